@@ -101,7 +101,7 @@ def _case(made: Campaign, recorded: RecordedLines, sigma: SigmaTable) -> Case:
     scatter = np.full(len(recorded.exact), np.inf)
     lines = 1 / (1 / relative).sum(axis=1)
     noise = recorded.response.experiment.noise
-    scatter[own.number] = np.sqrt(noise.gain**2 + _of_place(recorded.response) + lines)[own.number]
+    scatter[own.index] = np.sqrt(noise.gain**2 + _of_place(recorded.response) + lines)[own.index]
     return Case(made, recorded, scatter)
 
 

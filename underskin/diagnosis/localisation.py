@@ -1,28 +1,19 @@
-"""Where a misfit is: along which axis, in which region, of which shape and size.
+"""Where a misfit is: on which axes, in which region, of which size and shape.
 
-How large the misfit is where it lies: one number in percent, and its 95 % interval.
-
-Over the rows of the region, with weights 1/d²: rms² = (Σ|y − m|²/d² − what noise alone gives)/(Σ|m|²/d²), the noise
-being that of lines and of recordings' gains; and the mean along the model, Σ Re m*(y − m)/d² over the same. Where the
-misfit has one sign (|mean| at least 0.8 of the rms) the mean stands for it, with that sign; else the rms, which has
-none: it is above the model in part of the region and below it in others. The interval is the bootstrap's over whole
+Size: over the rows of the region, with weights 1/d², rms² = (Σ|y − m|²/d² − expected noise)/(Σ|m|²/d²), the noise being
+that of lines and of recordings' gains, and mean = Σ Re m*(y − m)/d² over the same. Where the misfit has one sign
+(|mean| at least 0.8 of the rms) the signed mean is given, otherwise the rms. The interval is a bootstrap over
 recordings.
 
-On which axes the residual depends, by permutation.
+Axes, by permutation: the gain residual, after what the other axes explain (Freedman and Lane 1983), is permuted among
+recordings, within sensors or days where there are several. For `frequency_hz` and `phase` the real and imaginary part
+of the lines' residuals change sign by recording. Each statistic is standardised by its own permutations; p-values are
+those of the largest over all axes, (b + 1)/(B + 1) (Westfall and Young 1993). An axis with too few arrangements, or
+that the others determine, is undecidable.
 
-A recording's axes: its gain residual, after what the other axes explain (Freedman and Lane 1983), is permuted among
-whole recordings, within sensors or within days where there are several. For `frequency_hz` and `phase`, the real and
-the imaginary part of the lines' residuals change sign by whole recordings. Each axis' statistic is standardised by its
-own permutations; the p-values are those of the largest over all axes, (b + 1)/(B + 1) (Westfall and Young 1993). An
-axis with too few arrangements, or that the others determine, is undecidable.
-
-The smallest region of the campaign's axes that holds most of the misfit.
-
-The shape of a residual that no mechanism describes: on which axis it lies, and which simple form fits it best.
-
-Forms over an axis x: power law (x^n), step (at a level of x), periodic (sine and cosine of one period), drift (linear
-in x), over frequency also a peak (a Lorentzian, real and imaginary part free), along a curve a bump (a Lorentzian).
-They are compared by the Bayesian information criterion; a form is a description, not an explanation.
+Shape: simple forms over an axis x: power law (x^n), step (at a level of x), periodic (sine and cosine of one period),
+drift (linear in x), over frequency also a peak (a Lorentzian, real and imaginary part free), along a curve a bump (a
+Lorentzian), compared by the Bayesian information criterion. A form is a description, not an explanation.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,7 +46,7 @@ def frequency_bins(frequency: Floats) -> tuple[Indices, Floats]:
 
 @dataclass(frozen=True)
 class EffectSize:
-    """In percent of the base model's response; `signed` where all of the region lies on one side of the model."""
+    """The misfit in percent of the base model's response; `signed` where it has one sign over the region."""
 
     percent: float
     low: float
@@ -111,11 +102,11 @@ def _ratios(square: Floats, along: Floats, size: Floats) -> tuple[Floats, Floats
 PERMUTATIONS = 999
 SEED = 20180205
 _LEAST_ARRANGEMENTS = 40
-_ALIASED = 0.98  # share of an axis' functions that the other axes' determine
-_MOST_SENSORS = 64  # of which each has a function of its own: time grows with the square of their number
-_LEVELS = 6  # up to as many levels an axis is a set of levels, beyond it a polynomial
+_ALIASED = 0.98  # share of an axis' functions that those of the other axes determine
+_MOST_SENSORS = 64  # with one function each: the time grows with the square of their number
+_LEVELS = 6  # number of levels up to which an axis is a factor; above it a polynomial
 SIGNIFICANT = 0.05
-_WORTH_TELLING = 0.005  # share of the misfit below which an axis is no cause to look for
+_WORTH_TELLING = 0.005  # share of the misfit below which an axis is not reported as its cause
 
 
 class Undecidable(StrEnum):
@@ -131,8 +122,8 @@ class Undecidable(StrEnum):
 class AxisResult:
     """Whether the residual depends on an axis: the p-value, and the share of the misfit that the axis explains.
 
-    `p_value` is None where that is undecidable, for the `reason`; `determined_by` are the axes without any of which
-    the others would no longer determine it, where that is the reason.
+    `p_value` is None where that is undecidable, for the `reason`. Where that is aliasing, `determined_by` are the axes
+    each of which is needed for the others to determine this one.
     """
 
     axis: str
@@ -143,12 +134,12 @@ class AxisResult:
 
     @property
     def significant(self) -> bool:
-        """Whether the residual depends on it beyond chance."""
+        """Whether the residual depends on the axis beyond chance."""
         return self.p_value is not None and self.p_value < SIGNIFICANT
 
     @property
     def telling(self) -> bool:
-        """Whether it does so, and with more than a trace of the misfit."""
+        """Whether it is significant and explains more than a trace of the misfit."""
         return self.significant and self.share >= _WORTH_TELLING
 
 
@@ -160,13 +151,13 @@ def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
     lines : Lines
         The recordings.
     residuals : Residuals
-        Of each recording's gain and of each line, against the base model.
+        Residuals of each recording's gain and of each line, against the base model.
 
     Returns
     -------
     list of AxisResult
-        Every axis that the campaign has: first those that are undecidable, then the others with p-values corrected for
-        their number.
+        Every axis of the campaign: first the undecidable ones, then the others with p-values corrected for their
+        number.
 
     Source
     ------
@@ -209,7 +200,7 @@ def _standardised(values: Floats) -> Floats:
 
 
 def _bases(lines: Lines) -> dict[str, Floats]:
-    """Of each axis a few functions over the recordings, their mean taken off; none of too many sensors."""
+    """A few functions of each axis over the recordings (recordings, functions); none for too many sensors."""
     bases = {}
     for name, column in recording_axes(lines.campaign).items():
         levels, level = np.unique(np.round(column, 9), axis=0, return_inverse=True)
@@ -229,10 +220,11 @@ def _bases(lines: Lines) -> dict[str, Floats]:
 
 
 def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
-    """Within which each axis' recordings may be exchanged: sensors, where each has several values of it; else days."""
+    """The blocks (recordings,) within which recordings may be permuted for each axis: sensors, where each has several
+    values of the axis, otherwise days."""
     none = np.zeros(lines.recordings, dtype=np.intp)
     days = none
-    times = [entry.recorded_at for entry in lines.campaign.recordings]
+    times = [recording.recorded_at for recording in lines.campaign.recordings]
     if None not in times:
         days = np.unique([str(time)[:10] for time in times], return_inverse=True)[1].reshape(-1)
     axes = recording_axes(lines.campaign)
@@ -241,15 +233,15 @@ def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
         if name == "sensor":
             blocks[name] = none
             continue
-        varies = [len(np.unique(axes[name][lines.sensor == number], axis=0)) > 1 for number in np.unique(lines.sensor)]
+        varies = [len(np.unique(axes[name][lines.sensor == sensor], axis=0)) > 1 for sensor in np.unique(lines.sensor)]
         blocks[name] = lines.sensor if all(varies) else (days if name != "recorded_at" else none)
     return blocks
 
 
 def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undecidable | None:
     arrangements = 1.0
-    for number in np.unique(blocks):
-        arrangements *= float(factorial(min(int((blocks == number).sum()), 20)))
+    for block in np.unique(blocks):
+        arrangements *= float(factorial(min(int((blocks == block).sum()), 20)))
     if arrangements < _LEAST_ARRANGEMENTS:
         return Undecidable.FEW_EXCHANGEABLE
     if others:
@@ -262,36 +254,36 @@ def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undeci
 
 
 def _determined(basis: Floats, others: Sequence[Floats]) -> bool:
-    """Whether functions of other axes make nearly all of each of an axis' own."""
+    """Whether the functions of other axes determine nearly all of each function of an axis."""
     design = np.column_stack([np.ones(len(basis)), *others])
     fitted = design @ np.linalg.lstsq(design, basis, rcond=None)[0]
     centred = basis - basis.mean(axis=0)
-    left = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
-    return bool(left.max() < 1 - _ALIASED)
+    unexplained = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
+    return bool(unexplained.max() < 1 - _ALIASED)
 
 
 def _determining(name: str, bases: Mapping[str, Floats], reason: Undecidable) -> tuple[str, ...]:
-    """The axes without any of which an aliased one would not be determined."""
+    """The axes each of which is needed for the others to determine an aliased one."""
     if reason is not Undecidable.ALIASED:
         return ()
     others = {key: basis for key, basis in bases.items() if key != name}
     return tuple(
-        left_out
-        for left_out in others
-        if not _determined(bases[name], [basis for key, basis in others.items() if key != left_out])
+        removed
+        for removed in others
+        if not _determined(bases[name], [basis for key, basis in others.items() if key != removed])
     )
 
 
 def _freedman_lane(
     gain: Floats, weight: Floats, basis: Floats, others: list[Floats], blocks: Indices, random: np.random.Generator
 ) -> Floats:
-    """The weighted square explained beyond the other axes: as observed, then under each permutation."""
+    """The weighted sum of squares explained beyond the other axes: as observed, then under each permutation."""
     reduced = np.column_stack([np.ones(len(gain)), *others]) * weight[:, None]
-    left, _, _ = np.linalg.svd(reduced, full_matrices=False)
-    left = left[:, : np.linalg.matrix_rank(reduced)]
+    reduced_basis, _, _ = np.linalg.svd(reduced, full_matrices=False)
+    reduced_basis = reduced_basis[:, : np.linalg.matrix_rank(reduced)]
 
     def beyond(rows: Floats) -> Floats:
-        return rows - left @ (left.T @ rows)
+        return rows - reduced_basis @ (reduced_basis.T @ rows)
 
     residual = beyond((gain * weight)[:, None])
     direction, size, _ = np.linalg.svd(beyond(basis * weight[:, None]), full_matrices=False)
@@ -309,7 +301,8 @@ def _permutations(blocks: Indices, random: np.random.Generator) -> Indices:
 
 
 def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator) -> dict[str, Floats]:
-    """For frequency (real part) and phase (imaginary part): the weighted square of the mean over recordings."""
+    """For frequency (real part) and phase (imaginary part), the weighted square of the mean over recordings: as
+    observed, then under each change of signs."""
     if lines.recordings < 6 or len(lines.value) < 2 * lines.recordings:
         return {}
     line, centres = frequency_bins(lines.frequency)
@@ -334,10 +327,10 @@ _MOST_OF_IT = 0.7
 
 
 def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dict[str, list[float | str]]:
-    """The smallest ranges of up to two telling axes that hold most of the misfit; of sensors or days the one where
+    """The smallest ranges of up to two significant axes that hold most of the misfit; of sensors or days the one where
     it is largest.
 
-    Along the lines it is the lines' misfit that counts, over recordings their gains'.
+    The misfit is that of the lines for axes of the lines, and that of the gains for axes of the recordings.
 
     Parameters
     ----------
@@ -351,9 +344,9 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     Returns
     -------
     dict
-        By axis the two ends of its range in the units of the campaign, or one text; empty where no axis tells.
+        By axis the two ends of its range in the units of the campaign, or one text; empty where no axis is significant.
     """
-    telling = sorted((entry for entry in results if entry.telling), key=lambda entry: -entry.share)[:2]
+    telling = sorted((result for result in results if result.telling), key=lambda result: -result.share)[:2]
     if not telling:
         return {}
     by_line = telling[0].axis in lines.row_axes
@@ -362,8 +355,8 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
         gain_misfit = (gain_misfit / np.bincount(lines.recording))[lines.recording]
     line_misfit = residuals.line_weight * np.abs(residuals.line) ** 2
     columns = {}
-    for entry in telling:
-        name = "frequency_hz" if entry.axis == "phase" else entry.axis
+    for result in telling:
+        name = "frequency_hz" if result.axis == "phase" else result.axis
         column = axis_values(lines, name, by_line)
         if column is not None:
             columns[name] = column
@@ -392,7 +385,7 @@ def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> Mask:
 
 
 def reaches_all_along(lines: Lines, name: str, ends: Sequence[float | str]) -> bool:
-    """Whether a region holds every value that the campaign has of one of its axes."""
+    """Whether a region holds all values of one of its axes in the campaign."""
     column = axis_values(lines, name, True)
     assert column is not None
     if column.dtype.kind == "U":
@@ -401,26 +394,27 @@ def reaches_all_along(lines: Lines, name: str, ends: Sequence[float | str]) -> b
 
 
 def axis_values(lines: Lines, name: str, by_line: bool) -> Array | None:
-    """A field's values in lab units, of each row or of each recording; the distance in mm stands for a position."""
+    """A field's values in lab units, by row or by recording; of a position the distance [mm]."""
     if name == "frequency_hz":
         return lines.frequency if by_line else None
-    entries = lines.campaign.recordings
+    recordings = lines.campaign.recordings
     if name == "displacement_mm":
-        curves = [np.asarray(getattr(entry, name)) for entry in entries]
+        curves = [np.asarray(getattr(recording, name)) for recording in recordings]
         return np.concatenate(curves) if by_line else None
     column: Array
     if name == "position_mm":
         x, y = recording_axes(lines.campaign)[name].T
         column = np.round(np.hypot(x, y), 6)
     elif name == "recorded_at":
-        column = np.array([str(entry.recorded_at)[:10] for entry in entries])
+        column = np.array([str(recording.recorded_at)[:10] for recording in recordings])
     else:
-        column = np.array([getattr(entry, name) for entry in entries])
+        column = np.array([getattr(recording, name) for recording in recordings])
     return column[lines.recording] if by_line else column
 
 
 def _smallest_range(column: Array, misfit: Floats) -> tuple[float | str, float | str]:
-    """The contiguous levels, fewest rows, that hold `_MOST_OF_IT` of the misfit; one level where they have no order."""
+    """The contiguous levels with the fewest rows that hold `_MOST_OF_IT` of the misfit; one level of an axis without
+    order."""
     levels, level, counts = np.unique(column, return_inverse=True, return_counts=True)
     held = np.bincount(level.reshape(-1), misfit, len(levels))
     if column.dtype.kind == "U":
@@ -461,10 +455,10 @@ class FormKind(StrEnum):
 
 @dataclass(frozen=True)
 class ShapeForm:
-    """A form, the value `at` which it lies (of periodic ones the period; NaN of none), and its size.
+    """A form, its position `at` on the axis (of a periodic form the period; NaN where it has none), and its size.
 
     The size is in percent of the response, of curves in percent of the largest force. `axis` is a field of the
-    campaign; `component` 0 or 1 is x or y of an axis of places. `gain` is the gain in information over a constant.
+    campaign; `component` 0 or 1 is x or y of a position. `gain` is the gain in information over a constant.
     """
 
     kind: FormKind
@@ -477,7 +471,7 @@ class ShapeForm:
 
 @dataclass(frozen=True)
 class Shape:
-    """The best form of what remains beyond some mechanisms; None where no simple form fits."""
+    """The best form of the residual beyond some mechanisms; None where no simple form fits."""
 
     beyond: tuple[str, ...]
     form: ShapeForm | None
@@ -485,7 +479,7 @@ class Shape:
 
 
 def describe(problem: FittingProblem, explanation: Explanation) -> Shape:
-    """The form on the axis where it takes away most."""
+    """The shape of an explanation's residual, on the axis where a form gains most."""
     forms = (_along_curves if problem.lines.curves else _over_axes)(problem, explanation)
     best = max(forms, key=lambda form: form.gain, default=None)
     return Shape(explanation.names, best, problem.lines.curves)
@@ -499,7 +493,7 @@ def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Sha
     weight = (lines.smooth.scale / lines.deviation) ** 2
     forms = []
     for name in ALONG_CURVES:
-        columns = [getattr(entry, name) for entry in lines.campaign.recordings]
+        columns = [getattr(recording, name) for recording in lines.campaign.recordings]
         if all(column is not None for column in columns):
             forms += _best_form(np.concatenate(columns), relative[:, None], weight, name)
     return forms
@@ -508,26 +502,26 @@ def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Sha
 def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
     """The best forms over each of the recordings' axes, and over the lines'."""
     levels = explanation.best.levels
-    left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
+    remaining = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     forms: list[ShapeForm] = []
     for name, column in recording_axes(problem.lines.campaign).items():
         for index in range(column.shape[1]):
             component = None if column.shape[1] == 1 else index
-            best = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
+            best = _best_form(column[:, index], remaining.gain[:, None], remaining.gain_deviation**-2, name)
             forms += [replace(form, component=component) for form in best]
     line, centres = frequency_bins(problem.lines.frequency)
     if len(centres) >= 6:
-        total = np.bincount(line, left.line_weight, len(centres)).astype(float)
+        total = np.bincount(line, remaining.line_weight, len(centres)).astype(float)
         parts = [
-            np.bincount(line, left.line_weight * part, len(centres)) / total
-            for part in (left.line.real, left.line.imag)
+            np.bincount(line, remaining.line_weight * part, len(centres)) / total
+            for part in (remaining.line.real, remaining.line.imag)
         ]
         forms += _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
     return forms
 
 
 def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[ShapeForm]:
-    """The form of largest information criterion, where one beats a constant; values (rows, parts)."""
+    """The form with the best information criterion, if better than a constant; values (rows, parts)."""
     if np.ptp(x) <= 0:
         return []
     root = np.sqrt(weight)[:, None]
@@ -553,8 +547,7 @@ _Candidate = tuple[Floats, int, FormKind, float]
 
 
 def _forms(x: Floats, axis: str) -> Iterator[_Candidate]:
-    """Basis functions, the number of shape parameters, the form and where it lies. Logarithmic axes come as
-    logarithms."""
+    """Basis functions, number of shape parameters, form and position; of logarithmic axes x is the logarithm."""
     logarithmic = axis in _LOGARITHMIC
     yield x[:, None], 0, FormKind.POWER_LAW if logarithmic else FormKind.DRIFT, np.nan
     levels = np.unique(x)

@@ -1,12 +1,12 @@
-"""The next experiment: which recordings best separate the explanations that survive.
+"""The next experiment: the recordings that best separate the surviving explanations.
 
-Candidates lie within the rig's limits, given or inferred from the campaign; where those separate nothing and the user
-gave none, within what most rigs can do besides. Each surviving explanation predicts the logarithm of every candidate's
-response, with the covariance S + J Σ Jᵀ: S the scatter of gains, of positioning and of lines, Σ what is still unknown
-of its own parameters (d33 among them, so that a common factor tells nothing). Recordings are added one by one, repeats
-allowed, the one first that raises the expected probability of deciding most; of equal ones that whose sphere is mounted
-already. That probability is simulated: truth drawn from the posterior, recordings from its prediction, and the
-posterior updated: the chance that the true explanation then could be stated without its rivals (`EXPLAINED`).
+Candidates lie within the rig's limits, given or inferred from the campaign; where these separate nothing and the user
+gave none, within what most rigs can do. Each surviving explanation predicts the logarithm of every candidate's
+response, with the covariance S + J Σ Jᵀ: S from the scatter of gains, positions and lines, Σ the posterior covariance
+of its own parameters (including d33, so that a common factor separates nothing). Recordings are added one by one,
+repeats allowed, each time the one that raises the expected probability of deciding most; of equal ones, one whose
+sphere is already mounted. That probability is simulated: truth drawn from the posterior, recordings from its
+prediction, then the posterior updated; it is the chance that the true explanation reaches `EXPLAINED`.
 """
 
 import itertools
@@ -28,38 +28,38 @@ from underskin.units import Floats, Mask
 SEED = 20180206
 _SIMULATIONS = 2000
 _ENOUGH = 0.95
-_LEAST_GAIN = 0.01  # in the probability of deciding that a further recording must bring
+_LEAST_GAIN = 0.01  # in the probability of deciding, by a further recording
 _SURVIVES = 0.02
 _RIVALS = 4
-_PROMISING = 0.3  # chance of deciding below which recordings are not proposed
+_PROMISING = 0.3  # probability of deciding below which no recordings are proposed
 WRONG_MODULUS = "modulus_error"
 _OF_FRFS = (  # what can be varied
     *("preload_n", "indenter_radius_mm", "position_mm", "dwell_s", "sensor", "dynamic_force_n", "load_cycles"),
     "frequency_hz",
 )
 _OF_CURVES = ("indenter_radius_mm", "displacement_mm", "force_n", "time_s", "sample_height_mm", "sample_diameter_mm")
-_MODULUS = ("youngs_modulus", "modulus_factor")  # whose logarithms make that of E
+_MODULUS = ("youngs_modulus", "modulus_factor")  # their logarithms add up to that of E
 _OF_BLOCK = 0.03  # relative, of E by a block: 2 % from piece to piece, and its fit
 
 
 @dataclass(frozen=True)
 class NextRecordings:
-    """The recordings to make next and what they promise; no recordings where none tells the rivals apart."""
+    """The recordings to make next and their value; no recordings where none separates the rivals."""
 
     rivals: Sequence[Sequence[str]]  # the mechanisms of each
-    recordings: Sequence[FrfConditions] = ()  # one object for those that are repeats, which are neighbours
-    first: FrfConditions | None = None  # the recording that tells most
+    recordings: Sequence[FrfConditions] = ()  # repeats are neighbours and the same object
+    first: FrfConditions | None = None  # the most informative recording
     probability: float = 0.0  # of deciding
     without: float = 0.0  # the same without further recordings
     minutes: float = 0.0
-    beyond: bool = False  # the recordings go beyond what the campaign did
+    beyond: bool = False  # the recordings go beyond the range of the campaign
     differ_on: Collection[str] = ()  # axes on which the rivals differ, where there are no recordings
     outside: bool = False  # all recordings within the limits lie beyond the tables
-    block: float | None = None  # chance that E from a block tells whether the modulus is wrong, where that is promising
+    block: float | None = None  # probability that E from a block decides whether the modulus is wrong, if promising
 
 
 def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextRecordings | None:
-    """The recordings to make, what they cost, and the chance that they decide; None if all is decided."""
+    """The recordings to make, their cost, and the probability that they decide; None if all is decided."""
     surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
         return None
@@ -80,8 +80,8 @@ def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextReco
 def _planned(
     problem: FittingProblem, surviving: Sequence[Answer], limits: RigLimits, beyond: bool
 ) -> NextRecordings | None:
-    """The best recordings within these limits; None where none brings anything, none in number where the tables hold
-    none of them."""
+    """The best recordings within these limits; None where none improves the decision, without recordings where the
+    tables hold none of them."""
     allowed = candidates(problem.lines.campaign, limits)
     rivals, outlook, allowed = _outlook(problem, surviving, allowed)
     if len(rivals) < 2:
@@ -104,9 +104,11 @@ def _planned(
 
 
 def _by_block(problem: FittingProblem, surviving: Sequence[Answer]) -> float | None:
-    """The chance that E, known from a compressed block or an indentation, tells whether the declared modulus is wrong,
-    where some rivals say so and some do not, both held equally probable; None where it is not promising, or curves
-    tell E already."""
+    """The probability that E from a compressed block or an indentation decides whether the declared modulus is wrong.
+
+    Rivals with and without a wrong modulus count as equally probable. None where it is not promising, where the rivals
+    agree on it, or where curves give E already.
+    """
     rivals = [answer for answer in surviving if answer.explanation is not None]
     wrong = np.array([WRONG_MODULUS in answer.names for answer in rivals])
     if problem.lines.curves or problem.beside is not None or not wrong.any() or wrong.all():
@@ -122,32 +124,33 @@ def _by_block(problem: FittingProblem, surviving: Sequence[Answer]) -> float | N
 
 
 def _log_modulus(explanation: Explanation) -> tuple[float, float]:
-    """ln E under an explanation, the declared one times what it makes of it, and its standard deviation."""
-    names = [entry.name for entry in explanation.model.parameters]
-    places = [names.index(name) for name in _MODULUS if name in names]
-    rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
+    """ln of E over the declared modulus under an explanation, and its standard deviation."""
+    names = [parameter.name for parameter in explanation.model.parameters]
+    indices = [names.index(name) for name in _MODULUS if name in names]
+    rows = [explanation.best.hypothesis.mean_places.index(index) for index in indices]
     variance = float(explanation.best.covariance[np.ix_(rows, rows)].sum())
-    return float(explanation.point.fit[places].sum()), float(np.sqrt(max(variance, 0.0)))
+    return float(explanation.point.fit[indices].sum()), float(np.sqrt(max(variance, 0.0)))
 
 
 def _nothing_to_plan(surviving: Sequence[Answer], varied: Collection[str]) -> NextRecordings:
-    """No recordings, and on which of the axes that can be `varied` the rivals would differ."""
+    """A plan without recordings, with the axes, of those that can be `varied`, on which the rivals would differ."""
     names = [answer.names for answer in surviving]
-    known = [own for own in names if set(own) <= set(CATALOGUE)]
-    axes = [{axis for name in own for axis in CATALOGUE[name].axes if axis in varied} for own in known]
+    listed = [mechanisms for mechanisms in names if set(mechanisms) <= set(CATALOGUE)]
+    axes = [{axis for name in mechanisms for axis in CATALOGUE[name].axes if axis in varied} for mechanisms in listed]
     return NextRecordings(
-        names, differ_on={axis for own in axes for axis in own if any(axis not in other for other in axes)}
+        names,
+        differ_on={axis for rival_axes in axes for axis in rival_axes if any(axis not in other for other in axes)},
     )
 
 
 def _outlook(
     problem: FittingProblem, surviving: Sequence[Answer], allowed: Sequence[FrfConditions]
 ) -> tuple[list[Answer], "_Outlook", list[FrfConditions]]:
-    """The rivals whose laws can be predicted there, what they predict, and the candidates that all tables hold."""
-    # The campaign's own recordings go along, so that each model has the parameters that it was fitted with.
+    """The rivals that can predict the candidates, their predictions, and the candidates within all tables."""
+    # The campaign's recordings are included, so that each model has the parameters that it was fitted with.
     campaign = problem.collapsed.campaign
     together = Conditions(campaign.name, campaign.skin, (*campaign.recordings, *allowed))
-    own = len(campaign.recordings)
+    count = len(campaign.recordings)
     inside = np.ones(len(allowed), dtype=bool)
     rivals, predictions = [], []
     for answer in surviving:
@@ -160,40 +163,40 @@ def _outlook(
         if len(model.parameters) != len(answer.explanation.point.fit):
             continue
         prediction = model.predict(answer.explanation.point.fit)
-        inside &= prediction.inside[own:] & (np.abs(prediction.value[own:]) > 0)
+        inside &= prediction.inside[count:] & (np.abs(prediction.value[count:]) > 0)
         rivals.append(answer)
         predictions.append(prediction)
-    kept = own + np.flatnonzero(inside)
+    rows = count + np.flatnonzero(inside)
     line = float(np.median(np.add.reduceat(problem.lines.deviation**-2.0, problem.lines.first)) ** -0.5)
     responses, unknown, scatter = [], [], []
     for answer, prediction in zip(rivals, predictions, strict=True):
         explanation = answer.explanation
         assert explanation is not None
-        levels, value = explanation.best.levels, prediction.value[kept]
-        slopes = (prediction.slopes[explanation.best.hypothesis.mean_places][:, kept] / value).real
+        levels, value = explanation.best.levels, prediction.value[rows]
+        slopes = (prediction.slopes[explanation.best.hypothesis.mean_places][:, rows] / value).real
         responses.append(np.log(np.abs(value)))
         unknown.append(slopes.T @ np.linalg.cholesky(explanation.best.covariance))
         variance = levels.gain**2 + (levels.level * line / np.abs(value)) ** 2
         if prediction.position_slopes is not None:
-            variance += levels.position**2 * (np.abs(prediction.position_slopes[:, kept] / value) ** 2).sum(axis=0)
+            variance += levels.position**2 * (np.abs(prediction.position_slopes[:, rows] / value) ** 2).sum(axis=0)
         scatter.append(variance)
     prior = np.array([answer.probability for answer in rivals])
     outlook = _Outlook(np.array(responses), unknown, np.array(scatter), prior / prior.sum())
-    return rivals, outlook, [entry for entry, good in zip(allowed, inside, strict=True) if good]
+    return rivals, outlook, [candidate for candidate, good in zip(allowed, inside, strict=True) if good]
 
 
 @dataclass(frozen=True)
 class _Outlook:
-    """What the rivals predict, and how sure each is."""
+    """Predictions of the rivals with their uncertainty and prior."""
 
     responses: Floats  # log |response| (rivals, candidates)
-    unknown: list[Floats]  # of each W (candidates, parameters), W Wᵀ the covariance from its own parameters
+    unknown: list[Floats]  # of each rival W (candidates, parameters), W Wᵀ being the covariance from its parameters
     scatter: Floats  # variance of the logarithm of a new recording (rivals, candidates)
     prior: Floats  # (rivals,)
 
     def deciding(self, chosen: Sequence[int], alike: Mask | None = None) -> float:
-        """The simulated chance that the true explanation holds `EXPLAINED` after these recordings, together with those
-        that are `alike` (rivals, rivals)."""
+        """The simulated probability that the true explanation, with those that are `alike` (rivals, rivals), reaches
+        `EXPLAINED` after these recordings."""
         random = np.random.default_rng(SEED)
         truth = random.choice(len(self.prior), size=_SIMULATIONS, p=self.prior)
         noise = random.normal(size=(_SIMULATIONS, len(chosen)))
@@ -214,7 +217,8 @@ class _Outlook:
 
     @property
     def promising(self) -> list[int]:
-        """Candidates at the ends of what separates each pair of rivals: only these are worth a simulation."""
+        """Candidates where the predictions of a pair of rivals differ most in either direction; only these are
+        simulated."""
         ends: list[int] = []
         for first, second in itertools.combinations(range(len(self.prior)), 2):
             order = np.argsort(self.responses[first] - self.responses[second], kind="stable").tolist()
@@ -223,7 +227,8 @@ class _Outlook:
 
 
 def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: RigLimits) -> tuple[list[int], float]:
-    """Recordings, two and then one at a time, until they decide or a further one brings too little."""
+    """Indices of the recordings, chosen two and then one at a time until they decide or a further one gains too little,
+    and the probability of deciding."""
     promising = outlook.promising
     chosen: list[int] = []
     best = outlook.deciding([])

@@ -1,4 +1,4 @@
-"""What the rig can do, as the user says or as the campaign did, and the recordings that this allows."""
+"""What the rig can do, given by the user or inferred from the campaign, and the recordings within these limits."""
 
 import itertools
 import math
@@ -12,17 +12,17 @@ from underskin.errors import out_of_range
 from underskin.recordings.campaign import Conditions, FrfConditions, frf_of, offsets
 
 MOST_RECORDINGS = 8
-_FURTHER = 1.25  # beyond the highest preload used
+_FURTHER = 1.25  # times the highest preload used
 _PRELOADS = 8
-# Than the campaign's largest dynamic force and longest dwell, where no more is known
+# Times the campaign's largest dynamic force and longest dwell, where limits are not given
 _LOUDER, _LONGER = (3.0, 10.0), 10.0
 
 
 @dataclass(frozen=True)
 class RigLimits:
-    """What the rig can do, in lab units; what is left None is inferred from the campaign.
+    """The limits of the rig, in lab units; fields that are None are inferred from the campaign.
 
-    Raises InvalidInput where no rig could: a force, a radius or a count not above zero, a distance or a time below it.
+    Raises InvalidInput for a force, a radius or a count not above zero, or a distance or a time below zero.
     """
 
     preload_n: tuple[float, float] | None = None
@@ -48,7 +48,7 @@ class RigLimits:
 
     @property
     def given(self) -> bool:
-        """Whether the user said anything of what the rig can do."""
+        """Whether the user gave any limit."""
         return any(
             value is not None
             for value in (self.preload_n, self.indenter_radius_mm, self.dynamic_force_n, self.dwell_s, self.offset_mm)
@@ -56,25 +56,26 @@ class RigLimits:
 
 
 def inferred(conditions: Conditions, limits: RigLimits) -> RigLimits:
-    """The limits, those left open as the campaign did it: its spheres, amplitudes, dwells and distances from the
-    sensor, its preloads and a quarter beyond the highest."""
-    entries = frf_of(conditions)
-    preloads = [entry.preload_n for entry in entries]
+    """The limits with missing ones from the campaign: its spheres, dynamic forces, dwells and distances from the
+    sensor, and its preloads up to a quarter beyond the highest."""
+    recordings = frf_of(conditions)
+    preloads = [recording.preload_n for recording in recordings]
     distances = np.round(1e3 * np.hypot(*offsets(conditions).T), 1)
-    dwells = [entry.dwell_s for entry in entries if entry.dwell_s is not None]
+    dwells = [recording.dwell_s for recording in recordings if recording.dwell_s is not None]
     return replace(
         limits,
         preload_n=limits.preload_n or (min(preloads), _FURTHER * max(preloads)),
-        indenter_radius_mm=limits.indenter_radius_mm or sorted({entry.indenter_radius_mm for entry in entries}),
-        dynamic_force_n=limits.dynamic_force_n or _ends([entry.dynamic_force_n for entry in entries]),
-        dwell_s=limits.dwell_s or (_ends(dwells) if len(dwells) == len(entries) else ()),
+        indenter_radius_mm=limits.indenter_radius_mm
+        or sorted({recording.indenter_radius_mm for recording in recordings}),
+        dynamic_force_n=limits.dynamic_force_n or _ends([recording.dynamic_force_n for recording in recordings]),
+        dwell_s=limits.dwell_s or (_ends(dwells) if len(dwells) == len(recordings) else ()),
         offset_mm=_ends(distances.tolist()) if limits.offset_mm is None else limits.offset_mm,
     )
 
 
 def wider(conditions: Conditions, limits: RigLimits) -> RigLimits:
-    """Inferred limits with what most rigs can do besides: a larger dynamic force, a longer dwell, half and all of the
-    thickness beside the sensor."""
+    """Inferred limits widened to what most rigs can do: larger dynamic forces, a longer dwell, and contacts at half and
+    at one thickness from the sensor."""
     thickness = conditions.skin.thickness_mm
     assert thickness is not None
     assert limits.dynamic_force_n is not None
@@ -94,25 +95,25 @@ def _ends(values: Sequence[float]) -> list[float]:
 
 def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]:
     """A recording for every combination within the limits, at the sensor that was recorded most, after all others."""
-    entries = frf_of(conditions)
-    sensors = [entry.sensor for entry in entries]
+    recordings = frf_of(conditions)
+    sensors = [recording.sensor for recording in recordings]
     sensor = max(dict.fromkeys(sensors), key=sensors.count)
-    place = next((known.x_mm, known.y_mm) for known in conditions.skin.sensors if known.id == sensor)
-    cycles = [entry.load_cycles for entry in entries if entry.load_cycles is not None]
+    position = next((declared.x_mm, declared.y_mm) for declared in conditions.skin.sensors if declared.id == sensor)
+    cycles = [recording.load_cycles for recording in recordings if recording.load_cycles is not None]
     return [
         FrfConditions(
-            id=f"candidate {number}",
+            id=f"candidate {index}",
             sensor=sensor,
             indenter_radius_mm=sphere,
             preload_n=force,
             dynamic_force_n=amplitude,
-            recorded_at=entries[0].recorded_at,
+            recorded_at=recordings[0].recorded_at,
             dwell_s=dwell,
-            load_cycles=max(cycles) if len(cycles) == len(entries) else None,
-            position_mm=(place[0] + round(offset, 3), place[1]),
+            load_cycles=max(cycles) if len(cycles) == len(recordings) else None,
+            position_mm=(position[0] + round(offset, 3), position[1]),
             frequency_hz=np.array([COLLAPSED_HZ]),
         )
-        for number, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))
+        for index, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))
     ]
 
 

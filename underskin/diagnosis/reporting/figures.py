@@ -1,11 +1,8 @@
-"""The figures of reports.
+"""Figures of reports, as plotly objects in lab units.
 
-Figures of a diagnosis: where recordings and model differ, measured against predicted before and after, how probable
-each explanation is; those of single recordings and of parameters have files of their own. Maps have a scale from purple
-to orange, which colour-blind people tell apart; lab units.
-
-Figures of reports on several campaigns: d33 of each sensor from campaign to campaign, and what each skin of a fleet
-has beside the band of the population; from the report alone.
+Of one diagnosis: where recordings and model differ, measured against predicted before and after, and the probability
+of each explanation. Of several campaigns, from the report alone: d33 of each sensor over the campaigns, and each skin
+against the band of its population. Colour scales run from purple to orange, which colour-blind readers can tell apart.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,45 +39,45 @@ from underskin.recordings.campaign import Campaign
 from underskin.units import Floats, readable_unit
 
 _GREY = "#BBBBBB"
-_MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, that show their number
-_CELL = 10  # pixels, of those numbers: 7.5 points on paper
-_TITLE, _TITLE_SIZE, _TITLE_LINE = 18, 12, 16  # of a panel: characters on a line; pixels of a letter and of a line
-_ABOVE_NOISE = 2.0  # times what 95 % of the noise stays in: as far the colours of a map reach at least
+_MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, up to which numbers are shown
+_CELL = 10  # pixels, size of these numbers: 7.5 points on paper
+_TITLE, _TITLE_SIZE, _TITLE_LINE = 18, 12, 16  # of a panel: characters per line; pixels of a letter and of a line
+_ABOVE_NOISE = 2.0  # least end of a map's colour scale, over the 95 % interval of the noise
 _BAND = 60  # points along a band
-_LABEL = 24  # characters on a line of a label
-_EDGE = 0.04  # of what is shown: room at an axis' ends
+_LABEL = 24  # characters per line of a label
+_EDGE = 0.04  # of the range shown: margin at the ends of an axis
 
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
-    """By name, those there are: where, frf or curve, before_after, explanations, parameters. `document`: its report."""
+    """The figures by name: where, frf or curve, before_after, explanations, parameters. `document`: the report."""
     if diagnosis.search is None or diagnosis.problem is None:
         return {}
-    nothing = next(entry for entry in diagnosis.search.explanations if not entry.names)
+    base = next(explanation for explanation in diagnosis.search.explanations if not explanation.names)
     shown = diagnosis.search.fit_behind(diagnosis.search.answers[0])
     thinned = Thinned(diagnosis, diagnosis.problem, shown)
-    before, after = thinned.points(nothing), thinned.points(shown)
+    before, after = thinned.points(base), thinned.points(shown)
     drawn = {
         "where": residual_map(diagnosis, thinned, before, after),
         "before_after": before_and_after(diagnosis, thinned, before, after, shown),
         "explanations": explanations(document),
     }
     if diagnosis.curves is not None:
-        drawn["curve"] = _curve(diagnosis.problem, diagnosis.curves, nothing, shown)
+        drawn["curve"] = _curve(diagnosis.problem, diagnosis.curves, base, shown)
     elif not diagnosis.problem.lines.curves:
-        recordings = shown_frfs(diagnosis.problem, nothing, shown)
+        recordings = shown_frfs(diagnosis.problem, base, shown)
         drawn["frf"] = frf_figure(recordings, *_models(diagnosis.problem, shown))
-    if any(entry["parameters"] for entry in document["mechanisms"]):
+    if any(mechanism["parameters"] for mechanism in document["mechanisms"]):
         drawn["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
     return drawn
 
 
-def _curve(problem: FittingProblem, recorded: Campaign, nothing: Explanation, shown: Explanation) -> go.Figure:
-    """Each curve with the model before and after; with one of them where nothing is added."""
-    return curve_figure(shown_curves(problem, recorded, nothing, shown), problem.kind, *_models(problem, shown))
+def _curve(problem: FittingProblem, recorded: Campaign, base: Explanation, shown: Explanation) -> go.Figure:
+    """Each curve with the model before and after; with one model where nothing is added."""
+    return curve_figure(shown_curves(problem, recorded, base, shown), problem.kind, *_models(problem, shown))
 
 
 def _models(problem: FittingProblem, shown: Explanation) -> tuple[str, str]:
-    """What the models before and after are called; before empty where nothing is added."""
+    """Names of the models before and after; before is empty where nothing is added."""
     simplest = SIMPLEST[problem.kind]
     return (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
 
@@ -88,10 +85,10 @@ def _models(problem: FittingProblem, shown: Explanation) -> tuple[str, str]:
 def explanations(document: Mapping[str, Any]) -> go.Figure:
     """The probability of each explanation in a report, the stated answer on top."""
     stated = {"no_mismatch": ["nothing_missing"], "unexplained": ["none_of_these"]}
-    leader = stated.get(document["verdict"]) or [entry["name"] for entry in document["mechanisms"]]
+    leader = stated.get(document["verdict"]) or [mechanism["name"] for mechanism in document["mechanisms"]]
     rows = [(leader, document["probability"])]
-    rows += [(entry["mechanisms"], entry["probability"]) for entry in document["alternatives"]]
-    names = [_in_lines([escape(name.replace("_", " ")) for name in entry]) for entry, _ in rows]
+    rows += [(alternative["mechanisms"], alternative["probability"]) for alternative in document["alternatives"]]
+    names = [_in_lines([escape(name.replace("_", " ")) for name in mechanisms]) for mechanisms, _ in rows]
     values = [value for _, value in rows]
     figure = go.Figure()
     figure.add_bar(
@@ -115,7 +112,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
 
 
 def _in_lines(names: Sequence[str]) -> str:
-    """Mechanisms as an axis has room for them: as many on a line as are short."""
+    """Mechanisms broken into lines of at most `_LABEL` characters, where names are short enough."""
     lines: list[str] = []
     for name in names:
         if lines and len(lines[-1]) + len(name) <= _LABEL:
@@ -126,18 +123,18 @@ def _in_lines(names: Sequence[str]) -> str:
 
 
 def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points) -> go.Figure:
-    """Measured less the model to which nothing is added, over the located axes; the region outlined.
+    """Residual of the base model over the located axes, with the region outlined.
 
-    A cell is the mean over the points in it; out of phase where the misfit lies in the phase, as the title says. What
-    is within the noise is pale: that of what is stated, since the model alone takes its misfit for noise. `meta` of the
-    layout has what 95 % of it stays in [%].
+    A cell is the mean over its points; out of phase where the misfit lies in the phase, as the title says. Cells within
+    the noise are pale. The noise is that of the stated explanation, since the base model counts its misfit as noise;
+    `meta` of the layout has half its 95 % interval [%].
     """
     part, name = _part(diagnosis, before.residual_percent)
     which = "" if thinned.lines.curves else f", {name}"
     x_axis, y_axis = _map_axes(diagnosis, thinned)
     x, y = (None if axis is None else thinned.levels(axis) for axis in (x_axis, y_axis))
-    one_place = Levels(np.zeros(len(before.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
-    x, y = (one_place if entry is None else entry for entry in (x, y))
+    single_level = Levels(np.zeros(len(before.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
+    x, y = (single_level if levels is None else levels for levels in (x, y))
     cell = y.step * len(x.names) + x.step
     size = len(x.names) * len(y.names)
     count = np.bincount(cell, minlength=size)
@@ -154,7 +151,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
         zmax=limit,
         colorscale="PuOr_r",
         customdata=count.reshape(shape),
-        text=np.array([_whole(value) for value in mean]).reshape(shape) if labelled else None,
+        text=np.array([_percent_label(value) for value in mean]).reshape(shape) if labelled else None,
         texttemplate="%{text}" if labelled else None,
         textfont={"size": _CELL} if len(y.names) <= _MOST_ABREAST else None,
         xgap=1,
@@ -162,9 +159,9 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
         colorbar={"title": {"text": f"{name} [%]", "side": "right"}},
         hovertemplate="%{z:+.3g} % (mean of %{customdata})<extra></extra>",
     )
-    for entry, update in ((x, figure.update_xaxes), (y, figure.update_yaxes)):
-        labels = [escape(label) for label in entry.names]
-        update(title=entry.title, tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
+    for levels, update in ((x, figure.update_xaxes), (y, figure.update_yaxes)):
+        labels = [escape(label) for label in levels.names]
+        update(title=levels.title, tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
     if diagnosis.region:
         (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
         figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": MEASURED, "width": 3})
@@ -176,8 +173,8 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
     return styled(figure)
 
 
-def _whole(percent: float) -> str:
-    """A number of a cell with its sign; empty where there is none."""
+def _percent_label(percent: float) -> str:
+    """The signed number in a cell; empty for NaN."""
     if np.isnan(percent):
         return ""
     return f"{percent:+.0f}".replace("-", "−") if round(percent) else "0"
@@ -186,9 +183,9 @@ def _whole(percent: float) -> str:
 def before_and_after(
     diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points, shown: Explanation
 ) -> go.Figure:
-    """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
-    called = f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"
-    titles = ["<br>".join(wrap(title, _TITLE)) for title in called]
+    """Measured against predicted, by the base model and by the stated explanation, each with the band of the noise."""
+    headings = f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"
+    titles = ["<br>".join(wrap(title, _TITLE)) for title in headings]
     figure = make_subplots(1, 2, subplot_titles=titles, horizontal_spacing=0.12)
     further = _TITLE_LINE * max(title.count("<br>") for title in titles)
     _, name = _part(diagnosis, before.measured)
@@ -200,16 +197,16 @@ def before_and_after(
     both = np.concatenate([column for points in (before, after) for column in (points.predicted, points.measured)])
     shown_part = _part(diagnosis, both)[0]
     room = _EDGE * float(np.ptp(shown_part))
-    whole = [float(shown_part.min()) - room, float(shown_part.max()) + room]
-    ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
-    for place, (points, colour, marker) in enumerate(
+    axis_range = [float(shown_part.min()) - room, float(shown_part.max()) + room]
+    ids = [escape(recording.id) for recording in thinned.lines.campaign.recordings]
+    for panel, (points, colour, marker) in enumerate(
         ((before, BEFORE, "square-open"), (after, AFTER, "circle")), start=1
     ):
         predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
         along = np.linspace(predicted.min(), predicted.max(), _BAND)
-        # Where all predictions are alike the band would have no width along the abscissa.
+        # If all predictions were equal the band would have no width along the abscissa.
         along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
-        # That of what is stated in both: the model alone takes its misfit for noise.
+        # The noise of the stated explanation in both: the base model counts its misfit as noise.
         half = SDS_OF_95 * np.hypot(after.gain * along, float(np.median(after.deviation)))
         figure.add_scatter(
             x=[*along, *along[::-1]],
@@ -219,30 +216,30 @@ def before_and_after(
             line={"width": 0},
             hoverinfo="skip",
             name="95 % of the noise",
-            showlegend=place == 1,
+            showlegend=panel == 1,
             row=1,
-            col=place,
+            col=panel,
         )
         figure.add_scatter(
             x=along, y=along, mode="lines", name="measured = predicted", hoverinfo="skip",
-            line={"color": MEASURED, "width": 1, "dash": BOUND}, showlegend=place == 1, row=1, col=place,
+            line={"color": MEASURED, "width": 1, "dash": BOUND}, showlegend=panel == 1, row=1, col=panel,
         )  # fmt: skip
         figure.add_scatter(
             x=predicted,
             y=measured,
             mode="markers",
             marker={"color": colour, "symbol": marker, "size": 6, "opacity": 0.7},
-            name=("before", "after")[place - 1],
-            text=[ids[number] for number in points.recording],
+            name=("before", "after")[panel - 1],
+            text=[ids[index] for index in points.recording],
             hovertemplate="%{text}<br>predicted %{x:.4g}<br>measured %{y:.4g}<extra></extra>",
             row=1,
-            col=place,
+            col=panel,
         )
-    figure.update_xaxes(title=f"predicted [{unit}]", title_font_size=_TITLE_SIZE, range=whole)
+    figure.update_xaxes(title=f"predicted [{unit}]", title_font_size=_TITLE_SIZE, range=axis_range)
     figure.update_yaxes(title=f"measured {what}[{unit}]", title_font_size=_TITLE_SIZE, col=1)
-    for place in (1, 2):
-        figure.update_yaxes(range=whole, scaleanchor=f"x{place}", constrain="domain", row=1, col=place)
-        figure.update_xaxes(constrain="domain", row=1, col=place)
+    for panel in (1, 2):
+        figure.update_yaxes(range=axis_range, scaleanchor=f"x{panel}", constrain="domain", row=1, col=panel)
+        figure.update_xaxes(constrain="domain", row=1, col=panel)
     figure.update_layout(
         title="Measured against predicted",
         height=470 + further,
@@ -254,33 +251,33 @@ def before_and_after(
 
 
 def _named(shown: Explanation) -> str:
-    known = shown.best.hypothesis.lines.mechanisms
-    said = " + ".join(in_plain_words(known[name]) for name in shown.names)
-    return said.replace("_", " ") or "nothing added"
+    mechanisms = shown.best.hypothesis.lines.mechanisms
+    label = " + ".join(in_plain_words(mechanisms[name]) for name in shown.names)
+    return label.replace("_", " ") or "nothing added"
 
 
 def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
-    """The real part, or the imaginary where the misfit lies in the phase alone, and what it is called."""
+    """The real part, or the imaginary part where the misfit lies in the phase, and its name."""
     if diagnosis.problem is not None and diagnosis.problem.lines.curves:
         return column.real, "force"
-    telling = [entry for entry in diagnosis.axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
-    largest = max(telling, key=lambda entry: entry.share, default=None)
+    telling = [result for result in diagnosis.axes if result.p_value is not None and result.p_value < SIGNIFICANT]
+    largest = max(telling, key=lambda result: result.share, default=None)
     if largest is not None and largest.axis == "phase":
         return column.imag, "out of phase"
     return column.real, "in phase"
 
 
 def _map_axes(diagnosis: DiagnosisResult, thinned: Thinned) -> tuple[str | None, str | None]:
-    """Those of the region, then the campaign's, as far as points differ along them; frequency lies on x."""
+    """The first two axes along which points differ, those of the region first; frequency is on x."""
     every = thinned.axes()
-    wanted = [name for name in dict.fromkeys([*diagnosis.region, *every]) if name in every]
-    varying: list[str | None] = [name for name in wanted if thinned.levels(name) is not None]
+    candidates = [name for name in dict.fromkeys([*diagnosis.region, *every]) if name in every]
+    varying: list[str | None] = [name for name in candidates if thinned.levels(name) is not None]
     first, second = (*varying, None, None)[:2]
     return (second, first) if second in thinned.lines.row_axes else (first, second)
 
 
 def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tuple[float, float]:
-    """From where to where the region reaches on an axis of the map, whose steps are 0, 1, …"""
+    """Ends of the region on an axis of the map, whose steps are 0, 1, …"""
     ends = diagnosis.region.get(axis or "")
     if ends is None:
         return -0.5, len(levels.names) - 0.5
@@ -291,12 +288,12 @@ def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tu
 
 
 _MARKERS = ("circle", "square", "diamond", "cross", "triangle-up", "x")
-_BESIDE = 0.5  # of a campaign's place on the axis, over which its sensors lie side by side
+_SENSORS_WIDTH = 0.5  # of the distance between campaigns, over which the sensors of one are spread
 _ROW, _OF_SKIN = 130, 22  # height of a quantity, and of a skin in it [pixels]
 
 
 def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
-    """By name: sensors, population; those that the report has."""
+    """The figures of the report by name: sensors, population."""
     drawn = {}
     rows = (document["d33"] or {}).get("per_sensor")
     if rows:
@@ -307,15 +304,17 @@ def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
 
 
 def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> go.Figure:
-    """d33 with its 95 % interval of each sensor in each campaign, sensors side by side; of many their median, the range
-    of most and, by name, those that stand apart. `rows` are those of `d33.per_sensor`, `names` all campaigns in their
-    order: one of which no d33 is told has its place too."""
-    told = dict.fromkeys(row["campaign"] for row in rows)
-    campaigns = list(dict.fromkeys([*names, *told]))
+    """d33 with its 95 % interval of each sensor in each campaign; of many sensors the median, the range of 90 % and,
+    by name, the outliers.
+
+    `rows` are those of `d33.per_sensor`, `names` all campaigns in order, including those without d33.
+    """
+    with_d33 = dict.fromkeys(row["campaign"] for row in rows)
+    campaigns = list(dict.fromkeys([*names, *with_d33]))
     sensors = list(dict.fromkeys(row["sensor"] for row in rows))
     few = len(sensors) <= MOST_NAMED
-    figure = go.Figure(list(_each(rows, campaigns, sensors) if few else _most(rows, campaigns)))
-    labels = [escape(name) + ("" if name in told else "<br>(no d33)") for name in campaigns]
+    figure = go.Figure(list(_by_sensor(rows, campaigns, sensors) if few else _summarised(rows, campaigns)))
+    labels = [escape(name) + ("" if name in with_d33 else "<br>(no d33)") for name in campaigns]
     figure.update_xaxes(title="campaign", tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
     figure.update_yaxes(title=f"d33 [{rows[0]['unit']}]" + (", 95 %" if few else ""))
     title = "d33 of each sensor over the campaigns"
@@ -327,96 +326,99 @@ def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]], names: Sequence[st
     return styled(figure)
 
 
-def _each(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str], sensors: Sequence[str]) -> Iterator[go.Scatter]:
-    beside = _BESIDE * (np.arange(len(sensors)) - (len(sensors) - 1) / 2) / len(sensors)
-    for number, sensor in enumerate(sensors):
-        own = [row for row in rows if row["sensor"] == sensor]
+def _by_sensor(
+    rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str], sensors: Sequence[str]
+) -> Iterator[go.Scatter]:
+    offsets = _SENSORS_WIDTH * (np.arange(len(sensors)) - (len(sensors) - 1) / 2) / len(sensors)
+    for index, sensor in enumerate(sensors):
+        sensor_rows = [row for row in rows if row["sensor"] == sensor]
         yield go.Scatter(
-            x=[campaigns.index(row["campaign"]) + beside[number] for row in own],
-            y=[row["value"] for row in own],
-            error_y=_reaching(own),
+            x=[campaigns.index(row["campaign"]) + offsets[index] for row in sensor_rows],
+            y=[row["value"] for row in sensor_rows],
+            error_y=_error_bars(sensor_rows),
             mode="lines+markers",
             name=escape(sensor),
-            line={"color": LINE_COLOURS[number % len(LINE_COLOURS)], "width": 1},
-            marker={"symbol": _MARKERS[number % len(_MARKERS)], "size": 8},
-            text=[escape(row["campaign"]) for row in own],
+            line={"color": LINE_COLOURS[index % len(LINE_COLOURS)], "width": 1},
+            marker={"symbol": _MARKERS[index % len(_MARKERS)], "size": 8},
+            text=[escape(row["campaign"]) for row in sensor_rows],
             hovertemplate="%{text}: %{y:.4g} pC/N<extra>%{fullData.name}</extra>",
         )
 
 
-def _most(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterator[go.Scatter]:
-    """The median of each campaign's sensors with the range of 90 % of them, then those that stand apart."""
+def _summarised(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterator[go.Scatter]:
+    """The median of each campaign's sensors with the range of 90 % of them, then the outliers."""
     of_campaign = {
-        number: own
+        number: campaign_rows
         for number, name in enumerate(campaigns)
-        if (own := [row for row in rows if row["campaign"] == name])
+        if (campaign_rows := [row for row in rows if row["campaign"] == name])
     }
-    found = [
+    summaries = [
         many_sensors(
-            np.array([row["value"] for row in own]),
-            np.array([(row["high"] - row["low"]) / (2 * SDS_OF_95) for row in own]),
+            np.array([row["value"] for row in campaign_rows]),
+            np.array([(row["high"] - row["low"]) / (2 * SDS_OF_95) for row in campaign_rows]),
         )
-        for own in of_campaign.values()
+        for campaign_rows in of_campaign.values()
     ]
-    ends = [{"value": one.median, "low": one.low, "high": one.high} for one in found]
+    ends = [{"value": summary.median, "low": summary.low, "high": summary.high} for summary in summaries]
     yield go.Scatter(
         x=list(of_campaign),
-        y=[one.median for one in found],
-        error_y=_reaching(ends),
+        y=[summary.median for summary in summaries],
+        error_y=_error_bars(ends),
         mode="lines+markers",
         name="median",
         line={"color": AFTER, "width": 1},
         marker={"symbol": "circle", "size": 9},
         hovertemplate="median %{y:.4g} pC/N<extra></extra>",
     )
-    apart = [
-        (number, own[place])
-        for (number, own), one in zip(of_campaign.items(), found, strict=True)
-        for place in one.apart
+    outliers = [
+        (number, campaign_rows[index])
+        for (number, campaign_rows), summary in zip(of_campaign.items(), summaries, strict=True)
+        for index in summary.apart
     ]
     yield go.Scatter(
-        x=[number for number, _ in apart],
-        y=[row["value"] for _, row in apart],
-        error_y=_reaching([row for _, row in apart]),
+        x=[number for number, _ in outliers],
+        y=[row["value"] for _, row in outliers],
+        error_y=_error_bars([row for _, row in outliers]),
         mode="markers+text",
         name="stands apart",
         marker={"color": BEFORE, "symbol": "square", "size": 8},
-        text=[escape(row["sensor"]) for _, row in apart],
+        text=[escape(row["sensor"]) for _, row in outliers],
         textposition="middle right",
         hovertemplate="%{text}: %{y:.4g} pC/N<extra></extra>",
     )
 
 
 def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
-    """Each quantity of each skin with its 95 % interval on the band of the population (95 %), those that depart in
-    another colour; `populations` is the report's `population`."""
+    """Each quantity of each skin with its 95 % interval on the 95 % band of the population, departing skins in another
+    colour; `populations` is the report's `population`."""
     titles = [
-        capital(quantity_in_words(entry["parameter"])) + ("" if entry["unit"] == "-" else f" [{entry['unit']}]")
-        for entry in populations
+        capital(quantity_in_words(population["parameter"]))
+        + ("" if population["unit"] == "-" else f" [{population['unit']}]")
+        for population in populations
     ]
-    skins = max(len(entry["skins"]) for entry in populations)
+    skins = max(len(population["skins"]) for population in populations)
     figure = make_subplots(len(populations), 1, subplot_titles=titles)
-    for place, entry in enumerate(populations, start=1):
-        departing = {one["skin"] for one in entry["departures"]}
+    for panel, population in enumerate(populations, start=1):
+        departing = {departure["skin"] for departure in population["departures"]}
         for departs, colour, name in ((False, AFTER, "as the others"), (True, BEFORE, "departs")):
-            own = [one for one in entry["skins"] if (one["skin"] in departing) is departs]
+            skin_rows = [row for row in population["skins"] if (row["skin"] in departing) is departs]
             figure.add_scatter(
-                x=[one["value"] for one in own],
-                y=[escape(one["skin"]) for one in own],
-                error_x=_reaching(own),
+                x=[row["value"] for row in skin_rows],
+                y=[escape(row["skin"]) for row in skin_rows],
+                error_x=_error_bars(skin_rows),
                 mode="markers",
                 marker={"color": colour, "symbol": "square" if departs else "circle", "size": 9},
                 name=name,
                 legendgroup=name,
-                showlegend=place == 1,
+                showlegend=panel == 1,
                 hovertemplate="%{y}: %{x:.4g}<extra></extra>",
-                row=place,
+                row=panel,
                 col=1,
             )
-        half = SDS_OF_95 * entry["sd"]  # plotly draws bands on subplots that have points alone
-        low, high = entry["mean"] - half, entry["mean"] + half
-        figure.add_vrect(x0=low, x1=high, fillcolor="rgba(0,0,0,0.12)", line_width=0, row=place, col=1)
-        figure.add_vline(x=entry["mean"], line={"color": "#000000", "width": 1}, row=place, col=1)
+        half = SDS_OF_95 * population["sd"]  # plotly draws bands on subplots that have points alone
+        low, high = population["mean"] - half, population["mean"] + half
+        figure.add_vrect(x0=low, x1=high, fillcolor="rgba(0,0,0,0.12)", line_width=0, row=panel, col=1)
+        figure.add_vline(x=population["mean"], line={"color": "#000000", "width": 1}, row=panel, col=1)
     figure.update_layout(
         title="Each skin, and the band in which 95 % of such skins lie",
         height=150 + len(populations) * (_ROW + _OF_SKIN * skins),
@@ -424,8 +426,8 @@ def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
     return styled(figure)
 
 
-def _reaching(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The 95 % intervals of some rows as plotly has them: how far beside the value."""
+def _error_bars(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The 95 % intervals of rows as plotly's error bars: distances from the value."""
     return {
         "type": "data",
         "symmetric": False,

@@ -1,8 +1,7 @@
-"""How well the answer fits, what warns of it, and what each kind of recording adds.
+"""How well the answer fits, findings on the fit, and what each kind of recording contributes.
 
-How much better the recordings are described: errors before and after, in sample and on groups held out. Findings on the
-stated explanation itself: what in its fit should not be taken at face value. What each kind of recording told, and
-where they contradict each other, as a report has it.
+Errors before and after, in sample and on held-out groups; parameters at bounds, contacts beyond the tables and large
+noise as findings; Young's modulus by kind of recording, and contradictions between the kinds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +12,14 @@ import numpy as np
 from underskin.diagnosis.data.names import NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, at_bounds, parameter, place_of, rounded, with_hidden
+from underskin.diagnosis.reporting.numbers import (
+    SDS_OF_95,
+    at_bounds,
+    parameter_index,
+    parameter_with_interval,
+    rounded,
+    with_hidden,
+)
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import OfCurves, hidden_factors, may_hide
 from underskin.diagnosis.selection.search import KindsTogether
@@ -34,26 +40,26 @@ def explains_percent(
     problem: FittingProblem,
     explanation: Explanation,
     name: str,
-    whole: cross_validation.PredictionScore,
+    score: cross_validation.PredictionScore,
 ) -> float | None:
-    """How much of the base model's misfit beyond noise comes back where the mechanism is left out of its set [%].
+    """Share of the base model's misfit beyond noise that returns where the mechanism is left out of its set [%].
 
-    None where the misfit without it is no larger than noise makes it: an effect that only many recordings together
-    tell. A mechanism that adds variance takes nothing away (see `_share_of_variance`).
+    None where the misfit without it is within noise: an effect that only many recordings together show. A mechanism
+    that adds variance reduces no misfit (see `_share_of_variance`).
     """
-    own = problem.lines.mechanisms[name].parameters(problem.lines.campaign, problem.kind)
-    if any(entry.acts_on == "line_variance" for entry in own):
+    mechanism_parameters = problem.lines.mechanisms[name].parameters(problem.lines.campaign, problem.kind)
+    if any(parameter.acts_on == "line_variance" for parameter in mechanism_parameters):
         return round(100 * _share_of_variance(explanation), 1)
-    rest = tuple(entry for entry in explanation.names if entry != name)
-    known = [entry for entry in (*search.explanations, *search.laws) if entry.names == rest]
-    without = known[0] if known else problem.explain([Request(rest)])[0]
-    assert without is not None  # alone, nothing is left out
-    nothing = next(entry for entry in search.explanations if not entry.names)
-    noise = whole.noise / whole.size
-    of_base, beyond = (_relative_square(problem, entry) - noise for entry in (nothing, without))
-    left = max(whole.square / whole.size - noise, 0.0)
-    back = (beyond - left) / max(of_base, beyond) if beyond > 0 else None
-    return None if back is None else round(100 * float(np.clip(back, 0.0, 1.0)), 1)
+    rest = tuple(other for other in explanation.names if other != name)
+    fitted = [candidate for candidate in (*search.explanations, *search.laws) if candidate.names == rest]
+    without = fitted[0] if fitted else problem.explain([Request(rest)])[0]
+    assert without is not None  # a single request is never pruned
+    base = next(candidate for candidate in search.explanations if not candidate.names)
+    noise = score.noise / score.size
+    misfit_of_base, misfit_without = (_relative_square(problem, candidate) - noise for candidate in (base, without))
+    misfit = max(score.square / score.size - noise, 0.0)
+    share = (misfit_without - misfit) / max(misfit_of_base, misfit_without) if misfit_without > 0 else None
+    return None if share is None else round(100 * float(np.clip(share, 0.0, 1.0)), 1)
 
 
 def _relative_square(problem: FittingProblem, explanation: Explanation) -> float:
@@ -62,7 +68,7 @@ def _relative_square(problem: FittingProblem, explanation: Explanation) -> float
 
 
 def _share_of_variance(explanation: Explanation) -> float:
-    """What mains pick-up is of the lines' variance where it acts: Σ q² · q²/(q² + n²) / Σ q², n a line's own noise."""
+    """Share of mains pick-up q in the lines' variance, Σ q² · q²/(q² + n²) / Σ q², n being a line's own noise."""
     best = explanation.best
     pickup = best.pickup_variance
     noise = (best.levels.level * best.hypothesis.lines.deviation) ** 2
@@ -72,44 +78,46 @@ def _share_of_variance(explanation: Explanation) -> float:
 def fit_summary(
     search: Search, problem: FittingProblem, groups: Sequence[cross_validation.HeldOut], explanation: Explanation
 ) -> dict[str, Any]:
-    """Errors before and after, held-out groups, the fitted noise, and of curves the modulus."""
-    nothing = next(entry for entry in search.explanations if not entry.names)
-    inside = [cross_validation.in_sample(problem, entry) for entry in (nothing, explanation)]
+    """Errors before and after, held-out groups, the fitted noise, and the modulus of curves."""
+    base = next(candidate for candidate in search.explanations if not candidate.names)
+    inside = [cross_validation.in_sample(problem, candidate) for candidate in (base, explanation)]
     outside = cross_validation.total(groups)
     parts = {
         name: {
             "rmse_percent": rounded(fitted.rmse_percent),
-            **_least_squares(problem, entry),
+            **_least_squares(problem, candidate),
             **({"correlated_rmse_percent": rounded(fitted.rmse_percent)} if problem.lines.curves else {}),
-            "heldout_rmse_percent": rounded(left.rmse_percent),
-            "log_score": rounded(left.log_score / left.recordings) if left.recordings else None,
-            **({"youngs_modulus": modulus(problem, entry)} if problem.lines.curves else {}),
+            "heldout_rmse_percent": rounded(held_out.rmse_percent),
+            "log_score": rounded(held_out.log_score / held_out.recordings) if held_out.recordings else None,
+            **({"youngs_modulus": modulus(problem, candidate)} if problem.lines.curves else {}),
         }
-        for name, entry, fitted, left in zip(("before", "after"), (nothing, explanation), inside, outside, strict=True)
+        for name, candidate, fitted, held_out in zip(
+            ("before", "after"), (base, explanation), inside, outside, strict=True
+        )
     }
     floor = outside[1].floor_percent if outside[1].recordings else inside[1].floor_percent
     return {
         **parts,
         "mechanisms": [
             name for name in explanation.names if name in problem.lines.mechanisms.named
-        ],  # of `after`, also where something beyond them is unexplained
+        ],  # of `after`, also where a misfit beyond them is unexplained
         "noise_floor_percent": rounded(floor),
         "groups": [
             {
-                "group": entry.group,
-                "chosen": [_plainly(problem, name) for name in entry.chosen] or [NOTHING_MISSING],
-                "before_rmse_percent": rounded(entry.before.rmse_percent),
-                "after_rmse_percent": rounded(entry.after.rmse_percent),
-                "noise_floor_percent": rounded(entry.after.floor_percent),
+                "group": group.group,
+                "chosen": [_plainly(problem, name) for name in group.chosen] or [NOTHING_MISSING],
+                "before_rmse_percent": rounded(group.before.rmse_percent),
+                "after_rmse_percent": rounded(group.after.rmse_percent),
+                "noise_floor_percent": rounded(group.after.floor_percent),
             }
-            for entry in groups
+            for group in groups
         ],
         "noise": _noise(explanation),
     }
 
 
 def _plainly(problem: FittingProblem, name: str) -> str:
-    """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
+    """A mechanism's name; of an unlisted law the quantity it acts on, its axis and its form."""
     law = problem.lines.mechanisms[name]
     if not isinstance(law, UnlistedLaw):
         return name
@@ -117,40 +125,42 @@ def _plainly(problem: FittingProblem, name: str) -> str:
 
 
 def _least_squares(problem: FittingProblem, explanation: Explanation) -> dict[str, float | None]:
-    """Of indentations, what plain least squares of the same law leave [%], and their modulus [MPa]."""
+    """Of indentations, the residual of a plain least-squares fit of the same law [%], and its modulus [MPa]."""
     if problem.kind != "indentation":
         return {}
-    fit, left = explanation.least_squares
-    place = place_of(explanation, "youngs_modulus")
-    declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # of which the parameter is a factor
-    modulus_mpa = declared * float(explanation.model.parameters[place].from_fit(float(fit[place])))
-    return {"rmse_percent": rounded(left), "least_squares_modulus_mpa": rounded(modulus_mpa)}
+    fit, residual_percent = explanation.least_squares
+    index = parameter_index(explanation, "youngs_modulus")
+    declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is a factor on it
+    modulus_mpa = declared * float(explanation.model.parameters[index].from_fit(float(fit[index])))
+    return {"rmse_percent": rounded(residual_percent), "least_squares_modulus_mpa": rounded(modulus_mpa)}
 
 
 def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
-    """Young's modulus under an explanation, with its 95 % interval, which allows for what an apparent modulus hides;
-    from factors on what was declared, or free."""
+    """Young's modulus under an explanation with its 95 % interval, from factors on the declared one, or free.
+
+    The interval allows for mechanisms that an apparent modulus may hide.
+    """
     mechanisms = problem.lines.mechanisms
     hiding = may_hide(mechanisms, problem.lines.campaign, mechanisms.named)
     return with_hidden(_apparent_modulus(problem, explanation), hidden_factors(hiding, explanation.names))
 
 
 def _apparent_modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
-    fitted = parameter(explanation, place_of(explanation, "youngs_modulus"))
+    fitted = parameter_with_interval(explanation, parameter_index(explanation, "youngs_modulus"))
     declared = problem.lines.campaign.skin.youngs_modulus_mpa
     if declared is None:
         return fitted
-    names = [entry.name for entry in explanation.model.parameters]
+    names = [parameter.name for parameter in explanation.model.parameters]
     if _FACTOR in names:
         fitted = {**fitted, **_product(explanation, [names.index("youngs_modulus"), names.index(_FACTOR)])}
     scaled = {name: rounded(declared * fitted[name]) for name in ("value", "low", "high")}
     return {**fitted, "unit": "MPa", **scaled}
 
 
-def _product(explanation: Explanation, places: Sequence[int]) -> dict[str, float | None]:
-    """Of parameters on a logarithmic scale, with the 95 % interval."""
-    rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
-    middle = float(explanation.point.fit[list(places)].sum())
+def _product(explanation: Explanation, indices: Sequence[int]) -> dict[str, float | None]:
+    """The product of parameters on a logarithmic scale, with its 95 % interval."""
+    rows = [explanation.best.hypothesis.mean_places.index(index) for index in indices]
+    middle = float(explanation.point.fit[list(indices)].sum())
     half = SDS_OF_95 * float(np.sqrt(explanation.best.covariance[np.ix_(rows, rows)].sum()))
     return {
         key: rounded(float(np.exp(middle + way * half)), 6) for key, way in (("value", 0), ("low", -1), ("high", 1))
@@ -167,51 +177,51 @@ def _noise(explanation: Explanation) -> dict[str, Any]:
     }
 
 
-# With depth, as a layer on a stiff base does
+# Mechanisms that stiffen the response with depth, as a layer on a stiff base does
 _STIFFENS = ("strain_stiffening", "compressible_layer", "layered_contact")
 
 
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    """Parameters at their bounds, recordings beyond the tables as found or as declared, noise that is larger than the
-    lines' own, and a thickness that only the curves tell."""
-    found = [
-        *(one.finding for one in at_bounds(explanation)),
+    """Findings on the fit: parameters at bounds, contacts beyond the tables (fitted or declared), noise larger than the
+    lines' own, and a thickness inferred from curves alone."""
+    findings = [
+        *(bound.finding for bound in at_bounds(explanation)),
         *_beyond_tables(problem, explanation),
         *_noisy(problem, explanation),
     ]
-    return [*found, *_kept(problem, explanation), *_of_unknown_thickness(problem, explanation)]
+    return [*findings, *_within_fitted_tables(problem, explanation), *_of_unknown_thickness(problem, explanation)]
 
 
 def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     best = explanation.best
     outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
-    known = [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]
-    answer = in_words(known) or SIMPLEST[problem.kind]
-    entries = problem.lines.campaign.recordings
+    mechanisms = [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]
+    answer = in_words(mechanisms) or SIMPLEST[problem.kind]
+    recordings = problem.lines.campaign.recordings
     return [
-        Finding(Reason.OUT_OF_TABLES_FITTED, entries[number].id, "preload_n", {"answer": answer})
-        for number in outside.tolist()
+        Finding(Reason.OUT_OF_TABLES_FITTED, recordings[index].id, "preload_n", {"answer": answer})
+        for index in outside.tolist()
     ]
 
 
-def _kept(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    """On contacts that lie within the tables as found, and beyond them as declared."""
+def _within_fitted_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    """The finding on contacts that lie within the tables with the fitted modulus, and beyond them with the declared."""
     if problem.kind != "frf":
         return []
     best, skin = explanation.best, problem.lines.campaign.skin
-    kept = np.unique(best.hypothesis.lines.recording[best.prediction.inside & ~explanation.model.valid])
-    if not len(kept):
+    recordings = np.unique(best.hypothesis.lines.recording[best.prediction.inside & ~explanation.model.valid])
+    if not len(recordings):
         return []
     assert skin.youngs_modulus_mpa is not None
-    fit = dict(zip([entry.name for entry in explanation.model.parameters], explanation.point.fit, strict=True))
-    found_mpa = None
+    fit = dict(zip([parameter.name for parameter in explanation.model.parameters], explanation.point.fit, strict=True))
+    fitted_mpa = None
     if "modulus_factor" in fit:
-        found_mpa = skin.youngs_modulus_mpa * float(np.exp(fit["modulus_factor"] + fit["youngs_modulus"]))
+        fitted_mpa = skin.youngs_modulus_mpa * float(np.exp(fit["modulus_factor"] + fit["youngs_modulus"]))
     arguments = {
-        "contacts": len(kept),
+        "contacts": len(recordings),
         "recordings": problem.lines.recordings,
         "declared_mpa": skin.youngs_modulus_mpa,
-        "found_mpa": found_mpa,
+        "found_mpa": fitted_mpa,
         "answer": in_words([in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]),
     }
     return [Finding(Reason.CONTACTS_KEPT, "", "skin.youngs_modulus_mpa", arguments)]
@@ -228,10 +238,10 @@ def _of_unknown_thickness(problem: FittingProblem, explanation: Explanation) -> 
     if problem.kind != "indentation" or problem.lines.campaign.skin.thickness_mm is not None:
         return []
     mechanisms = [problem.lines.mechanisms[name] for name in explanation.names]
-    alike = [one for one in mechanisms if one.name in _STIFFENS or _of_depth(one)]
-    if not alike:
+    stiffening = [mechanism for mechanism in mechanisms if mechanism.name in _STIFFENS or _of_depth(mechanism)]
+    if not stiffening:
         return []
-    answer = in_words([in_plain_words(one) for one in alike])
+    answer = in_words([in_plain_words(mechanism) for mechanism in stiffening])
     is_tried = "layered_contact" in problem.lines.mechanisms.named
     return [Finding(Reason.THICKNESS_UNKNOWN, "", "thickness_mm", {"answer": answer, "is_tried": is_tried})]
 
@@ -240,105 +250,110 @@ def _of_depth(mechanism: Mechanism) -> bool:
     return isinstance(mechanism, CurveLaw) and mechanism.description.axis in ("displacement_mm", "force_n")
 
 
-_CALLED: Mapping[Kind, str] = {"frf": "the FRFs", "indentation": "the indentations", "compression": "the block"}
+_KIND_WORDS: Mapping[Kind, str] = {"frf": "the FRFs", "indentation": "the indentations", "compression": "the block"}
 _MODULUS_ERROR = "modulus_error"
 
 
 def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any]]:
-    """E by each kind alone, and from curves the parameters of their mechanisms under the leading set, or under what the
-    curves alone find where the kinds contradict each other; empty where there is one kind."""
+    """E by each kind alone, and the parameters of the curves' own mechanisms; empty where there is one kind.
+
+    The parameters are those under the leading set, or under the curves' own best set where the kinds contradict each
+    other.
+    """
     if joined.beside is None or joined.apart is None:
         return []
-    told = []
+    rows = []
     for kind in joined.beside.kinds:
-        known = joined.beside.told_alone(kind) if joined.apart_is_likelier else joined.beside.told(kind, leading)
-        explanation = known.best
-        stated = [_of_elastomer(parameter(explanation, place_of(explanation, "youngs_modulus")), known)]
-        for own in own_places(explanation.names, explanation.best.hypothesis.lines).values():
-            stated += [parameter(explanation, place) for place in range(own.start, own.stop)]
-        told += [{"kind": kind.kind, **_entry(entry)} for entry in stated]
-    own_modulus = _modulus_alone(joined)
-    return told if own_modulus is None else [own_modulus, *told]
+        curves = joined.beside.told_alone(kind) if joined.apart_is_likelier else joined.beside.told(kind, leading)
+        explanation = curves.best
+        parameters = [
+            _of_elastomer(parameter_with_interval(explanation, parameter_index(explanation, "youngs_modulus")), curves)
+        ]
+        for span in own_places(explanation.names, explanation.best.hypothesis.lines).values():
+            parameters += [parameter_with_interval(explanation, index) for index in range(span.start, span.stop)]
+        rows += [{"kind": kind.kind, **_row(parameter)} for parameter in parameters]
+    first_modulus = _modulus_of_first_kind(joined)
+    return rows if first_modulus is None else [first_modulus, *rows]
 
 
-def _of_elastomer(modulus: Mapping[str, Any], known: OfCurves) -> dict[str, Any]:
-    """With an interval that allows for what an apparent modulus hides, and for how the skin's may differ."""
-    return with_hidden(modulus, known.hidden, known.tolerance)
+def _of_elastomer(modulus: Mapping[str, Any], curves: OfCurves) -> dict[str, Any]:
+    """With an interval that allows for hidden mechanisms, and for a difference between block and skin."""
+    return with_hidden(modulus, curves.hidden, curves.tolerance)
 
 
-def _entry(stated: Mapping[str, Any]) -> dict[str, Any]:
-    return {"parameter": stated["name"], **{key: stated[key] for key in ("unit", "value", "low", "high")}}
+def _row(parameter: Mapping[str, Any]) -> dict[str, Any]:
+    return {"parameter": parameter["name"], **{key: parameter[key] for key in ("unit", "value", "low", "high")}}
 
 
-def _modulus_alone(joined: KindsTogether) -> dict[str, Any] | None:
-    """E as the recordings of the first kind alone have it; None where they do not ask for another than is declared."""
+def _modulus_of_first_kind(joined: KindsTogether) -> dict[str, Any] | None:
+    """E by the recordings of the first kind alone; None where their best set keeps the declared one."""
     assert joined.apart is not None
     declared = joined.problem.lines.campaign.skin.youngs_modulus_mpa
     leader = joined.apart.answers[0]
     explanation = joined.apart.fit_behind(leader)
     kind = {"kind": joined.problem.kind}
     if declared is None:
-        return {**kind, **_entry(parameter(explanation, place_of(explanation, "youngs_modulus")))}
+        return {**kind, **_row(parameter_with_interval(explanation, parameter_index(explanation, "youngs_modulus")))}
     if _MODULUS_ERROR not in explanation.names:
         return None
-    place = own_places(explanation.names, explanation.best.hypothesis.lines)[_MODULUS_ERROR].start
-    factor = parameter(explanation, place)
+    index = own_places(explanation.names, explanation.best.hypothesis.lines)[_MODULUS_ERROR].start
+    factor = parameter_with_interval(explanation, index)
     ends = {key: rounded(declared * factor[key]) for key in ("value", "low", "high")}
     return {**kind, "parameter": "youngs_modulus", "unit": "MPa", **ends}
 
 
-def moduli_clause(joined: KindsTogether, told: Sequence[Mapping[str, Any]]) -> str:
-    """E by kind; empty where there is one kind."""
-    moduli = [entry for entry in told if entry["parameter"] == "youngs_modulus"]
+def moduli_clause(joined: KindsTogether, rows: Sequence[Mapping[str, Any]]) -> str:
+    """A clause on E by kind; empty where there is one kind."""
+    moduli = [row for row in rows if row["parameter"] == "youngs_modulus"]
     if not moduli:
         return ""
-    each = ", ".join(
-        f"E from {_CALLED[entry['kind']]}: {entry['value']:.3g} MPa (95 %: {entry['low']:.3g} to {entry['high']:.3g})"
-        for entry in moduli
+    text = ", ".join(
+        f"E from {_KIND_WORDS[row['kind']]}: {row['value']:.3g} MPa (95 %: {row['low']:.3g} to {row['high']:.3g})"
+        for row in moduli
     )
     declared = joined.problem.lines.campaign.skin.youngs_modulus_mpa
-    return f"{each}, declared {declared:g}" if declared is not None else each
+    return f"{text}, declared {declared:g}" if declared is not None else text
 
 
 def contradictions(joined: KindsTogether) -> list[dict[str, Any]]:
-    """That the kinds are not of one material, where this is more probable than that they are."""
+    """The statement that the kinds are not of one material, where this is more probable than the opposite."""
     if joined.beside is None or not joined.apart_is_likelier:
         return []
     kinds = [joined.problem.kind, *(kind.kind for kind in joined.beside.kinds)]
-    named = " and ".join(_CALLED[kind] for kind in kinds)
-    said = (
+    named = " and ".join(_KIND_WORDS[kind] for kind in kinds)
+    statement = (
         f"{named[0].upper()}{named[1:]} contradict each other (probability {in_percent(joined.contradictory)}): they "
         "are not of one material, or one of them is wrong, so each is explained alone."
     )
-    return [{"parameter": "youngs_modulus", "kinds": kinds, "statement": said}]
+    return [{"parameter": "youngs_modulus", "kinds": kinds, "statement": statement}]
 
 
-def of_curves_alone(joined: KindsTogether, names: Sequence[str], leading: Sequence[str]) -> list[dict[str, Any]]:
-    """Name, parameters and share of the misfit of mechanisms that act on the curves beside alone."""
-    entries = []
+def mechanisms_of_curves(joined: KindsTogether, names: Sequence[str], leading: Sequence[str]) -> list[dict[str, Any]]:
+    """Name, parameters and share of the misfit of mechanisms that act on the additional curves only."""
+    rows = []
     for kind in () if joined.beside is None else joined.beside.kinds:
         assert joined.beside is not None
-        told = joined.beside.told(kind, leading)
-        entries += [
-            _of_mechanism(name, explanation, told.each[0][0])
-            for explanation, _ in told.each
+        curves = joined.beside.told(kind, leading)
+        rows += [
+            _of_mechanism(name, explanation, curves.each[0][0])
+            for explanation, _ in curves.each
             for name in names
             if name in explanation.names
         ]
-    return entries
+    return rows
 
 
 def _of_mechanism(name: str, explanation: Explanation, without: Explanation) -> dict[str, Any]:
-    places = own_places(explanation.names, explanation.best.hypothesis.lines)[name]
-    left, all_of_it = (_left(entry) for entry in (explanation, without))
+    span = own_places(explanation.names, explanation.best.hypothesis.lines)[name]
+    misfit, misfit_without = (_misfit_square(candidate) for candidate in (explanation, without))
     return {
         "name": name,
-        "parameters": [parameter(explanation, place) for place in range(places.start, places.stop)],
-        "explains_percent": rounded(100 * max(1 - left / max(all_of_it, 1e-300), 0.0), 3),
+        "parameters": [parameter_with_interval(explanation, index) for index in range(span.start, span.stop)],
+        "explains_percent": rounded(100 * max(1 - misfit / max(misfit_without, 1e-300), 0.0), 3),
     }
 
 
-def _left(explanation: Explanation) -> float:
-    """Σ (F − model)² of the samples, what the cell may add not counted."""
+def _misfit_square(explanation: Explanation) -> float:
+    """Σ (F − model)² of the samples, without zero offset, drift and gain of the cell."""
     predicted = explanation.model.predict(explanation.point.fit).value.real
     return float(((explanation.best.hypothesis.lines.value.real - predicted) ** 2).sum())

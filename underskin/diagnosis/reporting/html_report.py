@@ -1,7 +1,7 @@
-"""The report as one HTML file that needs nothing from outside: it opens on any computer, also without a network.
+"""The report as one self-contained HTML file, which opens without a network.
 
-The template says what the page shows; names and numbers of the report are worded by filters. Every text that comes from
-a campaign is escaped; the page's policy forbids whatever is not in it.
+The template says what the page shows; filters word the names and numbers of the report. All text from a campaign is
+escaped, and the page's content policy forbids whatever is not in the file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -47,7 +47,7 @@ Plotly.relayout(plot, {"updatemenus[0].visible": false});
 plot.before(label, " ", steps[0], " ", steps[1]);
 plot.style.height = `${plot.layout.height}px`;
 plot.parentElement.style.height = "auto"; // its box has the height of the figure alone
-"""  # stands in for a figure's own menu, which only a pointer can open
+"""  # replaces a figure's own menu, which the keyboard cannot open
 
 _FILTERS = (
     *(wording.as_stated, wording.axis, wording.columns, wording.error, wording.finding, wording.group),
@@ -56,7 +56,7 @@ _FILTERS = (
     *(acted_on, followed, first_and_rest, in_percent, lacking_part),
 )
 
-_SCRIPTS = (SCHEME, SCHEME.with_name("narrow.js"), SCHEME.with_name("paper.js"))  # which pages have too
+_SCRIPTS = (SCHEME, SCHEME.with_name("narrow.js"), SCHEME.with_name("paper.js"))  # the same as on the service's pages
 _OF_SUMMARY = ("frf", "curve", "where", "explanations", "population", "sensors", "before_after")
 Report = Mapping[str, Any]
 FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
@@ -76,38 +76,41 @@ def _macros(template: str) -> Any:
 
 
 def of_summary(drawn: FigureHtml) -> list[str]:
-    """The figures of the summary, three at most: measured beside both models, where, how probable each answer is."""
+    """The figures of the summary, three at most, in the order of `_OF_SUMMARY`."""
     return [name for name in _OF_SUMMARY if name in drawn][:3]
 
 
 def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
-    """The whole page; `figures` as `underskin.diagnosis.reporting.figures` makes them: a report alone has but one."""
+    """The whole page; `figures` are those of `underskin.diagnosis.reporting.figures`, by default those of the report
+    alone."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
-    scripts = (get_plotlyjs(), *(one.read_text("utf-8") for one in _SCRIPTS)) if drawn else ()
+    scripts = (get_plotlyjs(), *(script.read_text("utf-8") for script in _SCRIPTS)) if drawn else ()
     return str(_macros("file.html").page(report, drawn, scripts))
 
 
 def body_of(report: Report, drawn: FigureHtml, plan: str | None = None) -> str:
-    """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next; `plan`:
-    address of the planned recordings, without the .csv or .xlsx at its end; without it, the CSV is in the page."""
+    """The page below the title, as HTML: statement, location, mechanisms, improvement, next recordings.
+
+    `plan` is the address of the planned recordings without its suffix .csv or .xlsx; without it the CSV is in the page.
+    """
     return str(_macros("report.html").body(report, drawn, plan))
 
 
 def csv_address(recordings: Sequence[Mapping[str, Any]]) -> str:
-    """The planned recordings as CSV, in the address itself: a file has no server to ask."""
+    """The planned recordings as CSV in a data address, since a file has no server."""
     return f"data:text/csv;charset=utf-8,{quote(to_spreadsheet(wording.planned_columns(recordings)))}"
 
 
 def provenance(report: Report) -> str:
-    """With what it was made, as HTML."""
+    """The provenance of a report, as HTML."""
     return str(_macros("report.html").provenance(report["provenance"]))
 
 
 def of_report(report: Report) -> dict[str, go.Figure]:
-    """The figures that a report alone can give."""
-    own = {} if report["fit"] is None else {"explanations": explanations(report)}
-    return {**own, **several_figures(report)}
+    """The figures that can be drawn from a report alone."""
+    fit_figures = {} if report["fit"] is None else {"explanations": explanations(report)}
+    return {**fit_figures, **several_figures(report)}
 
 
 def _plot(figure: go.Figure, name: str) -> str:

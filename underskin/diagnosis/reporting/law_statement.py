@@ -1,18 +1,8 @@
-"""The statement of a report in words.
+"""The statement of a report in words, three sentences at most.
 
-A statement as a few sentences of clauses, so that it stays short however much there is to say.
-
->>> of_clauses(["one slip: given in µm? Left out", "apart from that, all agrees"], [], ["d33 to quote: 14 pC/N"])
-'One slip: given in µm? – left out; apart from that, all agrees. d33 to quote: 14 pC/N.'
-
-The statement of a report: what decides, what is missing, what that means, and what to quote, in three sentences.
-
-Which physics usually does such a thing: hints, by where an unnamed law enters and what it follows.
-
-The same table stands in docs/unlisted.md.
-
-Findings that decide how far the statement of a report can be trusted, as clauses of that statement. A law that nobody
-listed in plain words: what it changes, by how much, what it is worth, what usually does it.
+First what decides how far the answer can be trusted and the verdict, then what is missing and its rivals, last what to
+quote. `HINTS` says which physics usually causes an unlisted law, by the quantity that it acts on and the axis that it
+follows; docs/unlisted.md has the same table.
 """
 
 import re
@@ -40,30 +30,35 @@ from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, acted_on, followed
 from underskin.recordings.readers.calendar_times import time_zone
 
-_END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # of a sentence within a clause
+_END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # end of a sentence within a clause
 _END_OR_STOP = re.compile(r"([.?!]) +")
 _STOP = re.compile(r"\. +")
-_NAME = re.compile(r"\w+('s|s')")  # Hertz's, Mullins': stays as it is
-_SYMBOLS = ("d33",)  # that no sentence writes with a capital
+_NAME = re.compile(r"\w+('s|s')")  # Hertz's, Mullins': keeps its capital
+_SYMBOLS = ("d33",)  # keep their small letter at the beginning of a sentence
 
 
 def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
-    """One sentence of each of `sentences` that has a clause that is not empty; within them no full stop stands before
-    a space, so that they can be told apart again by these. `names` of campaigns and skins stay whole: "Palm 2. Upper"
-    is no end of a sentence."""
-    kept = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
+    """One sentence from the clauses of each of `sentences`; empty clauses, and sentences without any, are left out.
 
-    def told(text: str) -> str:
-        for name, whole in kept.items():
-            text = text.replace(name, whole)
+    Within a sentence no full stop is followed by a space, so that the sentences can be split again. `names` of
+    campaigns and skins are not split: "Palm 2. Upper" is no end of a sentence.
+
+    >>> of_clauses(["one slip: given in µm? Left out", "apart from that, all agrees"], [], ["d33 to quote: 14 pC/N"])
+    'One slip: given in µm? – left out; apart from that, all agrees. d33 to quote: 14 pC/N.'
+    """
+    protected_names = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
+
+    def as_clause(text: str) -> str:
+        for name, protected in protected_names.items():
+            text = text.replace(name, protected)
         return clause(text)
 
-    filled = ([told(text) for text in clauses if text] for clauses in sentences)
+    filled = ([as_clause(text) for text in clauses if text] for clauses in sentences)
     return " ".join(f"{capital('; '.join(map(small, clauses)))}." for clauses in filled if clauses)
 
 
 def clause(text: str) -> str:
-    """A text of one sentence or of several as part of a sentence, without the full stop at its end."""
+    """A text of one or several sentences as part of a sentence, without a full stop at its end."""
     first, *parts = _END.split(text.strip().rstrip("."))
     for mark, following in zip(parts[::2], parts[1::2], strict=True):
         first += f"{'; ' if mark == '.' else f'{mark} – '}{small(following)}"
@@ -71,31 +66,31 @@ def clause(text: str) -> str:
 
 
 def capital(text: str) -> str:
-    """With a capital at its beginning."""
+    """The text with a capital at its beginning, unless it begins with a symbol."""
     return text if text.startswith(_SYMBOLS) else text[:1].upper() + text[1:]
 
 
 def small(text: str) -> str:
-    """With a small letter at its beginning, unless that is a symbol or somebody's name."""
+    """The text with a small letter at its beginning, unless it begins with a symbol or a name."""
     plain = text[1:2].islower() or text.startswith("A ")
     return text[:1].lower() + text[1:] if plain and not _NAME.match(text) else text
 
 
 _WORTH_NAMING = 0.02
-_FAR_ABOVE = 2.0  # times the noise: an error held out that a verdict's first sentence tells
+_FAR_ABOVE = 2.0  # times the noise: a held-out error that the first sentence mentions
 _INSUFFICIENT = "The recordings cannot tell anything: "
 _TO_CORRECT = "Nothing can be told before a correction: "
 _CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
 _SMALL = 5.0  # % of the response
-_STATED = 3  # mechanisms whose strengths are told
+_STATED = 3  # mechanisms whose strengths are given
 
 
 @dataclass(frozen=True)
 class StatementContext:
-    """What a statement says beside the answer itself.
+    """Clauses of a statement apart from the answer itself.
 
-    `slips` and `contradictions` are clauses on what decides how far any answer can be trusted, `reserves` on what this
-    one leaves open; `quoted` are clauses on d33, and on E as each kind of recording has it.
+    `slips` and `contradictions` decide how far any answer can be trusted, `reserves` are what this answer leaves open;
+    `quoted` are on d33, and on E by kind of recording.
     """
 
     slips: Sequence[str] = ()
@@ -104,28 +99,28 @@ class StatementContext:
     quoted: Sequence[str] = ()
 
     def first(self, verdict: str, *reserve: str) -> list[str]:
-        """The clauses of the first sentence: what decides comes before the verdict."""
+        """The clauses of the first sentence: contradictions and errors in the recordings come before the verdict."""
         decides = [*self.contradictions, *self.slips]
         return [*decides, f"apart from that, {verdict}" if decides else verdict, *reserve, *self.reserves]
 
 
 @dataclass(frozen=True)
 class AnswerFacts:
-    """What is known of the leading answer beside its probability.
+    """Facts on the leading answer apart from its probability.
 
-    `groups` are the report's `presence`, the most probable first, `idle` mechanisms that may as well have no effect,
-    `at_bounds` the parameters at an end of their search,
-    `mechanisms` those of the report, and `told` is what their values mean together.
+    `groups` are the report's `presence`, the most probable first, `idle` the mechanisms that may as well have no
+    effect, `at_bounds` the parameters at a bound of their search, `mechanisms` those of the report, and `meanings` what
+    their values mean together.
     """
 
     groups: Sequence[Mapping[str, Any]] = ()
     idle: Sequence[str] = ()
     at_bounds: Sequence[str] = ()
     mechanisms: Sequence[Mapping[str, Any]] = ()
-    told: Sequence[str] = ()
+    meanings: Sequence[str] = ()
 
 
-_NOTHING_AROUND, _NOTHING_KNOWN = StatementContext(), AnswerFacts()
+_NO_CONTEXT, _NO_FACTS = StatementContext(), AnswerFacts()
 
 
 def answer_statement(
@@ -133,15 +128,16 @@ def answer_statement(
     verdict: str,
     kind: Kind = "frf",
     fit: Mapping[str, Any] | None = None,
-    around: StatementContext = _NOTHING_AROUND,
-    of_answer: AnswerFacts = _NOTHING_KNOWN,
+    around: StatementContext = _NO_CONTEXT,
+    of_answer: AnswerFacts = _NO_FACTS,
     shape: str = "",
     power: Sequence[Power] = (),
 ) -> str:
-    """Three sentences at most: the verdict, after what decides how far it can be trusted; what is missing, its rivals,
-    or the `shape` of what remains; what to quote, or where nothing is missing what would have shown (`power`).
+    """The statement of a report: three sentences at most.
 
-    `fit` is the report's; of curves it has the modulus under the stated answer, or what the base model leaves.
+    First the verdict, after what decides how far it can be trusted; then what is missing, its rivals, or the `shape` of
+    the residual; last what to quote, or, where nothing is missing, what would have shown (`power`). `fit` is the
+    report's; of curves it has the modulus under the stated answer, or the residual of the base model.
     """
     model = SIMPLEST[kind]
     stated, *means = _answer(answers, verdict, model, of_answer, all_used=not around.slips)
@@ -156,18 +152,18 @@ def answer_statement(
     first = around.first(stated, reserve)
     if verdict == "no_mismatch":
         return of_clauses(first, [*means, *quoted], [power_clause(power, kind)])
-    left = [left_by(fit, model)] if fit is not None and of_curves and verdict == "unexplained" else []
-    return of_clauses(first, [*means, shape, *left, *of_answer.told], quoted)
+    misfit = [misfit_clause(fit, model)] if fit is not None and of_curves and verdict == "unexplained" else []
+    return of_clauses(first, [*means, shape, *misfit, *of_answer.meanings], quoted)
 
 
 def _answer(
     answers: Sequence[Answer], verdict: str, model: str, of_answer: AnswerFacts, *, all_used: bool
 ) -> tuple[str, ...]:
-    """The verdict as a clause, and further ones on what it means."""
+    """The verdict as a clause, and further clauses on its meaning."""
     leader = answers[0]
     percent = in_percent(leader.probability)
     rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
-    listed = _each(rivals)
+    listed = _answers_in_words(rivals)
     mentioned = dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE)
     if verdict == "no_mismatch":
         agree = f"recordings and {model} agree within the noise (probability {percent})"
@@ -176,7 +172,7 @@ def _answer(
         return f"{agree}, but they do not rule out: {listed}", _law(tuple(mentioned))
     if verdict == "unexplained":
         return (f"something is missing that none of the known mechanisms describes (probability {percent})",)
-    by_sets = f"by sets: {_each([leader, *rivals])}" if rivals else ""
+    by_sets = f"by sets: {_answers_in_words([leader, *rivals])}" if rivals else ""
     if verdict == "explained":
         lacking, by_mechanism = _lacking(leader, of_answer)
         means = _law(leader.names) or _strengths(of_answer.mechanisms)
@@ -194,33 +190,33 @@ def _answer(
     but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
     doubtful = bool(idle or of_answer.at_bounds) and leader.names != (NOTHING_MISSING,)
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
-    begin = f"best explained by {in_words(leader.names)} ({percent})"
+    lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
-        known = sum(answer.probability for answer in answers if answer.kind == leader.kind)
-        begin = (
-            f"known mechanisms explain this ({in_percent(known)} together), best {in_words(leader.names)} ({percent})"
+        total = sum(answer.probability for answer in answers if answer.kind == leader.kind)
+        lead = (
+            f"known mechanisms explain this ({in_percent(total)} together), best {in_words(leader.names)} ({percent})"
         )
     return (
-        f"{begin}, but {', and '.join(but)}",
+        f"{lead}, but {', and '.join(but)}",
         misfit,
         _law(tuple(mentioned)),
     )
 
 
 def _lacking(leader: Answer, of_answer: AnswerFacts) -> tuple[str, bool]:
-    """The mechanisms of the leading set with their probability, and whether that is each mechanism's own.
+    """The mechanisms of the leading set, and whether each has its own probability instead of that of the set.
 
-    It is where a mechanism is in other sets too, or these have its twin in its place.
+    It has where it is also in other sets, or these hold an indistinguishable one in its place.
     """
     group, least = next(iter(of_answer.groups), None), leader.probability + _WORTH_NAMING
     twins = group is not None and len(group["mechanisms"]) > 1 and set(leader.names) < set(group["mechanisms"])
     if group is not None and twins and group["probability"] > least:
         return f"{_group_in_words(group)}, rather {in_words(leader.names)} ({in_percent(leader.probability)})", True
-    present = {entry["name"]: entry["probability"] for entry in of_answer.mechanisms}
+    present = {mechanism["name"]: mechanism["probability"] for mechanism in of_answer.mechanisms}
     if not any(present.get(name, 0.0) > least for name in leader.names):
         return f"{in_words(leader.names)} (probability {in_percent(leader.probability)})", False
-    own = [{"mechanisms": [name], "probability": present[name]} for name in leader.names]
-    return " and ".join(map(_group_in_words, own)), True
+    single_groups = [{"mechanisms": [name], "probability": present[name]} for name in leader.names]
+    return " and ".join(map(_group_in_words, single_groups)), True
 
 
 def _group_in_words(group: Mapping[str, Any]) -> str:
@@ -228,36 +224,35 @@ def _group_in_words(group: Mapping[str, Any]) -> str:
     return f"{named} ({in_percent(group['probability'])})"
 
 
-def _each(answers: Sequence[Answer]) -> str:
+def _answers_in_words(answers: Sequence[Answer]) -> str:
     return ", or ".join(f"{in_words(answer.names)} ({in_percent(answer.probability)})" for answer in answers)
 
 
 def _law(names: Sequence[str]) -> str:
-    """What a mechanism is; of several nothing, since a page says it of each."""
+    """What a mechanism is; empty for several, which a page explains one by one."""
     return f"{in_words(names)}: {small(CATALOGUE[names[0]].plain)}" if len(names) == 1 else ""
 
 
 def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
     """The first parameter of each of a few mechanisms."""
-    each = [
-        (in_words([entry["name"]]), parameter_in_words(entry["parameters"][0]))
-        for entry in mechanisms[:_STATED]
-        if entry["parameters"]
+    strengths = [
+        (in_words([mechanism["name"]]), parameter_in_words(mechanism["parameters"][0]))
+        for mechanism in mechanisms[:_STATED]
+        if mechanism["parameters"]
     ]
-    return ", ".join(f"{name} has {'an' if strength[0] in 'aeiou' else 'a'} {strength}" for name, strength in each)
+    return ", ".join(f"{name} has {'an' if strength[0] in 'aeiou' else 'a'} {strength}" for name, strength in strengths)
 
 
-def parameter_in_words(entry: Mapping[str, Any]) -> str:
+def parameter_in_words(parameter: Mapping[str, Any]) -> str:
     """Name, value and interval of a parameter: "tip mass of 6.02 g (5.9 to 6.1)"."""
-    value, low, high = (in_digits(entry[key], 3) for key in ("value", "low", "high"))
-    unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
-    interval = "at or beyond the end of its search" if entry.get("at_bound") else f"{low} to {high}"
-    return f"{entry['name'].replace('_', ' ')} of {value}{unit} ({interval})"
+    value, low, high = (in_digits(parameter[key], 3) for key in ("value", "low", "high"))
+    unit = "" if parameter["unit"] == "-" else f" {parameter['unit']}"
+    interval = "at or beyond the end of its search" if parameter.get("at_bound") else f"{low} to {high}"
+    return f"{parameter['name'].replace('_', ' ')} of {value}{unit} ({interval})"
 
 
 def _reserve(fit: Mapping[str, Any]) -> str:
-    """What keeps an answer from being one without reserve: recordings held out that are predicted far worse than noise
-    would have it."""
+    """A reserve where held-out recordings are predicted far worse than the noise."""
     missed, floor = fit["after"]["heldout_rmse_percent"], fit["noise_floor_percent"]
     if missed is None or floor is None or missed <= _FAR_ABOVE * floor:
         return ""
@@ -270,20 +265,20 @@ def insufficient_statement(what: Lacking | None, slips: Sequence[str]) -> str:
     return of_clauses([f"{_TO_CORRECT if what.lack in _CORRECTED else _INSUFFICIENT}{lacking(what)}"], slips)
 
 
-# The page of a stored report lays its statement out by these two; nothing is decided by what they return.
+# For the layout of a stored report's statement on its page only.
 def lacking_part(statement: str) -> str:
-    """What is lacking or wrong, with its full stop, out of the statement that `insufficient_statement` made."""
+    """What is lacking or wrong, with its full stop, from a statement of `insufficient_statement`."""
     return statement.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
 
 
 def first_and_rest(statement: str) -> tuple[str, str]:
-    """The first sentence of a statement, which is the verdict, without its full stop, and the other sentences."""
+    """The first sentence of a statement, the verdict, without its full stop, and the other sentences."""
     first, _, rest = statement.partition(". ")
     return first.rstrip("."), rest
 
 
 def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
-    """E of curves, and what it is under."""
+    """A clause on E of curves, and on the answer under which it holds."""
     modulus = after["youngs_modulus"]
     if modulus.get("at_bound"):
         bound = f"{modulus['value']:.3g} {modulus['unit']}"
@@ -292,25 +287,27 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     return f"Young's modulus {how}: {modulus['value']:.3g} {modulus['unit']} ({interval})"
 
 
-def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
-    """How far the base model goes on curves, and the best set of mechanisms, or a law that nobody listed with the
-    mechanisms beside it, which `law` holds."""
+def misfit_clause(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
+    """A clause on the residual of curves under the base model, and under the best set of mechanisms.
+
+    With `law`, the latter is an unlisted law together with these mechanisms.
+    """
     before, after, names = fit["before"], fit["after"], fit["mechanisms"]
     modulus = before.get("least_squares_modulus_mpa")
-    alone = f"{model} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
-    said = f"{alone} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
+    base_words = f"{model} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
+    sentence = f"{base_words} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
     added = in_words(names) if names else ""
     if law is not None:
         added = f"this law and {in_words(law)}" if law else "this law"
-    beside = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
+    addition = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
     modulus = _modulus_clause(after, f"with {added}") if added and "youngs_modulus" in after else ""
-    return f"{said}{beside}" + (f"; {modulus}" if modulus else "")
+    return f"{sentence}{addition}" + (f"; {modulus}" if modulus else "")
 
 
 def power_clause(power: Sequence[Power], kind: Kind) -> str:
-    """What the recordings would have shown."""
+    """A clause on the mechanisms that the recordings would have shown."""
     all_of_them = sum(kind in mechanism.kinds for mechanism in CATALOGUE.values())
-    shown = [entry.mechanism for entry in power if entry.smallest_visible_percent <= _SMALL]
+    shown = [limit.mechanism for limit in power if limit.smallest_visible_percent <= _SMALL]
     if not shown:
         return f"none of the {all_of_them} known mechanisms would have shown with {_SMALL:g} % of the response"
     which = f"these {len(shown)} would each have shown with {_SMALL:g} % of the response"
@@ -394,7 +391,7 @@ HINTS: Mapping[tuple[str, str], str] = {
     ("frequency_response", "recorded_at"): "A clock or filter that drifts would do this.",
     ("frequency_response", _ANY): "Electronics or a frame that follow this axis would do this.",
 }
-OF_BLOCKS: Mapping[tuple[str, str], str] = {  # in place of these, where a sample is compressed or pulled
+OF_BLOCKS: Mapping[tuple[str, str], str] = {  # instead of `HINTS`, where a sample is compressed or pulled
     (
         "modulus",
         "displacement_mm",
@@ -422,7 +419,7 @@ OF_BLOCKS: Mapping[tuple[str, str], str] = {  # in place of these, where a sampl
 
 
 def hint(acts_on: str, axis: str, kind: Kind) -> str:
-    """A sentence, or none."""
+    """The physics that usually causes such a law, as a sentence; empty where none is known."""
     if kind == "compression" and (acts_on, axis) in OF_BLOCKS:
         return OF_BLOCKS[acts_on, axis]
     return HINTS.get((acts_on, axis), HINTS.get((acts_on, _ANY), ""))
@@ -457,34 +454,36 @@ _MOST = 2  # findings that are quoted; the others are counted
 
 
 def slips(findings: Sequence[Mapping[str, str]]) -> list[str]:
-    """Clauses on errors in the recordings: on the most decisive ones what they are, on the others how many."""
+    """Clauses on errors in the recordings: the most important ones are quoted, the others counted."""
     return _clauses(findings, _SLIPS)
 
 
 def reserves(findings: Sequence[Mapping[str, str]]) -> list[str]:
-    """Clauses on what the stated answer leaves open: a remainder, an error held out, a d33 that cannot be."""
+    """Clauses on what the stated answer leaves open: a remainder, a held-out error, an implausible d33."""
     return _clauses(findings, _RESERVES)
 
 
 def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCode]) -> list[str]:
     chosen = sorted(
-        (entry for entry in findings if entry["code"] in decisive),
-        key=lambda entry: decisive.index(FindingCode(entry["code"])),
+        (finding for finding in findings if finding["code"] in decisive),
+        key=lambda finding: decisive.index(FindingCode(finding["code"])),
     )
-    further = Counter(entry["code"].replace("_", " ") for entry in chosen[_MOST:])
+    further = Counter(finding["code"].replace("_", " ") for finding in chosen[_MOST:])
     counted = [f"{count} of {code}" for code, count in further.items()]
     more = [f"further findings: {', '.join(counted)}"] if counted else []
     return [*map(_quoted, chosen[:_MOST]), *more]
 
 
-def _quoted(entry: Mapping[str, str]) -> str:
-    text = clause(entry["statement"])
-    return f"recording {entry['recording']!r}: {text}" if entry["recording"] else text
+def _quoted(finding: Mapping[str, str]) -> str:
+    text = clause(finding["statement"])
+    return f"recording {finding['recording']!r}: {text}" if finding["recording"] else text
 
 
 def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
-    """Clauses on the mechanisms of curves that their recordings do not support, and why: one of them may be what is
-    missing. Mechanisms of other kinds of recordings are none of it."""
+    """Clauses on the mechanisms of curves that their recordings do not support, and why: one of them may be missing.
+
+    Mechanisms of other kinds of recordings are not included.
+    """
     return [
         f"{name.replace('_', ' ')} was not tried: {reason}"
         for name, reason in unsupported.items()
@@ -493,12 +492,12 @@ def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
 
 
 def _is_physics(mechanism: Mechanism) -> bool:
-    """Whether it is more than another value of what is declared, which curves without a declared value have free."""
+    """Whether it is more than another value of a declared quantity, which is free for curves without a declared one."""
     return mechanism.stage is not Stage.DECLARED
 
 
-_HERTZ = ("preload_n", "indenter_radius_mm")  # with whose cube root Hertz's contact radius grows
-_DELAY = 0.5  # of the exponent of a phase, above which it is more like a delay than like a loss angle
+_HERTZ = ("preload_n", "indenter_radius_mm")  # Hertz's contact radius grows with their cube roots
+_DELAY = 0.5  # exponent of a phase above which it is more like a delay than a loss angle
 
 
 def statement(
@@ -507,44 +506,45 @@ def statement(
     document: Mapping[str, Any],
     floor: float,
     around: StatementContext,
-    left: str,
+    misfit: str,
 ) -> str:
-    """Three sentences at most: that no known mechanism describes this, after what decides how far that can be trusted;
-    what is missing, with its numbers and what it is worth; its rivals, what usually does this, and what to quote.
+    """The statement on an unlisted law: three sentences at most.
 
-    `left` says how far the base model goes on curves.
+    First that no known mechanism describes this, after what decides how far that can be trusted; then the law, with its
+    size and held-out errors; last its rivals, the usual cause, and what to quote. `misfit` is the clause on the
+    residual of curves.
     """
     law = leading.law
     acts_on = law.description.acts_on
-    beside = tuple(name for name in leading.explanation.names if name != law.name)
-    known = f" beside {_listed(beside)}" if beside else ""
+    other_names = tuple(name for name in leading.explanation.names if name != law.name)
+    with_others = f" beside {_listed(other_names)}" if other_names else ""
     held = document["heldout_rmse_percent"]
-    worth = _worth(held, floor, _held_out(law), f" and {_listed(beside)}" if beside else "")
+    worth = _worth(held, floor, _held_out(law), f" and {_listed(other_names)}" if other_names else "")
     altered = [*_altered(law, document), *_order(law, document)]
-    missing = [f"what is missing{known} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, *altered]
+    missing = [f"what is missing{with_others} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, *altered]
     rivals = [
-        f"{acted_on(entry['acts_on'], entry['axis'])} over {followed(entry['axis'])}, {entry['form']} "
-        f"({in_percent(entry['probability'])} of it)"
-        for entry in document["rivals"][:2]
+        f"{acted_on(rival['acts_on'], rival['axis'])} over {followed(rival['axis'])}, {rival['form']} "
+        f"({in_percent(rival['probability'])} of it)"
+        for rival in document["rivals"][:2]
     ]
     also = [f"in these recordings this may also be {', or '.join(rivals)}"] if rivals else []
-    certain = probability * _same_place(document) >= EXPLAINED
-    told = ""
+    certain = probability * _share_of_quantity(document) >= EXPLAINED
+    hint_text = ""
     if certain and not (altered or leading.is_constant):
-        told = hint(acts_on, _hinted(leading), leading.explanation.best.hypothesis.lines.kind)
+        hint_text = hint(acts_on, _hinted(leading), leading.explanation.best.hypothesis.lines.kind)
     verdict = f"no known mechanism describes this (probability {in_percent(probability)})"
-    return of_clauses(around.first(verdict), missing, [*also, told, left, *around.quoted])
+    return of_clauses(around.first(verdict), missing, [*also, hint_text, misfit, *around.quoted])
 
 
-def _same_place(document: Mapping[str, Any]) -> float:
-    """The share of laws of any form that act on the same and follow the same."""
+def _share_of_quantity(document: Mapping[str, Any]) -> float:
+    """The share of laws of any form that act on the same quantity along the same axis."""
     same = (document["acts_on"], document["axis"])
-    rivals = (one["probability"] for one in document["rivals"] if (one["acts_on"], one["axis"]) == same)
+    rivals = (rival["probability"] for rival in document["rivals"] if (rival["acts_on"], rival["axis"]) == same)
     return float(document["probability"] + sum(rivals))
 
 
 def _hinted(leading: LeadingLaw) -> str:
-    """What it follows, as hints have it."""
+    """The axis of the law, as the key of `HINTS`."""
     law = leading.law
     if isinstance(law, CurveLaw) and law.shape.variant == TURN:
         return TURNED
@@ -556,16 +556,16 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _altered(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
-    """That a power law is one that is known with another exponent."""
+    """That a power law is a known one with another exponent."""
     if law.description.form != "power":
         return []
-    stated = {entry["name"]: entry for entry in document["parameters"]}
+    parameters = {parameter["name"]: parameter for parameter in document["parameters"]}
     if isinstance(law, RecordingLaw) and law.description.acts_on == "contact_radius" and law.axis.name in _HERTZ:
-        value, low, high = (1 / 3 + stated["change"][name] for name in ("value", "low", "high"))
+        value, low, high = (1 / 3 + parameters["change"][name] for name in ("value", "low", "high"))
         power = f"{value:.2f} ({low:.2f} to {high:.2f}) in place of 1/3"
         grows = f"the contact radius grows with {followed(law.axis.name)} to the power {power}"
         return [f"this is Hertz's law with another exponent: {grows}"]
-    exponent = stated.get("exponent")
+    exponent = parameters.get("exponent")
     if isinstance(law, FrequencyLaw) and law.variant == "phase" and exponent and exponent["value"] > _DELAY:
         power = f"{exponent['value']:.2f} ({exponent['low']:.2f} to {exponent['high']:.2f}) in place of 1"
         return [f"this is a delay with another exponent: its phase grows with frequency to the power {power}"]
@@ -573,11 +573,11 @@ def _altered(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
 
 
 def _order(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
-    """That lines fall off towards low frequencies as behind a high pass, of what order."""
+    """The order of a high pass that makes lines fall off towards low frequencies."""
     if not (isinstance(law, FrequencyLaw) and law.variant == "high_pass"):
         return []
-    stated = {entry["name"]: entry for entry in document["parameters"]}
-    value, low, high = (stated["exponent"][name] for name in ("value", "low", "high"))
+    parameters = {parameter["name"]: parameter for parameter in document["parameters"]}
+    value, low, high = (parameters["exponent"][name] for name in ("value", "low", "high"))
     if value < 0:
         return []
     return [f"this is a high pass of order {value:.2f} ({low:.2f} to {high:.2f}), where an amplifier's is of order 1"]
@@ -623,10 +623,10 @@ def _axis_words(leading: LeadingLaw) -> str:
 
 
 def _size(leading: LeadingLaw) -> str:
-    """−8 % (−10 to −6) at 14:00."""
+    """The largest change with its interval and where it occurs: "−8 % (−10 to −6) at 14:00"."""
     at, size, deviation = leading.largest()
     law = leading.law
-    where = f" {place}" if (place := _where(leading, at)) else ""
+    where = f" {location}" if (location := _where(leading, at)) else ""
     half = SDS_OF_95 * deviation
     if law.description.acts_on in ("force", "position"):
         unit = "N" if law.description.acts_on == "force" else "mm"
@@ -662,11 +662,11 @@ def _where(leading: LeadingLaw, at: float) -> str:
     return f"at {in_digits(at, 3)}{'' if axis.unit == '-' else ' ' + axis.unit}"
 
 
-def _worth(held: Mapping[str, float | None], floor: float, what: str, beside: str) -> str:
+def _worth(held: Mapping[str, float | None], floor: float, what: str, others: str) -> str:
     noise = f" (noise {in_digits(floor, 2)} %)" if np.isfinite(floor) else ""
     if held["before"] is None or held["after"] is None:
         return f"too few {what} to hold any out"
     after, before = in_digits(held["after"], 2), in_digits(held["before"], 2)
     if held["after"] >= held["before"]:
         return f"it predicts {what} held out no better: to {after} % instead of {before} %{noise}"
-    return f"with it{beside}, {what} held out are predicted to {after} % instead of {before} %{noise}"
+    return f"with it{others}, {what} held out are predicted to {after} % instead of {before} %{noise}"

@@ -1,20 +1,14 @@
-"""Numbers of a report, with their intervals.
+"""Numbers of a report: rounding, parameters with 95 % intervals, parameters at bounds, d33 over all answers.
 
-Numbers as a report states them: rounded to stated digits, parameters with their 95 % intervals.
-
-Parameters of an explanation that lie at a bound of their search: at that value or beyond, and so no result.
-
-A set of mechanisms that holds one explains nothing, and its d33 is not to be quoted. A bound beyond which there is
-nothing, or at which a mechanism does nothing, is none (`Parameter.ends_search`).
-
-The level that a law which nobody listed refers to: where its factor is 1 is a convention of its form.
-
-A resonance beside the response may leave the low frequencies as they are, or the high ones: both fit alike, and d33
-differs by what the law does between them. So d33 may be that of any line, or any recording.
-
-What all surviving answers say together: which mechanisms are there, d33, and whether they predict alike. What the base
-model idealises although declared facts say it: laws without a free parameter, such as the layer's. Which sensors stand
-apart in d33 where sensors differ: a clause that names them, since a spread names none.
+- A parameter at a bound of its search is no result: a set of mechanisms that holds one explains nothing, and its d33 is
+  not to be quoted. A bound beyond which there is nothing, or at which a mechanism has no effect, does not count
+  (`Parameter.ends_search`).
+- The level at which the factor of an unlisted law is 1 is a convention of its form. A resonance may leave the low
+  frequencies as they are, or the high ones: both fit equally well, and d33 differs by what the law does in between. d33
+  is therefore averaged over the law's factor at all rows (`law_levels`).
+- Summaries over all surviving answers: the probability of each mechanism, d33, answers with the same predictions, and
+  laws without a free parameter that declared facts imply (such as the layer's) but the base model idealises.
+- Sensors whose d33 lies far from the others'.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -48,12 +42,12 @@ SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard
 
 
 def rounded(value: float, digits: int = 4) -> float | None:
-    """To significant digits; None for what is not finite."""
+    """The value to significant digits; None if it is not finite."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Floats) -> float:
-    """Of a mixture of normal distributions, whose `shares` sum to 1, (parts,)."""
+    """A quantile of a mixture of normal distributions (parts,), whose `shares` sum to 1."""
 
     def beyond(at: float) -> float:
         return float(shares @ ndtr((at - means) / deviations) - level)
@@ -65,8 +59,8 @@ def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Fl
 def with_hidden(
     modulus: Mapping[str, Any], hidden: Sequence[tuple[float, float]], tolerance: float = 0.0
 ) -> dict[str, Any]:
-    """A modulus with its 95 % interval, of which the logarithm may be too large by `hidden` values with probabilities,
-    and differs by a standard deviation of `tolerance` from the one sought."""
+    """A modulus with its 95 % interval, whose logarithm may be too large by the `hidden` values with their
+    probabilities, and differs from that sought with the standard deviation `tolerance`."""
     if len(hidden) == 1 and tolerance == 0:
         return dict(modulus)
     deviation = np.log(modulus["high"] / modulus["low"]) / (2 * SDS_OF_95)
@@ -77,97 +71,97 @@ def with_hidden(
     return {**modulus, **{key: rounded(float(at)) for key, at in ends.items()}}
 
 
-def place_of(explanation: Explanation, name: str) -> int:
-    """Where in its model's parameters one is."""
-    return [entry.name for entry in explanation.model.parameters].index(name)
+def parameter_index(explanation: Explanation, name: str) -> int:
+    """The index of a parameter in the explanation's model."""
+    return [parameter.name for parameter in explanation.model.parameters].index(name)
 
 
-def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
-    """A parameter's most probable value and 95 % interval, within its bounds: 1.96 standard deviations either way.
+def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, Any]:
+    """A parameter's most probable value and 95 % interval within its bounds: ±1.96 standard deviations.
 
-    Where these reach the value at which a mechanism does nothing, and the profile of the posterior falls off before it,
-    the interval ends where the profile does. `at_bound` is the end of its search that it lies at or beyond, `low` or
-    `high`, where it does.
+    Where the interval would include the value at which a mechanism has no effect, but the profile of the posterior
+    falls off before it, the profile gives the end. `at_bound`, `low` or `high`, is present where the value lies at or
+    beyond that end of its search.
     """
     best, point = explanation.best, explanation.point
-    entry = explanation.model.parameters[place]
-    if entry.moves_covariance:
-        own = [parameter.name for parameter in best.hypothesis.covariance].index(entry.name)
-        variance = float(levels_covariance(best.fitter.covariance_equations(best.at)[1][0])[own, own])
+    parameter = explanation.model.parameters[index]
+    if parameter.moves_covariance:
+        row = [other.name for other in best.hypothesis.covariance].index(parameter.name)
+        variance = float(levels_covariance(best.fitter.covariance_equations(best.at)[1][0])[row, row])
     else:
-        index = best.hypothesis.mean_places.index(place)
-        variance = float(explanation.best.covariance[index, index])
+        row = best.hypothesis.mean_places.index(index)
+        variance = float(explanation.best.covariance[row, row])
     half_width = SDS_OF_95 * np.sqrt(max(variance, 0.0))
-    low, high = entry.bounds
-    middle = float(point.fit[place])
+    low, high = parameter.bounds
+    middle = float(point.fit[index])
     ends = [max(middle - half_width, low), min(middle + half_width, high)]
-    limit = None if entry.moves_covariance else entry.fit_limit
+    limit = None if parameter.moves_covariance else parameter.fit_limit
     if limit is not None and ends[0] <= limit <= ends[1] and limit != middle:
         side = 0 if limit < middle else 1
-        end = profile_end(best, place, limit)
+        end = profile_end(best, index, limit)
         ends[side] = ends[side] if end is None else end
-    values = [entry.from_fit(at) for at in (middle, *ends)]
-    if entry.relative_to is not None:
-        values = _absolute(explanation, place, values)
+    values = [parameter.from_fit(at) for at in (middle, *ends)]
+    if parameter.relative_to is not None:
+        values = _absolute(explanation, index, values)
     stated = zip(("value", "low", "high"), values, strict=True)
-    at_bound = entry.ends_search(middle)
+    at_bound = parameter.ends_search(middle)
     return {
-        "name": entry.name,
-        "unit": entry.unit,
+        "name": parameter.name,
+        "unit": parameter.unit,
         **{key: rounded(float(value)) for key, value in stated},
         **({} if at_bound is None else {"at_bound": at_bound}),
     }
 
 
-def multiple_of(explanation: Explanation, entry: Parameter) -> float:
-    """The value that a parameter's bounds and prior are multiples of: 1, or that of the one it is relative to."""
-    if entry.relative_to is None:
+def multiple_of(explanation: Explanation, parameter: Parameter) -> float:
+    """The unit of a parameter's bounds and prior: 1, or the value of the parameter that it is relative to."""
+    if parameter.relative_to is None:
         return 1.0
-    other = place_of(explanation, entry.relative_to)
+    other = parameter_index(explanation, parameter.relative_to)
     return explanation.model.parameters[other].from_fit(float(explanation.point.fit[other]))
 
 
 def without_effect(explanation: Explanation) -> list[str]:
-    """Its mechanisms of which the 95 % interval of every strength holds the value at which the mechanism does nothing.
+    """The mechanisms whose every strength may be zero: its 95 % interval holds the value without effect.
 
     A strength is a parameter with such a value (`limit`); on a logarithmic scale none reaches 0 or ∞.
     """
     idle = []
-    for name, place in own_places(explanation.names, explanation.best.hypothesis.lines).items():
-        own = range(place.start, place.stop)
-        strengths = [index for index in own if explanation.model.parameters[index].limit is not None]
+    for name, span in own_places(explanation.names, explanation.best.hypothesis.lines).items():
+        indices = range(span.start, span.stop)
+        strengths = [index for index in indices if explanation.model.parameters[index].limit is not None]
         if strengths and all(_holds_limit(explanation, index) for index in strengths):
             idle.append(name)
     return idle
 
 
-def _holds_limit(explanation: Explanation, place: int) -> bool:
-    stated, limit = parameter(explanation, place), explanation.model.parameters[place].limit
+def _holds_limit(explanation: Explanation, index: int) -> bool:
+    stated, limit = parameter_with_interval(explanation, index), explanation.model.parameters[index].limit
     return limit is not None and bool(stated["low"] <= limit <= stated["high"])
 
 
-def _absolute(explanation: Explanation, place: int, multiples: list[float]) -> list[float]:
-    """A parameter that is fitted as a multiple of another, as their product; both on logarithmic scales.
+def _absolute(explanation: Explanation, index: int, multiples: list[float]) -> list[float]:
+    """The value of a parameter that is fitted as a multiple of another one, both on logarithmic scales.
 
-    The interval is that of the product, cut off where the multiple has its bounds.
+    The interval is that of the product, cut off at the bounds of the multiple.
     """
-    best, entry = explanation.best, explanation.model.parameters[place]
-    assert entry.relative_to is not None
-    other = place_of(explanation, entry.relative_to)
-    places = [best.hypothesis.mean_places.index(one) for one in (place, other)]
-    deviation = float(np.sqrt(max(best.covariance[np.ix_(places, places)].sum(), 0.0)))
+    best, parameter = explanation.best, explanation.model.parameters[index]
+    assert parameter.relative_to is not None
+    other = parameter_index(explanation, parameter.relative_to)
+    rows = [best.hypothesis.mean_places.index(i) for i in (index, other)]
+    deviation = float(np.sqrt(max(best.covariance[np.ix_(rows, rows)].sum(), 0.0)))
     unit = float(np.exp(explanation.point.fit[other]))
     factor = np.exp(SDS_OF_95 * deviation)
     value = multiples[0] * unit
-    return [value, max(value / factor, min(entry.low * unit, value)), min(value * factor, entry.high * unit)]
+    return [value, max(value / factor, min(parameter.low * unit, value)), min(value * factor, parameter.high * unit)]
 
 
-_MEASURED = ("d33", "youngs_modulus")  # that belong to no mechanism, where they are free
+_MEASURED = ("d33", "youngs_modulus")  # free parameters that belong to no mechanism
 
 
 @dataclass(frozen=True)
 class AtBound:
-    """A parameter at an end of its search, `low` to `high` in `unit`; `mechanism` in plain words, or the base model."""
+    """A parameter at the `end` of its search, `low` to `high` in `unit`; `mechanism` in words, or the base model."""
 
     mechanism: str
     parameter: str
@@ -178,112 +172,116 @@ class AtBound:
 
     @property
     def words(self) -> str:
-        """As the reason why something is no result: "timing delay: delay at or beyond 5000 µs"."""
+        """The reason why a value is no result: "timing delay: delay at or beyond 5000 µs"."""
         value = f"{in_digits(self.end, 3)} {self.unit.strip('-')}".rstrip()
-        called = self.parameter.replace("_", " ")
-        return f"{self.mechanism.replace('_', ' ')}: {called} at or beyond {value}, where its search ends"
+        parameter_words = self.parameter.replace("_", " ")
+        return f"{self.mechanism.replace('_', ' ')}: {parameter_words} at or beyond {value}, where its search ends"
 
     @property
     def finding(self) -> Finding:
-        """The same among the findings."""
+        """The same as a finding."""
         arguments = {"mechanism": self.mechanism, "parameter": self.parameter}
         bounds = {"low": self.low, "high": self.high, "unit": self.unit}
         return Finding(Reason.PARAMETER_AT_BOUND, "", self.parameter, {**arguments, **bounds})
 
 
 def at_bounds(explanation: Explanation) -> Sequence[AtBound]:
-    """Those of an explanation's mechanisms, and of d33 and a modulus that nobody declared."""
-    places = own_places(explanation.names, explanation.best.hypothesis.lines)
-    known = explanation.best.hypothesis.lines.mechanisms
-    owner = {index: known[name] for name, place in places.items() for index in range(place.start, place.stop)}
-    found = []
-    for index, (entry, fit) in enumerate(zip(explanation.model.parameters, explanation.point.fit, strict=True)):
-        if index not in owner and (entry.name not in _MEASURED or entry.unit == "-"):
+    """Parameters at bounds: those of an explanation's mechanisms, d33, and an undeclared modulus."""
+    spans = own_places(explanation.names, explanation.best.hypothesis.lines)
+    mechanisms = explanation.best.hypothesis.lines.mechanisms
+    owner = {index: mechanisms[name] for name, span in spans.items() for index in range(span.start, span.stop)}
+    bounds = []
+    for index, (parameter, fit) in enumerate(zip(explanation.model.parameters, explanation.point.fit, strict=True)):
+        if index not in owner and (parameter.name not in _MEASURED or parameter.unit == "-"):
             continue
-        side = entry.ends_search(float(fit))
+        side = parameter.ends_search(float(fit))
         if side is not None:
-            called = in_plain_words(owner[index]) if index in owner else "base model"
-            found.append(_at_bound(explanation, entry, called, side))
-    return found
+            mechanism_words = in_plain_words(owner[index]) if index in owner else "base model"
+            bounds.append(_at_bound(explanation, parameter, mechanism_words, side))
+    return bounds
 
 
-def _at_bound(explanation: Explanation, entry: Parameter, mechanism: str, side: str) -> AtBound:
-    scale = multiple_of(explanation, entry)
-    low, high = scale * entry.low, scale * entry.high
+def _at_bound(explanation: Explanation, parameter: Parameter, mechanism: str, side: str) -> AtBound:
+    scale = multiple_of(explanation, parameter)
+    low, high = scale * parameter.low, scale * parameter.high
     end = low if side == "low" else high
-    return AtBound(mechanism, entry.name.removeprefix("law_"), low, high, entry.unit, end)
+    return AtBound(mechanism, parameter.name.removeprefix("law_"), low, high, parameter.unit, end)
 
 
-_LEVELS = 9  # evenly over the rows
+_LEVELS = 9  # quantiles over the rows
 _FACTORS = ("gain", "frequency_response")
 
 
 def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
-    """Logarithms of the factors (levels,) by which d33 may be another, equally probable; 0 alone where no law is a
-    factor."""
-    known, names = problem.lines.mechanisms, explanation.names
+    """Logarithms of equally probable factors on d33 (levels,) from the reference level of unlisted laws; only 0 where
+    no law is a factor."""
+    mechanisms, names = problem.lines.mechanisms, explanation.names
     laws = [
-        law for name in names if isinstance(law := known[name], UnlistedLaw) and law.description.acts_on in _FACTORS
+        law
+        for name in names
+        if isinstance(law := mechanisms[name], UnlistedLaw) and law.description.acts_on in _FACTORS
     ]
     if not laws:
         return np.zeros(1)
-    left = tuple(name for name in names if all(name != law.name for law in laws))
-    with_law, without = (problem.hypothesis(each, has_position_scatter=False, whole=True) for each in (names, left))
+    other_names = tuple(name for name in names if all(name != law.name for law in laws))
+    with_law, without = (
+        problem.hypothesis(mechanism_names, has_position_scatter=False, whole=True)
+        for mechanism_names in (names, other_names)
+    )
     fit = np.zeros(len(without.model.parameters))
-    for name, place in own_places(left, without.lines).items():
-        fit[place] = explanation.own(name)
+    for name, span in own_places(other_names, without.lines).items():
+        fit[span] = explanation.own(name)
     fit[without.own_parameters :] = explanation.point.fit[with_law.own_parameters :]
     here, there = (
         np.abs(hypothesis.frf_model.predict(at, slopes=False, place=False).value)
         for hypothesis, at in ((with_law, explanation.point.fit), (without, fit))
     )
-    some = (there > 0) & (here > 0)
+    nonzero = (there > 0) & (here > 0)
     shares = (np.arange(_LEVELS) + 0.5) / _LEVELS
-    return np.quantile(np.log(here[some] / there[some]), shares)
+    return np.quantile(np.log(here[nonzero] / there[nonzero]), shares)
 
 
-_COUNTS = 0.003  # of the probability, below which an answer is left out of averages
-_WORTH_MORE = 0.03  # of the probability, below which what may be there besides an answer is left out
-_TWINS = 2.0  # nats by which sets with the one in place of the other differ at most
-_NAMED, _LEAST_NAMED = 0.02, 3  # probability of a group that is listed, and how many are at least
-_ALIKE = 0.5  # of the noise: answers that differ by less predict alike
+_COUNTS = 0.003  # probability below which an answer is left out of averages
+_WORTH_MORE = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
+_TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
+_NAMED, _LEAST_NAMED = 0.02, 3  # probability from which a group is listed, and the least number listed
+_ALIKE = 0.5  # of the noise: answers that differ by less have the same predictions
 _ENOUGH_ALIKE = 0.95
 
 
 def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Groups of mechanisms that these recordings cannot tell apart, and the posterior that one of each is there.
+    """Groups of mechanisms that these recordings cannot tell apart, and the posterior that one of each group acts.
 
-    Two are in a group where some answer stands as well with the one in place of the other. `present` is the posterior
-    of each mechanism, from which that of one alone in its group is taken.
+    Two mechanisms are in a group where some answer is as good with one in place of the other. `present` is the
+    posterior of each mechanism, used for groups of one.
     """
-    found = []
+    groups = []
     for group in _groups(search):
         together = sum(answer.probability for answer in search.answers if set(group) & set(answer.names))
-        found.append((present.get(group[0], 0.0) if len(group) == 1 else together, group))
-    found.sort(key=lambda entry: (-entry[0], entry[1]))
+        groups.append((present.get(group[0], 0.0) if len(group) == 1 else together, group))
+    groups.sort(key=lambda ranked: (-ranked[0], ranked[1]))
     return [
         {"mechanisms": group, "probability": round(probability, 3)}
-        for place, (probability, group) in enumerate(found)
-        if place < _LEAST_NAMED or probability >= _NAMED
+        for rank, (probability, group) in enumerate(groups)
+        if rank < _LEAST_NAMED or probability >= _NAMED
     ]
 
 
 def present(search: Search, problem: FittingProblem) -> dict[str, float]:
-    """The posterior that each mechanism is there, also beside an unlisted law."""
-    found: dict[str, float] = {}
+    """The posterior of each mechanism, including answers where it acts together with an unlisted law."""
+    probabilities: dict[str, float] = {}
     for answer in search.answers:
         if answer.explanation is not None:
             for name in answer.names:
-                found[name] = found.get(name, 0.0) + answer.probability
+                probabilities[name] = probabilities.get(name, 0.0) + answer.probability
             continue
-        laws = [(entry, search.log_weight(entry)) for entry in search.laws if search.is_supported(entry)]
-        total = np.logaddexp.reduce([weight for _, weight in laws]) if laws else 0.0
-        for entry, weight in laws:
-            for name in entry.names:
+        total = np.logaddexp.reduce([weight for _, weight in search.weighed_laws]) if search.weighed_laws else 0.0
+        for explanation, weight in search.weighed_laws:
+            for name in explanation.names:
                 if name in problem.lines.mechanisms.named:
                     share = answer.probability * float(np.exp(weight - total))
-                    found[name] = found.get(name, 0.0) + share
-    return found
+                    probabilities[name] = probabilities.get(name, 0.0) + share
+    return probabilities
 
 
 def _groups(search: Search) -> list[list[str]]:
@@ -292,11 +290,11 @@ def _groups(search: Search) -> list[list[str]]:
         for answer in search.answers
         if answer.explanation is not None and answer.probability > _COUNTS
     ]
-    evidence = {frozenset(entry.names): entry.log_evidence for entry in standing}
-    names = sorted({name for own in evidence for name in own})
+    evidence = {frozenset(explanation.names): explanation.log_evidence for explanation in standing}
+    names = sorted({name for mechanisms in evidence for name in mechanisms})
     groups = [{name} for name in names]
-    for one, two in _twins(evidence):
-        first, second = (next(group for group in groups if name in group) for name in (one, two))
+    for twin, other_twin in _twins(evidence):
+        first, second = (next(group for group in groups if name in group) for name in (twin, other_twin))
         if first is not second:
             first |= second
             groups.remove(second)
@@ -305,96 +303,113 @@ def _groups(search: Search) -> list[list[str]]:
 
 def _twins(evidence: Mapping[frozenset[str], float]) -> list[tuple[str, str]]:
     pairs = []
-    for one, log_evidence in evidence.items():
-        for two, other in evidence.items():
-            apart = one ^ two
-            if len(one) == len(two) and len(apart) == 2 and abs(log_evidence - other) < _TWINS:
-                (mine,), (others,) = one - two, two - one
+    for first, log_evidence in evidence.items():
+        for second, other in evidence.items():
+            difference = first ^ second
+            if len(first) == len(second) and len(difference) == 2 and abs(log_evidence - other) < _TWINS:
+                (mine,), (others,) = first - second, second - first
                 pairs.append((mine, others))
     return pairs
 
 
 def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[str, Any] | None:
-    """The median and the 95 % interval of d33 over all answers that have one, each with its probability and with what
-    may be there besides without showing; None where what no answer explains is more probable than all of them.
+    """The median and the 95 % interval of d33 over all answers, weighted with their probabilities and allowing for
+    mechanisms that would not show; None where answers without d33 are more probable than all others.
 
-    What the declared values of the skin may be off by widens the interval, and not `relative`, which is for comparing
-    sensors, dates and spheres. `unsure` is a further relative standard uncertainty.
+    The tolerances of the skin's declared values widen the interval, but not `relative`, which is for comparing sensors,
+    dates and spheres. `unsure` is a further relative standard uncertainty.
     """
     by_explanation: dict[int, tuple[float, Explanation]] = {}  # curves' own mechanisms do not change d33
-    for probability, entry in (pair for answer in search.answers for pair in _stand_on(search, answer)):
-        by_explanation[id(entry)] = (probability + by_explanation.get(id(entry), (0.0, entry))[0], entry)
-    each = [pair for pair in by_explanation.values() if pair[0] > _COUNTS]
-    total = sum(probability for probability, _ in each)
+    for probability, explanation in (pair for answer in search.answers for pair in _stand_on(search, answer)):
+        by_explanation[id(explanation)] = (
+            probability + by_explanation.get(id(explanation), (0.0, explanation))[0],
+            explanation,
+        )
+    weighted = [pair for pair in by_explanation.values() if pair[0] > _COUNTS]
+    total = sum(probability for probability, _ in weighted)
     if total < 0.5:
         return None
-    parts = [_d33_under(search, problem, entry, probability).times(probability) for probability, entry in each]
+    parts = [
+        _d33_under(search, problem, explanation, probability).times(probability)
+        for probability, explanation in weighted
+    ]
     mixture = NormalMixture.joined(parts)
     declared = np.concatenate(
-        [np.full(len(part.share), declared_d33(problem, entry)) for part, (_, entry) in zip(parts, each, strict=True)]
+        [
+            np.full(len(part.share), declared_d33(problem, explanation))
+            for part, (_, explanation) in zip(parts, weighted, strict=True)
+        ]
     )
     shares = mixture.share / mixture.share.sum()
 
     def ends(deviation: Floats) -> dict[str, float | None]:
         levels = {"value": 0.5, "low": 0.025, "high": 0.975}
         at = {key: mixture_quantile(level, shares, mixture.mean, deviation) for key, level in levels.items()}
-        return {key: rounded(float(np.exp(place))) for key, place in at.items()}
+        return {key: rounded(float(np.exp(logarithm))) for key, logarithm in at.items()}
 
     relative = np.hypot(mixture.deviation, unsure)
-    unit = each[0][1].model.parameters[place_of(each[0][1], "d33")].unit
-    alone = ends(relative)
+    unit = weighted[0][1].model.parameters[parameter_index(weighted[0][1], "d33")].unit
+    relative_ends = ends(relative)
     return {
         "name": "d33",
         "unit": unit,
         **ends(np.hypot(relative, declared)),
-        "relative": {key: alone[key] for key in ("low", "high")},
+        "relative": {key: relative_ends[key] for key in ("low", "high")},
     }
 
 
 def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> NormalMixture:
-    """ln d33 under an answer, at each level that a law of it may refer to, and with one more mechanism that does not
-    show; the shares sum to 1."""
-    place = place_of(explanation, "d33")
+    """ln d33 under an answer, at each reference level of its laws, and with one more mechanism that does not show; the
+    shares sum to 1."""
+    index = parameter_index(explanation, "d33")
     best = explanation.best
-    spread = marginalise_sensor_spread(best.fitter, best.at, place)
+    spread = marginalise_sensor_spread(best.fitter, best.at, index)
     if spread is None:
-        index = best.hypothesis.mean_places.index(place)
-        deviation = np.sqrt(best.covariance[index, index])
-        spread = [NormalMixture(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))]
+        row = best.hypothesis.mean_places.index(index)
+        deviation = np.sqrt(best.covariance[row, row])
+        spread = [NormalMixture(np.ones(1), explanation.point.fit[index : index + 1], np.array([deviation]))]
     several = list(spread)
     if probability > _WORTH_MORE:
-        known = {frozenset(one.explanation.names) for one in search.answers if one.explanation is not None}
-        others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in known]
+        sets_of_answers = {
+            frozenset(answer.explanation.names) for answer in search.answers if answer.explanation is not None
+        }
+        others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in sets_of_answers]
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
         for name in others:
-            found = None if name in explanation.names else with_unseen(problem, explanation, name, "d33")
-            if found is not None:  # what declared facts say is as probable as its absence, and counts as it fits
-                several.append(found if name in declared_laws(problem.lines) else found.times(odds * _as_unseen(found)))
+            with_mechanism = None if name in explanation.names else with_unseen(problem, explanation, name, "d33")
+            if with_mechanism is not None:  # a law that declared facts imply has even odds, weighted by its fit
+                several.append(
+                    with_mechanism
+                    if name in declared_laws(problem.lines)
+                    else with_mechanism.times(odds * _as_unseen(with_mechanism))
+                )
     mixture = NormalMixture.joined(several)
     mixture = mixture.times(1 / float(mixture.share.sum()))
     levels = law_levels(problem, explanation)
     return NormalMixture.joined([mixture.moved(level).times(1 / len(levels)) for level in levels.tolist()])
 
 
-def _as_unseen(found: NormalMixture) -> float:
-    """The factor that takes from a mechanism's shares what it would show by: no set of the answers holds it."""
-    return min(1.0, float(np.exp(SHOWS) / found.share.sum()))
+def _as_unseen(normals: NormalMixture) -> float:
+    """The factor that limits a mechanism's shares to those of one that does not show, as no answer holds it."""
+    return min(1.0, float(np.exp(SHOWS) / normals.share.sum()))
 
 
 def _stand_on(search: Search, answer: Answer) -> list[tuple[float, Explanation]]:
-    """The explanations of an answer, each with its probability: of `none_of_these` all laws that nobody listed which
-    show, as they may have the same course and differ by what is d33."""
+    """The explanations of an answer with their probabilities.
+
+    Those of `none_of_these` are all supported unlisted laws, which may predict the same and differ in d33.
+    """
     if answer.explanation is not None:
         return [(answer.probability, answer.explanation)]
-    laws = [entry for entry in search.laws if search.is_supported(entry)]
-    weights = np.array([search.log_weight(entry) for entry in laws])
+    laws = [explanation for explanation in search.laws if search.is_supported(explanation)]
+    weights = np.array([search.log_weight(explanation) for explanation in laws])
     shares = np.exp(weights - np.logaddexp.reduce(weights)) if laws else weights
-    return [(answer.probability * float(share), entry) for share, entry in zip(shares, laws, strict=True)]
+    return [(answer.probability * float(share), explanation) for share, explanation in zip(shares, laws, strict=True)]
 
 
 def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict[str, Any] | None:
-    """The rivals of the leading answer that predict these recordings as it does, by less than half the noise, and the
-    probability of all of them; None where that is too little to stand for one answer, or one stands alone."""
+    """The rivals of the leading answer whose predictions differ from its own by less than half the noise, and their
+    total probability; None where that is too small, or there are no such rivals."""
     leader = search.answers[0]
     if leader.explanation is None or not leader.explanation.names or leader.probability >= EXPLAINED:
         return None
@@ -415,30 +430,30 @@ def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict
     return {"probability": round(total, 3), "rivals": rivals, "differ_percent": rounded(furthest, 2)}
 
 
-def alike_clause(found: Mapping[str, Any]) -> str:
-    """That one of several answers may serve as a model."""
+def alike_clause(document: Mapping[str, Any]) -> str:
+    """A clause saying that any of several answers may serve as a model."""
     return (
-        f"all that hold {100 * found['probability']:.1f} % predict these recordings alike, to "
-        f"{found['differ_percent']:g} %: as a model any of them serves within what was measured"
+        f"all that hold {100 * document['probability']:.1f} % predict these recordings alike, to "
+        f"{document['differ_percent']:g} %: as a model any of them serves within what was measured"
     )
 
 
-_ASKED = 0.03  # of the probability, below which an answer is asked no more than whether it holds the law
+_LEAST_ASKED = 0.03  # probability below which an answer without the law contributes none to it
 
 
 def idealised(search: Search, problem: FittingProblem, shown: Explanation) -> list[dict[str, Any]]:
-    """Of each such law the posterior that it is there, over all answers, and what it does to the response that is
-    `shown`, root mean square in percent of it.
+    """Laws without a free parameter that the base model idealises: their posteriors over all answers, and their effect
+    on the response of `shown`, root mean square in percent of it.
 
-    It has even odds beside its absence under every answer; where it shows too little to be named in one, its share of
-    that is by the evidence.
+    The prior odds of a law are even under every answer; in an answer that does not name it, its share is by the
+    evidence.
     """
     named = problem.lines.mechanisms.named
     stated = {frozenset(answer.names) for answer in search.answers}
     return [
         {
             "name": name,
-            "probability": round(sum(_probability(one, problem, name, stated) for one in search.answers), 3),
+            "probability": round(sum(_probability(answer, problem, name, stated) for answer in search.answers), 3),
             "effect_percent": rounded(_effect_percent(problem, shown, name), 2),
         }
         for name in named
@@ -447,22 +462,22 @@ def idealised(search: Search, problem: FittingProblem, shown: Explanation) -> li
 
 
 def _probability(answer: Answer, problem: FittingProblem, name: str, stated: Collection[frozenset[str]]) -> float:
-    """The posterior of an answer and the law together; 0 of one beside which the answer with the law is `stated`."""
+    """The joint posterior of an answer and the law; 0 where the answer with the law is itself in `stated`."""
     if answer.explanation is None or name in answer.names:
         return answer.probability * (0.5 if answer.explanation is None else 1.0)
     with_law = frozenset({name, *answer.explanation.names, *answer.alone})
-    if answer.probability < _ASKED or with_law in stated:
+    if answer.probability < _LEAST_ASKED or with_law in stated:
         return 0.0
     measured = "youngs_modulus" if problem.lines.curves else "d33"
-    found = with_unseen(problem, answer.explanation, name, measured)
-    odds = 0.0 if found is None else float(found.share.sum())
+    normals = with_unseen(problem, answer.explanation, name, measured)
+    odds = 0.0 if normals is None else float(normals.share.sum())
     return answer.probability * odds / (1 + odds)
 
 
 def _effect_percent(problem: FittingProblem, shown: Explanation, name: str) -> float:
-    """Since the law has no parameter, the models with and without it have the same."""
-    without = tuple(one for one in shown.names if one != name)
-    order = [one for one in problem.lines.mechanisms if one in {*without, name}]
+    """Effect of a law on the response [%]; the models with and without it have the same parameters."""
+    without = tuple(other for other in shown.names if other != name)
+    order = [other for other in problem.lines.mechanisms if other in {*without, name}]
     models = [problem.hypothesis(names, has_position_scatter=False).model for names in (without, tuple(order))]
     before, after = (model.predict(shown.point.fit).value for model in models)
     change, size = (float(np.linalg.norm(of)) for of in (after - before, before))
@@ -472,35 +487,35 @@ def _effect_percent(problem: FittingProblem, shown: Explanation, name: str) -> f
 _SPREAD = "sensor_spread"
 _LEAST_SENSORS = 4
 _LEAST = 0.1  # of d33: sensors of one skin differ by some percent
-_APART = 3.0  # standard deviations: of the sensors, by the median absolute deviation, and of its own
-_ROBUST = 1.4826  # standard deviations of a normal distribution in its median absolute deviation
-_MOST = 3  # that are named
+_OUTLIER_SDS = 3.0  # standard deviations, both of the sensors (from the median absolute deviation) and of its own d33
+_ROBUST = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+_MOST = 3  # sensors named
 
 
-def sensors_apart(problem: FittingProblem, shown: Explanation) -> str:
-    """The sensors whose d33 lies far from the others', by how much; empty where none does, or sensors are alike."""
+def outlying_sensors(problem: FittingProblem, shown: Explanation) -> str:
+    """A clause on the sensors whose d33 lies far from the others'; empty where none does, or without sensor spread."""
     if _SPREAD not in shown.names or problem.kind != "frf":
         return ""
-    numbers, off, deviation = _besides(problem, shown)
+    indices, off, deviation = _sensor_deviations(problem, shown)
     if len(off) < _LEAST_SENSORS:
         return ""
     spread = _ROBUST * float(np.median(np.abs(off)))
-    far = np.abs(off) > np.maximum(_LEAST, _APART * np.maximum(spread, deviation))
+    far = np.abs(off) > np.maximum(_LEAST, _OUTLIER_SDS * np.maximum(spread, deviation))
     rows = np.flatnonzero(far)[np.argsort(-np.abs(off[far]), kind="stable")].tolist()
-    names = [problem.lines.campaign.skin.sensors[number].id for number in numbers.tolist()]
+    names = [problem.lines.campaign.skin.sensors[index].id for index in indices.tolist()]
     return ", ".join(_clause(names[row], off[row], deviation[row]) for row in rows[:_MOST])
 
 
-def _besides(problem: FittingProblem, shown: Explanation) -> tuple[Indices, Floats, Floats]:
-    """The numbers of the sensors, d33 of each over the sensors' median, less 1, and its standard deviation."""
+def _sensor_deviations(problem: FittingProblem, shown: Explanation) -> tuple[Indices, Floats, Floats]:
+    """Indices of the sensors, d33 of each over the median minus 1, and its standard deviation."""
     levels = shown.best.levels
-    found = residuals(problem, shown, levels.gain, levels.position)
-    numbers, sensor = np.unique(problem.lines.sensor, return_inverse=True)
-    weight = found.gain_deviation**-2
+    sensor_residuals = residuals(problem, shown, levels.gain, levels.position)
+    indices, sensor = np.unique(problem.lines.sensor, return_inverse=True)
+    weight = sensor_residuals.gain_deviation**-2
     total = np.bincount(sensor, weight)
-    value = 1 + np.bincount(sensor, weight * found.gain) / total
+    value = 1 + np.bincount(sensor, weight * sensor_residuals.gain) / total
     median = float(np.median(value))
-    return numbers, value / median - 1, np.asarray(total**-0.5 / median, dtype=float)
+    return indices, value / median - 1, np.asarray(total**-0.5 / median, dtype=float)
 
 
 def _clause(sensor: str, off: float, deviation: float) -> str:

@@ -1,21 +1,12 @@
-"""Figures of recordings beside what was fitted to them.
+"""Figures of single recordings with their fits, and of the parameters' intervals.
 
-What the figures of a diagnosis have in common: colours of Okabe and Ito, which colour-blind people tell apart, and
-the layout. Black is what was measured, orange the model before, blue the one after, grey the band of the noise.
+Curves: force against depth with both models and the marks, and below the residual of each model on the band of the
+noise. FRFs: magnitude and phase with both models, and below the residuals on the band of the noise. One recording is
+shown at a time and chosen from a menu, which changes the numbers of the traces, not the traces, so that hundreds of
+FRFs stay a small file.
 
-The figure of curves: force against depth with the models before and after and the marks, below what each leaves on
-the noise's band.
-
-One recording is shown at a time; a menu chooses. What a colour means, a dash and a marker mean as well: orange, dashed
-and a square are the model before; blue, solid and a circle the one after; black is what was measured.
-
-The figure of FRFs: magnitude and phase with the models before and after, below what each leaves on the noise's band.
-
-One recording is shown at a time; a menu chooses. A colour, a dash and a marker mean the same as in the figure of
-curves: orange, dashed and a square are the model before; blue, solid and a circle the one after; black is what was
-measured. The menu changes the numbers of the traces, not the traces, so that hundreds of recordings stay a small file.
-
-The figure of what the recordings say of the parameters of the stated mechanisms.
+Colour, dash and marker mean the same everywhere (colours of Okabe and Ito, for colour-blind readers): black is
+measured; orange, dashed and square the model before; blue, solid and circle the model after; grey the noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +35,7 @@ from underskin.mechanisms.base import Kind
 from underskin.mechanisms.parameter import Parameter
 from underskin.units import Floats, readable_unit
 
-PLAIN = {"exponentformat": "none"}  # else ticks had prefixes beside the unit of their axis: 10μ of N
+PLAIN = {"exponentformat": "none"}  # without it ticks would have prefixes as well as the axis its unit: 10μ of N
 TEMPLATE = go.layout.Template(pio.templates["plotly_white"]).update(
     layout={"xaxis": PLAIN, "yaxis": PLAIN}, data={"heatmap": [{"colorbar": PLAIN}]}
 )
@@ -52,24 +43,24 @@ MEASURED, BEFORE, AFTER, BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.1
 
 
 def styled(figure: go.Figure) -> go.Figure:
-    """The figure in the layout of all."""
+    """The figure in the common layout."""
     figure.update_layout(template=TEMPLATE, font={"size": 14, "color": "#222222"})
     return figure
 
 
 _MOST_CURVES = 12
 _TITLES = {"indentation": "Force against depth", "compression": "Force against displacement"}
-_LOADED = 0.02  # of the largest force, from which on a curve is in view from the start
-_CURVE_ROOM = 0.4, 0.05  # of what is in view: the air beside it, if there is any, and the edge
+_LOADED = 0.02  # of the largest force, from which a curve is in the initial view
+_CURVE_ROOM = 0.4, 0.05  # of the initial view: additional range in the air, if recorded, and margin
 _ALONG = 40  # points along an edge of the band
 _CURVE_HEIGHT, _PANEL = 460, 150  # pixels
-_PANEL_TITLE = 12  # smaller than others, that those of two panels do not touch
+_PANEL_TITLE = 12  # smaller than others, so that those of two panels do not touch
 
 
 class _CurveModel(NamedTuple):
-    """How a model is called and drawn."""
+    """Name and style of a model; `role` is before or after."""
 
-    shows: str
+    role: str
     name: str
     colour: str
     dash: str
@@ -78,7 +69,7 @@ class _CurveModel(NamedTuple):
 
 @dataclass(frozen=True)
 class _Drawing:
-    """One recording: its traces, and of the layout what is its own, by path."""
+    """One recording: its traces, and its part of the layout by path."""
 
     label: str
     traces: list[dict[str, Any]]
@@ -86,7 +77,8 @@ class _Drawing:
 
 
 def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: str) -> go.Figure:
-    """Of the first curves; `before` and `after` are what the models are called, `before` empty where they are one."""
+    """The figure of the first curves; `before` and `after` are names of the models, `before` empty where there is
+    one."""
     models = [_CurveModel("after", after, AFTER, SHOWN, {"symbol": "circle", "size": 8})]
     if before:
         models.insert(0, _CurveModel("before", before, BEFORE, PAPER, {"symbol": "square-open", "size": 13}))
@@ -97,8 +89,8 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
     figure = make_subplots(
         1 + panels, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=[1 - panels * share, *[share] * panels]
     )
-    for number, drawing in enumerate(drawings):
-        figure.add_traces([{**trace, "visible": number == 0} for trace in drawing.traces])
+    for index, drawing in enumerate(drawings):
+        figure.add_traces([{**trace, "visible": index == 0} for trace in drawing.traces])
     for path, value in drawings[0].layout.items():
         figure.layout[path] = value
     figure.update_layout(
@@ -115,7 +107,7 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
 
 
 class _Curve:
-    """One recording in the units in which its numbers read well; depth is counted from the contact point after."""
+    """One recording in readable units; depth is measured from the contact point of the model after."""
 
     def __init__(self, curve: ShownCurve, kind: Kind, models: Sequence[_CurveModel]) -> None:
         self._curve, self._models = curve, models
@@ -125,7 +117,7 @@ class _Curve:
         self._along = "depth" if kind == "indentation" else "displacement"
 
     def drawing(self) -> _Drawing:
-        """Samples and models above, what each model leaves below, marks on top."""
+        """Samples and models above, residuals below, marks on top."""
         curve = self._curve
         every = len(curve.sample_n) == curve.count
         samples = f"{curve.count} samples" if every else f"{len(curve.sample_n)} of {curve.count} samples"
@@ -135,18 +127,18 @@ class _Curve:
         traces = [self._trace("measured", curve.sample_mm, curve.sample_n, largest, measured)]
         layout: dict[str, Any] = {"yaxis.title.text": f"force [{readable_unit('force_n', largest)[0]}]"}
         residuals = [curve.force_n - self._predicted(model).force_n for model in self._models]
-        most = min(float(np.abs(left).max()) for left in residuals)  # the unit of all is the best one's
-        for row, (model, left) in enumerate(zip(self._models, residuals, strict=True), start=2):
-            alone = len(self._models) == 1
-            name = model.name if alone else f"{model.shows}: {model.name}"
+        most = min(float(np.abs(residual).max()) for residual in residuals)  # the unit of all is the best one's
+        for row, (model, residual) in enumerate(zip(self._models, residuals, strict=True), start=2):
+            is_single = len(self._models) == 1
+            name = model.name if is_single else f"{model.role}: {model.name}"
             line = {"color": model.colour, "width": 2, "dash": model.dash}
-            look: dict[str, Any] = {"mode": "lines", "line": line, "legendgroup": model.shows, "name": escape(name)}
+            look: dict[str, Any] = {"mode": "lines", "line": line, "legendgroup": model.role, "name": escape(name)}
             predicted = self._predicted(model).force_n
-            traces.append(self._trace(model.shows, curve.displacement_mm, predicted, largest, look))
+            traces.append(self._trace(model.role, curve.displacement_mm, predicted, largest, look))
             look |= {"showlegend": False, "xaxis": f"x{row}", "yaxis": f"y{row}"}
             traces += self._band(model, most, row)
-            traces.append(self._trace(f"residual {model.shows}", curve.displacement_mm, left, most, look))
-            which = "residual" if alone else f"residual<br>{model.shows}"
+            traces.append(self._trace(f"residual {model.role}", curve.displacement_mm, residual, most, look))
+            which = "residual" if is_single else f"residual<br>{model.role}"
             layout[f"yaxis{row}.title.text"] = f"{which} [{readable_unit('force_n', most)[0]}]"
             layout[f"yaxis{row}.title.font.size"] = _PANEL_TITLE
         traces += [self._mark(name, mark, largest, marker) for name, mark, marker in self._marks()]
@@ -154,10 +146,10 @@ class _Curve:
         layout[f"xaxis{last}.title.text"] = f"{self._along} from the contact point [{self._length}]"
         view = self._view()
         layout |= {f"xaxis{row}.range": view for row in ("", *range(2, last + 1))}
-        return _Drawing(f"{curve.name}: {curve.left_percent:.2g} % left", traces, layout)
+        return _Drawing(f"{curve.name}: {curve.misfit_percent:.2g} % left", traces, layout)
 
     def _band(self, model: _CurveModel, most: float, row: int) -> list[dict[str, Any]]:
-        """What holds 95 % of the residuals of an exact law, on the way in and on the way back."""
+        """The band that holds 95 % of the residuals of an exact law, on loading and unloading."""
         curve = self._curve
         half = SDS_OF_95 * curve.after.deviation_n
         turn = int(curve.displacement_mm.argmax())
@@ -168,20 +160,20 @@ class _Curve:
         for name, way in (("in", slice(None, turn + 1)), ("back", slice(turn, None))):
             order = np.argsort(curve.displacement_mm[way])  # an area is filled in one direction
             order = order[np.unique(np.linspace(0, len(order) - 1, _ALONG).astype(int))]
-            place, high = curve.displacement_mm[way][order], half[way][order]
+            displacement, high = curve.displacement_mm[way][order], half[way][order]
             filled = {**edge, "fill": "tonexty", "fillcolor": BAND}
             filled["showlegend"] = row == 2 and name == "in"
-            traces.append(self._trace(f"noise {name} {model.shows} low", place, -high, most, edge))
-            traces.append(self._trace(f"noise {name} {model.shows} high", place, high, most, filled))
+            traces.append(self._trace(f"noise {name} {model.role} low", displacement, -high, most, edge))
+            traces.append(self._trace(f"noise {name} {model.role} high", displacement, high, most, filled))
         return traces
 
     def _predicted(self, model: _CurveModel) -> CurvePrediction:
-        return self._curve.before if model.shows == "before" else self._curve.after
+        return self._curve.before if model.role == "before" else self._curve.after
 
     def _marks(self) -> list[tuple[str, Mark, dict[str, Any]]]:
         marks = []
         for model in self._models:
-            name = "contact point" if len(self._models) == 1 else f"contact point {model.shows}"
+            name = "contact point" if len(self._models) == 1 else f"contact point {model.role}"
             marks.append((name, self._predicted(model).contact, {"color": model.colour, **model.marker}))
         jumps = (("snap-in", self._curve.snap_in, "down"), ("pull-off", self._curve.pull_off, "up"))
         for name, mark, way in jumps:
@@ -190,22 +182,22 @@ class _Curve:
         return marks
 
     def _mark(self, name: str, mark: Mark, largest: float, marker: dict[str, Any]) -> dict[str, Any]:
-        place, force = np.array([mark.displacement_mm]), np.array([mark.force_n])
-        trace = self._trace(name, place, force, largest, {"mode": "markers", "marker": marker, "name": name})
+        displacement, force = np.array([mark.displacement_mm]), np.array([mark.force_n])
+        trace = self._trace(name, displacement, force, largest, {"mode": "markers", "marker": marker, "name": name})
         recorded = f"<br>displacement as recorded: {mark.displacement_mm:.6g} mm<extra></extra>"
         return {**trace, "hovertemplate": trace["hovertemplate"].replace("<extra></extra>", recorded)}
 
     def _trace(
-        self, shows: str, displacement_mm: Floats, force_n: Floats, largest: float, look: dict[str, Any]
+        self, role: str, displacement_mm: Floats, force_n: Floats, largest: float, look: dict[str, Any]
     ) -> dict[str, Any]:
-        """In the unit in which forces up to `largest` [N] read well. `meta`: what it is, and its units in the lab's."""
+        """A trace in the readable unit of forces up to `largest` [N]; `meta` has its role and its units in mm and N."""
         unit, per_n = readable_unit("force_n", largest)
         return {
             "type": "scatter",
             "x": self._depth(displacement_mm),
             "y": (per_n * force_n).astype(np.float32),  # more than an eye can tell
-            "meta": {"recording": self._curve.name, "shows": shows, "mm": 1 / self._per_mm, "n": 1 / per_n},
-            "hovertemplate": f"{escape(self._curve.name)}, {shows}<br>"
+            "meta": {"recording": self._curve.name, "shows": role, "mm": 1 / self._per_mm, "n": 1 / per_n},
+            "hovertemplate": f"{escape(self._curve.name)}, {role}<br>"
             f"%{{x:.4g}} {self._length}: %{{y:.4g}} {unit}<extra></extra>",
             **look,
         }
@@ -214,18 +206,18 @@ class _Curve:
         return (self._per_mm * (displacement_mm - self._zero)).astype(np.float32)
 
     def _view(self) -> list[float]:
-        """From where to where the abscissa reaches at first: the loaded part and the marks, with some air."""
+        """The initial range of the abscissa: the loaded part and the marks, with some air."""
         curve = self._curve
         loaded = np.abs(curve.force_n) > _LOADED * np.abs(curve.force_n).max()
         marks = [mark.displacement_mm for _, mark, _ in self._marks()]
-        places = self._depth(np.concatenate([curve.displacement_mm[loaded], marks]))
-        low, high = float(places.min()), float(places.max())
+        depths = self._depth(np.concatenate([curve.displacement_mm[loaded], marks]))
+        low, high = float(depths.min()), float(depths.max())
         air, edge = (share * (high - low) for share in _CURVE_ROOM)
         return [max(low - air, float(self._depth(curve.sample_mm).min()) - edge), high + edge]
 
 
 def _curve_menu(drawings: Sequence[_Drawing]) -> dict[str, Any]:
-    """Shows one recording; a button's `name` is its label without markup."""
+    """The menu that shows one recording; a button's `name` is its label without markup."""
     buttons = []
     for drawing in drawings:
         visible = [other is drawing for other in drawings for _ in other.traces]
@@ -237,19 +229,19 @@ def _curve_menu(drawings: Sequence[_Drawing]) -> dict[str, Any]:
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
-_LONG_TITLE = 11  # pixels: as long as a panel is high where a window is narrow
-_ROOM = 0.08  # at either end of an axis
-_IN_VIEW = 10.0  # times the noise's band: as far as residuals are in view at first
-_FEW = 3  # lines, up to which a model's have markers
-_SMALLEST, _NONE = 0.05, 1e-9  # of a recording's largest response, and pC/N: smaller ones are no scale for a residual
+_LONG_TITLE = 11  # pixels: fits the height of a panel in a narrow window
+_ROOM = 0.08  # margin at either end of an axis
+_IN_VIEW = 10.0  # times the noise's band: initial range of residuals
+_FEW = 3  # lines up to which a model has markers
+_SMALLEST, _NONE = 0.05, 1e-9  # of a recording's largest response, and pC/N: least scale of a residual
 _RESPONSES = ("measured", "before", "after")
-_DIGITS, _DIGITS_LEFT = 5, 3  # of responses and frequencies, and of phases and residuals
+_DIGITS, _RESIDUAL_DIGITS = 5, 3  # of responses and frequencies, and of phases and residuals
 
 
 class _Model(NamedTuple):
-    """How a model is called and drawn."""
+    """Name and style of a model; `role` is before or after."""
 
-    shows: str
+    role: str
     name: str
     colour: str
     dash: str
@@ -257,26 +249,26 @@ class _Model(NamedTuple):
 
 
 class _Trace(NamedTuple):
-    """What it shows, on which of the four panels, and how."""
+    """The quantity of a trace (`role`), its panel of four, unit and style."""
 
-    shows: str
+    role: str
     panel: int
     unit: str
     look: dict[str, Any]
 
 
 def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Figure:
-    """Of recordings, the first at first; `before` and `after`: what the models are called, `before` empty where they
-    are one. `layout.meta` has the recordings' names, sensors, spheres and preloads, what either model leaves of them,
-    and what each trace shows."""
+    """The figure of FRFs, the first recording in view; `before` and `after` are names of the models, `before` empty
+    where there is one. `layout.meta` has the recordings' names, sensors, spheres, preloads and misfits, and the role of
+    each trace."""
     models = [_Model("after", after, AFTER, SHOWN, "circle")]
     if before:
         models.insert(0, _Model("before", before, BEFORE, PAPER, "square-open"))
-    few = min(len(one.frequency_hz) for one in recordings) <= _FEW
+    few = min(len(recording.frequency_hz) for recording in recordings) <= _FEW
     traces = _traces(models, few)
     figure = make_subplots(4, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=_ROWS)
-    numbers = [_numbers(one, [trace.shows for trace in traces]) for one in recordings]
-    for place, trace in enumerate(traces):
+    numbers = [_numbers(recording, [trace.role for trace in traces]) for recording in recordings]
+    for index, trace in enumerate(traces):
         axis = "" if trace.panel == 1 else str(trace.panel)
         figure.add_trace(
             {
@@ -284,11 +276,11 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
                 "xaxis": f"x{axis}",
                 "yaxis": f"y{axis}",
                 "hovertemplate": f"%{{x:.4g}} Hz: %{{y:.4g}} {trace.unit}<extra></extra>",
-                **{name: column[place] for name, column in numbers[0].items()},
+                **{name: column[index] for name, column in numbers[0].items()},
                 **trace.look,
             }
         )
-    lines_hz = np.concatenate([one.frequency_hz for one in recordings])
+    lines_hz = np.concatenate([recording.frequency_hz for recording in recordings])
     figure.update_xaxes(type="log", dtick=decade_ticks(lines_hz), **WHOLE_NUMBERS)
     figure.update_xaxes(title="frequency [Hz]", row=4, col=1)
     titles = ("|FRF| [pC/N]", "phase [°]", "residual,<br>in phase [%]", "residual, out<br>of phase [%]")
@@ -297,7 +289,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     for row in (3, 4):
         figure.update_yaxes(title_font_size=_LONG_TITLE, row=row, col=1)
     figure.update_yaxes(**WHOLE_NUMBERS, row=1, col=1)
-    views = [_view(one, bool(before)) for one in recordings]
+    views = [_view(recording, bool(before)) for recording in recordings]
     for path, value in views[0].items():
         figure.layout[path] = value
     figure.update_layout(
@@ -308,14 +300,15 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         margin={"l": 90, "r": 20, "t": 80, "b": 100},
         legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
         meta={
-            "recordings": [one.name for one in recordings],
-            "sensors": [one.sensor for one in recordings],
-            "indenters_mm": [one.indenter_radius_mm for one in recordings],
-            "preloads_n": [one.preload_n for one in recordings],
+            "recordings": [recording.name for recording in recordings],
+            "sensors": [recording.sensor for recording in recordings],
+            "indenters_mm": [recording.indenter_radius_mm for recording in recordings],
+            "preloads_n": [recording.preload_n for recording in recordings],
             "left_percent": [
-                [float(f"{left:.3g}") for left in (one.left_before, one.left_after)] for one in recordings
+                [float(f"{misfit:.3g}") for misfit in (recording.misfit_before, recording.misfit_after)]
+                for recording in recordings
             ],
-            "shows": [trace.shows for trace in traces],
+            "shows": [trace.role for trace in traces],
         },
     )
     if len(recordings) > 1:
@@ -324,7 +317,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
 
 
 def _traces(models: Sequence[_Model], few: bool) -> list[_Trace]:
-    """In the order in which they are drawn."""
+    """The traces in the order of drawing."""
     dots = {"mode": "markers", "marker": {"color": MEASURED, "symbol": "circle-open", "size": 5}}
     traces = [_Trace("measured", 1, "pC/N", {**dots, "name": "measured", "legendgroup": "measured"})]
     traces.append(_Trace("measured phase", 2, "°", {**dots, "legendgroup": "measured", "showlegend": False}))
@@ -334,50 +327,50 @@ def _traces(models: Sequence[_Model], few: bool) -> list[_Trace]:
         traces.append(_Trace(f"noise {part} low", panel, "%", {**edge, "showlegend": False}))
         traces.append(_Trace(f"noise {part} high", panel, "%", {**edge, **named}))
     for model in models:
-        name = model.name if len(models) == 1 else f"{model.shows}: {model.name}"
+        name = model.name if len(models) == 1 else f"{model.role}: {model.name}"
         marker = {"color": model.colour, "symbol": model.marker, "size": 5}
         line = {
             "mode": "lines+markers" if few else "lines",
             "line": {"color": model.colour, "width": 2, "dash": model.dash},
             "marker": marker,
-            "legendgroup": model.shows,
+            "legendgroup": model.role,
         }
-        traces.append(_Trace(model.shows, 1, "pC/N", {**line, "name": escape(name)}))
-        traces.append(_Trace(f"{model.shows} phase", 2, "°", {**line, "showlegend": False}))
-        left = {"mode": "markers", "marker": marker, "legendgroup": model.shows, "showlegend": False}
-        traces.append(_Trace(f"residual {model.shows} real", 3, "%", left))
-        traces.append(_Trace(f"residual {model.shows} imaginary", 4, "%", left))
+        traces.append(_Trace(model.role, 1, "pC/N", {**line, "name": escape(name)}))
+        traces.append(_Trace(f"{model.role} phase", 2, "°", {**line, "showlegend": False}))
+        residual = {"mode": "markers", "marker": marker, "legendgroup": model.role, "showlegend": False}
+        traces.append(_Trace(f"residual {model.role} real", 3, "%", residual))
+        traces.append(_Trace(f"residual {model.role} imaginary", 4, "%", residual))
     return traces
 
 
-def _columns(one: ShownFrf) -> dict[str, Floats]:
-    """What the traces show of a recording, by their `shows`: each (shown,); residuals and noise in percent of what is
-    predicted after, or of 5 % of the largest where that is less."""
-    before, phase = (np.degrees(np.unwrap(np.angle(predicted))) for predicted in (one.before, one.after))
+def _columns(recording: ShownFrf) -> dict[str, Floats]:
+    """The ordinates of a recording's traces by `role`, each (shown,); residuals and noise in percent of the prediction
+    after, or of 5 % of the largest where that is more."""
+    before, phase = (np.degrees(np.unwrap(np.angle(predicted))) for predicted in (recording.before, recording.after))
     columns = {
-        "measured": np.abs(one.measured),
-        "measured phase": phase + np.degrees(np.angle(one.measured * one.after.conj())),
+        "measured": np.abs(recording.measured),
+        "measured phase": phase + np.degrees(np.angle(recording.measured * recording.after.conj())),
         "after phase": phase,
         "before phase": before + 360 * np.round((phase[0] - before[0]) / 360),
     }
-    size = np.abs(one.after)
+    size = np.abs(recording.after)
     percent = 100 / np.maximum(size, max(_SMALLEST * float(size.max()), _NONE))
-    for part, deviation in zip(("real", "imaginary"), one.deviation, strict=True):
+    for part, deviation in zip(("real", "imaginary"), recording.deviation, strict=True):
         half = SDS_OF_95 * deviation * percent
         columns |= {f"noise {part} low": -half, f"noise {part} high": half}
-    for name, predicted in (("before", one.before), ("after", one.after)):
-        left = (one.measured - predicted) * percent
+    for name, predicted in (("before", recording.before), ("after", recording.after)):
+        residual = (recording.measured - predicted) * percent
         columns |= {name: np.abs(predicted)}
-        columns |= {f"residual {name} real": left.real, f"residual {name} imaginary": left.imag}
+        columns |= {f"residual {name} real": residual.real, f"residual {name} imaginary": residual.imag}
     return columns
 
 
-def _numbers(one: ShownFrf, shows: Sequence[str]) -> dict[str, list[Any]]:
-    """x and y of every trace, to the digits that a figure shows."""
-    columns, frequency = _columns(one), _short(one.frequency_hz, _DIGITS)
+def _numbers(recording: ShownFrf, roles: Sequence[str]) -> dict[str, list[Any]]:
+    """x and y of every trace, rounded to the digits of a figure."""
+    columns, frequency = _columns(recording), _short(recording.frequency_hz, _DIGITS)
     return {
-        "x": [frequency for _ in shows],
-        "y": [_short(columns[name], _DIGITS if name in _RESPONSES else _DIGITS_LEFT) for name in shows],
+        "x": [frequency for _ in roles],
+        "y": [_short(columns[name], _DIGITS if name in _RESPONSES else _RESIDUAL_DIGITS) for name in roles],
     }
 
 
@@ -385,9 +378,9 @@ def _short(values: Floats, digits: int) -> list[float]:
     return [float(f"{value:.{digits}g}") for value in values.tolist()]
 
 
-def _view(one: ShownFrf, both: bool) -> dict[str, Any]:
-    """What of the layout is a recording's own, by path; `both`: whether there is a model before."""
-    columns = _columns(one)
+def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
+    """A recording's part of the layout, by path; `both`: whether there is a model before."""
+    columns = _columns(recording)
     names = ("measured", "before", "after") if both else ("measured", "after")
     sizes = np.concatenate([columns[name] for name in names])
     wide = is_logarithmic(sizes, float(np.median(columns["measured"])))
@@ -403,8 +396,8 @@ def _view(one: ShownFrf, both: bool) -> dict[str, Any]:
     view["yaxis2.range"] = [float(low - _ROOM * (high - low)), float(high + _ROOM * (high - low))]
     for axis, part in ((3, "real"), (4, "imaginary")):
         band = float(columns[f"noise {part} high"].max())
-        left = [float(np.abs(columns[f"residual {name} {part}"]).max()) for name in names[1:]]
-        reach = max(band, left[-1], min(max(left), _IN_VIEW * band)) * (1 + _ROOM)
+        largest = [float(np.abs(columns[f"residual {name} {part}"]).max()) for name in names[1:]]
+        reach = max(band, largest[-1], min(max(largest), _IN_VIEW * band)) * (1 + _ROOM)
         view[f"yaxis{axis}.range"] = [-reach, reach]
     return view
 
@@ -412,22 +405,24 @@ def _view(one: ShownFrf, both: bool) -> dict[str, Any]:
 def _menu(
     recordings: Sequence[ShownFrf], numbers: Sequence[dict[str, list[Any]]], views: Sequence[dict[str, Any]], both: bool
 ) -> dict[str, Any]:
-    """Shows one recording; a button's `name` is its label without markup."""
+    """The menu that shows one recording; a button's `name` is its label without markup."""
     first = recordings[0].frequency_hz
-    alike = all(np.array_equal(one.frequency_hz, first) for one in recordings)
+    alike = all(np.array_equal(recording.frequency_hz, first) for recording in recordings)
     buttons = []
-    for one, own, view in zip(recordings, numbers, views, strict=True):
-        label = _label(one, both)
-        changed = {"y": own["y"]} if alike else own
+    for recording, columns, view in zip(recordings, numbers, views, strict=True):
+        label = _label(recording, both)
+        changed = {"y": columns["y"]} if alike else columns
         buttons.append({"label": escape(label), "name": label, "method": "update", "args": [changed, view]})
     return {"buttons": buttons, "x": 1, "xanchor": "right", "y": 1.02, "yanchor": "bottom"}
 
 
-def _label(one: ShownFrf, both: bool) -> str:
-    where = f"{one.sensor}, R {one.indenter_radius_mm:.3g} mm, {one.preload_n:.3g} N"
-    lines = "" if len(one.frequency_hz) == one.count else f"; {len(one.frequency_hz)} of {one.count} lines"
-    before = f"{_percent(one.left_before)} before, " if both else ""
-    return f"{one.name} ({where}): misfit {before}{_percent(one.left_after)}{' after' if both else ''}{lines}"
+def _label(recording: ShownFrf, both: bool) -> str:
+    where = f"{recording.sensor}, R {recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
+    drawn = len(recording.frequency_hz)
+    lines = "" if drawn == recording.count else f"; {drawn} of {recording.count} lines"
+    before = f"{_percent(recording.misfit_before)} before, " if both else ""
+    after = f"{_percent(recording.misfit_after)}{' after' if both else ''}"
+    return f"{recording.name} ({where}): misfit {before}{after}{lines}"
 
 
 def _percent(value: float) -> str:
@@ -435,38 +430,40 @@ def _percent(value: float) -> str:
     return np.format_float_positional(value, precision=2, fractional=False, trim="-") + " %"
 
 
-_BESIDE = 1.0  # of an interval: room beside it
-_ROW, _BETWEEN = 140, 0.73  # height of a parameter's row [pixels], and the share of it that labels need
+_MARGIN = 1.0  # of an interval, on either side of it
+_ROW, _BETWEEN = 140, 0.73  # height of a parameter's row [pixels], and the share of it for labels
 _TITLE = 13  # pixels
 
 
 def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
-    """Each parameter's 95 % interval in its own unit, and in words that of its prior, which would hide it."""
-    places = own_places(shown.names, problem.lines)
+    """Each parameter's 95 % interval in its unit; that of its prior is in words, since drawn it would dwarf it."""
+    spans = own_places(shown.names, problem.lines)
     rows = [
-        (entry["name"], parameter, prior, multiple_of(shown, prior))
-        for entry in document["mechanisms"]
-        for parameter, prior in zip(entry["parameters"], shown.model.parameters[places[entry["name"]]], strict=True)
+        (mechanism["name"], parameter, prior, multiple_of(shown, prior))
+        for mechanism in document["mechanisms"]
+        for parameter, prior in zip(
+            mechanism["parameters"], shown.model.parameters[spans[mechanism["name"]]], strict=True
+        )
     ]
     titles = [
-        f"{name.replace('_', ' ')}<br>{_labelled(entry)}<br><sup>{_before(prior, scale, entry['unit'])}</sup>"
-        for name, entry, prior, scale in rows
+        f"{name.replace('_', ' ')}<br>{_labelled(parameter)}<br><sup>{_before(prior, scale, parameter['unit'])}</sup>"
+        for name, parameter, prior, scale in rows
     ]
     figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_BETWEEN / len(rows))
     figure.update_annotations(font_size=_TITLE)
-    for place, (_, entry, *_) in enumerate(rows, start=1):
-        low, high = entry["low"], entry["high"]
+    for panel, (_, parameter, *_) in enumerate(rows, start=1):
+        low, high = parameter["low"], parameter["high"]
         figure.add_scatter(
             x=[low, high], y=[0, 0], mode="lines", line={"color": AFTER, "width": 8}, name="95 % interval",
-            showlegend=place == 1, row=place, col=1,
+            showlegend=panel == 1, row=panel, col=1,
         )  # fmt: skip
         figure.add_scatter(
-            x=[entry["value"]], y=[0], mode="markers", name="most probable", showlegend=place == 1,
-            marker={"color": MEASURED, "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=place, col=1,
+            x=[parameter["value"]], y=[0], mode="markers", name="most probable", showlegend=panel == 1,
+            marker={"color": MEASURED, "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=panel, col=1,
         )  # fmt: skip
-        beside = _BESIDE * (high - low) or 0.1 * abs(low) or 1.0
-        left = low - beside if low < 0 else max(low - beside, 0.0)  # what is positive stays so
-        figure.update_xaxes(range=[left, high + beside], row=place, col=1)
+        margin = _MARGIN * (high - low) or 0.1 * abs(low) or 1.0
+        start = low - margin if low < 0 else max(low - margin, 0.0)  # positive parameters have no negative range
+        figure.update_xaxes(range=[start, high + margin], row=panel, col=1)
     figure.update_yaxes(visible=False, range=[-1, 1])
     figure.update_layout(
         title="What the recordings say of the parameters",
@@ -477,14 +474,14 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
     return styled(figure)
 
 
-def _labelled(entry: Mapping[str, Any]) -> str:
-    unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
-    interval = f"{entry['value']:.3g} ({entry['low']:.3g} to {entry['high']:.3g}){unit}"
-    return with_minus(f"{entry['name'].replace('_', ' ')} {interval}")
+def _labelled(parameter: Mapping[str, Any]) -> str:
+    unit = "" if parameter["unit"] == "-" else f" {parameter['unit']}"
+    interval = f"{parameter['value']:.3g} ({parameter['low']:.3g} to {parameter['high']:.3g}){unit}"
+    return with_minus(f"{parameter['name'].replace('_', ' ')} {interval}")
 
 
 def _before(prior: Parameter, scale: float, unit: str) -> str:
-    """What was known before the recordings, in words."""
+    """The 95 % interval of the prior, in words."""
     low, high = (scale * prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975))
     return with_minus(
         f"before the recordings (prior), 95 %: {low:.3g} to {high:.3g}{'' if unit == '-' else f' {unit}'}"

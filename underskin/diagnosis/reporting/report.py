@@ -1,7 +1,7 @@
-"""The report (`report/1`): the results of all steps as one document, its numbers rounded to stated digits.
+"""The report (`report/1`): the results of all steps of a diagnosis as one document of plain JSON values.
 
-Four significant digits for values, three decimals for probabilities and p-values: enough for any use. The same input
-gives the same report on one machine; on a processor that rounds differently a last digit may differ.
+Values have four significant digits, probabilities and p-values three decimals. The same input gives the same report on
+one machine; on a processor that rounds differently a last digit may differ.
 """
 
 import math
@@ -22,7 +22,7 @@ from underskin.diagnosis.reporting.law_statement import (
     StatementContext,
     answer_statement,
     insufficient_statement,
-    left_by,
+    misfit_clause,
     not_tried,
     reserves,
     slips,
@@ -31,13 +31,13 @@ from underskin.diagnosis.reporting.law_statement import statement as law_stateme
 from underskin.diagnosis.reporting.numbers import (
     at_bounds,
     idealised,
-    parameter,
+    outlying_sensors,
+    parameter_with_interval,
     rounded,
-    sensors_apart,
     without_effect,
 )
 from underskin.diagnosis.reporting.statements import BY_NUISANCES, StatedD33, stated_d33
-from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, confirming, unnamed
+from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, confirming, law_document
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether
@@ -59,16 +59,16 @@ _STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})
 
 @dataclass(frozen=True)
 class DiagnosisResult:
-    """Everything that the steps worked out about one campaign; `search` is None where the data were too few."""
+    """The results of all steps on one campaign; `search` is None where the data were too few."""
 
     name: str
     findings: Sequence[Finding]
     provenance: Mapping[str, Any]
     skin_d33_pc_per_n: float | None = None  # as the skin declares it
-    level_unsure: float = 0.0  # relative uncertainty of all FRFs that noise in their channels leaves
+    level_unsure: float = 0.0  # relative uncertainty of all FRFs due to noise in their channels
     lacking: Lacking | None = None  # of a campaign from which nothing can be concluded
     search: Search | None = None
-    few: Search | None = None  # in its place where recordings agree with the model but are too few to say so alone
+    few: Search | None = None  # instead of `search` where recordings agree with the model but are too few to say so
     problem: FittingProblem | None = None
     axes: Sequence[AxisResult] = ()
     region: Mapping[str, list[float | str]] = field(default_factory=dict)
@@ -77,13 +77,13 @@ class DiagnosisResult:
     confounded: Sequence[Confounding] = ()
     power: Sequence[Power] = ()
     shifts: Sequence[HiddenShift] = ()
-    shape: Shape | None = None  # of what remains, where no mechanism describes it
+    shape: Shape | None = None  # of the residual, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
     joined: KindsTogether | None = None  # with recordings of other kinds
 
     def with_findings(self, *further: Finding) -> "DiagnosisResult":
-        """The same with further findings behind the others."""
+        """The same result with further findings appended."""
         return replace(self, findings=(*self.findings, *further))
 
     @property
@@ -97,10 +97,10 @@ class DiagnosisResult:
 
 
 def verdict(diagnosis: DiagnosisResult) -> str:
-    """The verdict that the probabilities give, as docs/diagnosis.md explains it.
+    """The verdict by the probabilities, as docs/diagnosis.md explains it.
 
-    A set of mechanisms explains nothing while one of them may as well have no effect, or has a parameter at the bound
-    of its search; nor does the base model with d33 or a free modulus there.
+    A set of mechanisms explains nothing if one of them may as well have no effect, or has a parameter at the bound of
+    its search; nor does the base model with d33 or a free modulus at a bound.
     """
     if diagnosis.search is None:
         return "insufficient_data"
@@ -117,21 +117,25 @@ def verdict(diagnosis: DiagnosisResult) -> str:
 
 
 def _may_be_the_other(search: Search, explanation: Explanation) -> bool:
-    """Whether a thickness that nobody declared leaves open which of a thin layer and a stiffening sample stiffens a
-    curve with depth: the one in place of the other is no less probable than a law of contact that idealises may be."""
+    """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens curves with depth.
+
+    That is so where the evidence of one in place of the other is above that which an idealised contact law may have.
+    """
     lines = explanation.best.hypothesis.lines
     if lines.kind != "indentation" or lines.campaign.skin.thickness_mm is not None:
         return False
-    evidence = {frozenset(entry.names): entry.log_evidence for entry in search.explanations}
+    evidence = {frozenset(candidate.names): candidate.log_evidence for candidate in search.explanations}
     least = explanation.log_evidence - least_evidence(explanation)
     names = frozenset(explanation.names)
-    own = names & _STIFFER_WITH_DEPTH
-    others = [names - own | {other} for other in _STIFFER_WITH_DEPTH - own] if len(own) == 1 else []
+    stiffening = names & _STIFFER_WITH_DEPTH
+    others = (
+        [names - stiffening | {other} for other in _STIFFER_WITH_DEPTH - stiffening] if len(stiffening) == 1 else []
+    )
     return any(evidence.get(other, -math.inf) > least for other in others)
 
 
 def _idle(diagnosis: DiagnosisResult, explanation: Explanation) -> list[str]:
-    """Its mechanisms that may as well have no effect, and show on no recordings of another kind."""
+    """Mechanisms that may as well have no effect, and are not supported by recordings of another kind."""
     joined = diagnosis.joined
     return [
         name
@@ -142,19 +146,19 @@ def _idle(diagnosis: DiagnosisResult, explanation: Explanation) -> list[str]:
 
 @dataclass(frozen=True)
 class Reported:
-    """A report, plain JSON values, and its d33 with what keeps it from being quoted."""
+    """A report of plain JSON values, and its d33 with the reasons against quoting it."""
 
     document: dict[str, Any]
     d33: StatedD33
 
 
 def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
-    """The document."""
+    """The report of a diagnosis."""
     return reported(diagnosis).document
 
 
 def reported(diagnosis: DiagnosisResult) -> Reported:
-    """The document and its d33."""
+    """The report of a diagnosis, and its d33."""
     stated = verdict(diagnosis)
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
     if diagnosis.search is None or diagnosis.problem is None:
@@ -187,10 +191,10 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     stated_set = named if leading is None else leading.explanation
     mechanisms = [] if stated_set is None else _mechanisms(search, problem, stated_set)
     if named is not None:
-        mechanisms += _of_curves_alone(diagnosis, leader)
-    told_by_kind = [] if diagnosis.joined is None else goodness_of_fit.by_kind(diagnosis.joined, shown.names)
+        mechanisms += _mechanisms_of_curves(diagnosis, leader)
+    by_kind = [] if diagnosis.joined is None else goodness_of_fit.by_kind(diagnosis.joined, shown.names)
     contradictory = [] if diagnosis.joined is None else goodness_of_fit.contradictions(diagnosis.joined)
-    law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
+    law = None if leading is None else law_document(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33 = stated_d33(
         search,
@@ -199,7 +203,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         diagnosis.shifts,
         stands=stands,
         contradictory=bool(contradictory),
-        at_bounds=[one.words for one in at_bounds(shown)],
+        at_bounds=[bound.words for bound in at_bounds(shown)],
         law=leading,
         unsure=diagnosis.level_unsure,
         skin_pc_per_n=diagnosis.skin_d33_pc_per_n,
@@ -207,15 +211,17 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     alike = numbers.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
     present = numbers.presence(search, numbers.present(search, problem))
-    # At a typical strength: what shows only where it changes more than it usually does, would be read as ruled out
-    unseen = {entry.mechanism for entry in diagnosis.confounded if entry.confounded_with in BY_NUISANCES}
-    unseen |= {entry.mechanism for entry in d33.hidden}
-    plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
-    of_kinds = "" if diagnosis.joined is None else goodness_of_fit.moduli_clause(diagnosis.joined, told_by_kind)
+    # Detection limits are left out for mechanisms that would not show at a typical strength: they are not ruled out
+    unseen = {
+        confounding.mechanism for confounding in diagnosis.confounded if confounding.confounded_with in BY_NUISANCES
+    }
+    unseen |= {shift.mechanism for shift in d33.hidden}
+    plain = [limit for limit in diagnosis.power if limit.mechanism not in unseen]
+    of_kinds = "" if diagnosis.joined is None else goodness_of_fit.moduli_clause(diagnosis.joined, by_kind)
     untried = _not_tried(stated, search, problem, findings)
     around = StatementContext(
-        slips=[*slips(findings), *([apart] if (apart := sensors_apart(problem, shown)) else [])],
-        contradictions=[entry["statement"] for entry in contradictory],
+        slips=[*slips(findings), *([outliers] if (outliers := outlying_sensors(problem, shown)) else [])],
+        contradictions=[contradiction["statement"] for contradiction in contradictory],
         reserves=[*reserves(findings), *untried],
         quoted=[
             of_kinds,
@@ -226,21 +232,21 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
-        beside = [entry["name"] for entry in mechanisms]
-        left = left_by(fit, SIMPLEST[problem.kind], beside) if problem.lines.curves else ""
-        statement = law_statement(leader.probability, leading, law, floor, around, left)
+        mechanism_names = [mechanism["name"] for mechanism in mechanisms]
+        misfit = misfit_clause(fit, SIMPLEST[problem.kind], mechanism_names) if problem.lines.curves else ""
+        statement = law_statement(leader.probability, leading, law, floor, around, misfit)
     else:
         of_answer = AnswerFacts(
             groups=present,
             idle=_idle(diagnosis, named) if named is not None else (),
-            at_bounds=[one.words for one in at_bounds(named)] if named is not None else (),
+            at_bounds=[bound.words for bound in at_bounds(named)] if named is not None else (),
             mechanisms=mechanisms,
-            told=_told(problem, mechanisms) if named is not None else (),
+            meanings=_meanings(problem, mechanisms) if named is not None else (),
         )
-        # What remains tells no form where a mechanism that may explain it was not tried
+        # The shape of the residual is not stated where a mechanism that may explain it was not tried
         shape = "" if untried else statements.shape_clause(diagnosis.shape)
         statement = answer_statement(search.answers, stated, problem.kind, fit, around, of_answer, shape, plain)
-    whole = {
+    completed = {
         **document,
         "probability": round(leader.probability, 3),
         "statement": statement,
@@ -254,13 +260,13 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         "findings": findings,
         "fit": fit,
         "power": [
-            {"mechanism": entry.mechanism, "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2)}
-            for entry in diagnosis.power
+            {"mechanism": limit.mechanism, "smallest_visible_percent": rounded(limit.smallest_visible_percent, 2)}
+            for limit in diagnosis.power
         ],
         "d33": d33.document,
-        **({"by_kind": told_by_kind, "contradictions": contradictory} if told_by_kind else {}),
+        **({"by_kind": by_kind, "contradictions": contradictory} if by_kind else {}),
         "next_experiment": diagnosis.next_experiment or None,
-        # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
+        # Sets that were tried but not fitted could not win, or did not improve on the smaller set.
         "provenance": {
             **diagnosis.provenance,
             **({} if leading is None else {"unnamed": leading.as_fitted}),
@@ -268,63 +274,70 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }
-    return Reported(whole, d33)
+    return Reported(completed, d33)
 
 
 def _depths_clause(problem: FittingProblem, explanation: Explanation) -> str:
-    """How deep spheres were pressed, over their radius and the declared thickness; empty of other recordings."""
+    """A clause on the depth of indentation over radius and declared thickness; empty for other recordings."""
     model, lines = explanation.model, problem.lines
     if lines.kind != "indentation" or not isinstance(model, CurveModel):
         return ""
-    curves = [one for one in lines.campaign.recordings if isinstance(one, IndentationRecording)]
+    curves = [curve for curve in lines.campaign.recordings if isinstance(curve, IndentationRecording)]
     contacts = explanation.point.fit[model.contact_points].tolist()
-    depths = [float(one.displacement_mm.max()) - at for one, at in zip(curves, contacts, strict=True)]
-    over = max(depth / one.indenter_radius_mm for depth, one in zip(depths, curves, strict=True))
-    said = f"pressed to {in_digits(over, 2)} of the radius"
+    depths = [float(curve.displacement_mm.max()) - at for curve, at in zip(curves, contacts, strict=True)]
+    over = max(depth / curve.indenter_radius_mm for depth, curve in zip(depths, curves, strict=True))
+    clause = f"pressed to {in_digits(over, 2)} of the radius"
     if over > PARABOLOID:
-        said += " (by the law of the whole sphere)"
+        clause += " (by the law of the whole sphere)"
     thickness = lines.campaign.skin.thickness_mm
-    return said if thickness is None else f"{said}, {in_digits(max(depths) / thickness, 2)} of the thickness"
+    return clause if thickness is None else f"{clause}, {in_digits(max(depths) / thickness, 2)} of the thickness"
 
 
 def _not_tried(
     stated: str, search: Search, problem: FittingProblem, findings: Sequence[Mapping[str, str]]
 ) -> list[str]:
-    """What was not tried, where something remains that it could explain."""
+    """Clauses on mechanisms that were not tried, where they could explain a residual."""
     remains = stated in ("unexplained", "ambiguous") or any(
-        entry["code"] == FindingCode.REMAINDER for entry in findings
+        finding["code"] == FindingCode.REMAINDER for finding in findings
     )
     return not_tried(search.unsupported, problem.kind) if remains else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
-    places = own_places(explanation.names, explanation.best.hypothesis.lines)
-    whole = cross_validation.in_sample(problem, explanation)
+    spans = own_places(explanation.names, explanation.best.hypothesis.lines)
+    score = cross_validation.in_sample(problem, explanation)
     probabilities = numbers.present(search, problem)
     return [
         {
             "name": name,
             "probability": round(probabilities.get(name, 0.0), 3),
-            "parameters": [parameter(explanation, place) for place in range(places[name].start, places[name].stop)],
-            "explains_percent": explains_percent(search, problem, explanation, name, whole),
+            "parameters": [
+                parameter_with_interval(explanation, index) for index in range(spans[name].start, spans[name].stop)
+            ],
+            "explains_percent": explains_percent(search, problem, explanation, name, score),
         }
         for name in explanation.names
         if name in problem.lines.mechanisms.named
     ]
 
 
-def _of_curves_alone(diagnosis: DiagnosisResult, leader: Answer) -> list[dict[str, Any]]:
+def _mechanisms_of_curves(diagnosis: DiagnosisResult, leader: Answer) -> list[dict[str, Any]]:
     if diagnosis.joined is None or leader.explanation is None or diagnosis.search is None or diagnosis.problem is None:
         return []
     present = numbers.present(diagnosis.search, diagnosis.problem)
-    own = goodness_of_fit.of_curves_alone(diagnosis.joined, leader.alone, leader.explanation.names)
-    return [{**entry, "probability": round(present.get(entry["name"], 0.0), 3)} for entry in own]
+    mechanisms = goodness_of_fit.mechanisms_of_curves(diagnosis.joined, leader.alone, leader.explanation.names)
+    return [{**mechanism, "probability": round(present.get(mechanism["name"], 0.0), 3)} for mechanism in mechanisms]
 
 
-def _told(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the parameters of each mean together, where they do not speak for themselves."""
-    values = {one["name"]: {entry["name"]: entry["value"] for entry in one["parameters"]} for one in mechanisms}
-    return [said for name, own in values.items() if (said := problem.lines.mechanisms[name].told(own))]
+def _meanings(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The joint meaning of each mechanism's parameters, where a single value does not show it."""
+    values = {
+        mechanism["name"]: {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+        for mechanism in mechanisms
+    }
+    return [
+        meaning for name, parameters in values.items() if (meaning := problem.lines.mechanisms[name].told(parameters))
+    ]
 
 
 def _alternatives(search: Search) -> list[dict[str, Any]]:
@@ -335,27 +348,27 @@ def _alternatives(search: Search) -> list[dict[str, Any]]:
         enough = answer.probability < _LEAST_PROBABILITY and len(alternatives) > 1
         if enough or len(alternatives) >= _ALTERNATIVES:
             break
-        said = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
-        alternatives.append({**said, "why_not": statements.why_not(answer, leader)})
+        document = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
+        alternatives.append({**document, "why_not": statements.why_not(answer, leader)})
     return alternatives
 
 
 def _location(diagnosis: DiagnosisResult, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
     assert diagnosis.effect is not None
     effect, region = diagnosis.effect, diagnosis.region
-    whole = {name: reaches_all_along(problem.lines, name, ends) for name, ends in region.items()}
+    reaches_all = {name: reaches_all_along(problem.lines, name, ends) for name, ends in region.items()}
     return {
         "axes": [
             {
-                "axis": entry.axis,
-                "p_value": None if entry.p_value is None else round(entry.p_value, 3),
-                "share_percent": round(100 * float(entry.share), 1),
-                **({"undecidable": why} if (why := statements.undecidable(entry)) else {}),
+                "axis": result.axis,
+                "p_value": None if result.p_value is None else round(result.p_value, 3),
+                "share_percent": round(100 * float(result.share), 1),
+                **({"undecidable": why} if (why := statements.undecidable(result)) else {}),
             }
-            for entry in diagnosis.axes
+            for result in diagnosis.axes
         ],
         "region": {name: [rounded(x) if isinstance(x, float) else x for x in ends] for name, ends in region.items()},
         "effect_percent": rounded(effect.percent, 3),
         "effect_interval_percent": [rounded(effect.low, 3), rounded(effect.high, 3)],
-        "statement": statements.location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
+        "statement": statements.location_statement(diagnosis.axes, region, reaches_all, effect, agrees=agrees),
     }

@@ -1,8 +1,8 @@
-"""What a report states of mechanisms, of d33, and of what to measure next.
+"""Sentences and entries of a report: location, shape of the residual, rivals, next recordings, d33.
 
-What a report says in words, for people who press skins: no statistics but percentages, values with their units. The
-planned recordings as the report's `next_experiment`, with a statement in words. The d33 of a report: whether it is to
-be quoted, and what would change it that these recordings do not show.
+Written for experimenters: percentages and values with units, no further statistics. `next_experiment` is the plan of
+recordings as the report has it; `StatedD33` says whether d33 is to be quoted, and what would change it without showing
+in these recordings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,12 +34,12 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.prediction import plausibility
 
-_UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no law shows
-_IN_PERCENT = 90.0  # beyond it an effect is said as a factor
+_MOST_UNLISTED = 0.016  # largest probability of none_of_these where no process is supported
+_IN_PERCENT = 90.0  # beyond it an effect is given as a factor
 
 
 def shape_clause(shape: Shape | None) -> str:
-    """What is known of a residual that no mechanism describes; empty where nothing was looked at."""
+    """A clause on the residual that no mechanism describes; empty where it was not analysed."""
     if shape is None:
         return ""
     form = "has no simple form over one axis" if shape.form is None else f"looks like {_form(shape.form, shape)}"
@@ -50,10 +50,10 @@ def shape_clause(shape: Shape | None) -> str:
 
 
 def _form(form: ShapeForm, shape: Shape) -> str:
-    called, unit = ALONG_CURVES[form.axis] if shape.of_curves else (_form_axis(form), WORDS[form.axis][1])
+    axis_words, unit = ALONG_CURVES[form.axis] if shape.of_curves else (_form_axis(form), WORDS[form.axis][1])
     words = _FORMS[form.kind].format(at=form.at, unit=f" {unit}" if unit else "")
     of = " of the largest force" if shape.of_curves else ""
-    return f"{words}, up to {in_digits(form.size, 2)} %{of} over {called}"
+    return f"{words}, up to {in_digits(form.size, 2)} %{of} over {axis_words}"
 
 
 _FORMS: Mapping[FormKind, str] = {
@@ -75,7 +75,7 @@ def why_not(answer: Answer, leader: Answer) -> str:
     """Why an answer is less probable than the leading one."""
     if answer.probability > 0.25 * leader.probability:
         return "the recordings hardly tell it from the leading explanation"
-    if answer.explanation is None and answer.probability < _UNTHOUGHT_AT_MOST:
+    if answer.explanation is None and answer.probability < _MOST_UNLISTED:
         return "nothing in the recordings asks for it; a small share always stays for what nobody thought of"
     if answer.explanation is None:
         return "unlisted laws explain the recordings less well, or no better though they are freer"
@@ -100,15 +100,15 @@ _UNDECIDABLE: Mapping[Undecidable, str] = {
 }
 
 
-_DETERMINING = {"recorded_at": "the time of recording", "sensor": "the sensor"}  # as in `WORDS` else
+_DETERMINING = {"recorded_at": "the time of recording", "sensor": "the sensor"}  # others as in `WORDS`
 
 
-def undecidable(entry: AxisResult) -> str:
+def undecidable(result: AxisResult) -> str:
     """Why it cannot be decided whether the residual depends on an axis; empty where it can."""
-    if not entry.determined_by:
-        return "" if entry.reason is None else _UNDECIDABLE[entry.reason]
-    named = listed([_DETERMINING.get(name, WORDS[name][0]) for name in entry.determined_by])
-    determine = "determines" if len(entry.determined_by) == 1 else "together determine"
+    if not result.determined_by:
+        return "" if result.reason is None else _UNDECIDABLE[result.reason]
+    named = listed([_DETERMINING.get(name, WORDS[name][0]) for name in result.determined_by])
+    determine = "determines" if len(result.determined_by) == 1 else "together determine"
     return f"{named} {determine} it in this design"
 
 
@@ -124,23 +124,26 @@ CONFOUNDED: Mapping[Likeness, str] = {
 def location_statement(
     axes: Sequence[AxisResult],
     region: Mapping[str, Sequence[float | str]],
-    whole: Mapping[str, bool],
+    reaches_all: Mapping[str, bool],
     effect: EffectSize,
     *,
     agrees: bool = False,
 ) -> str:
-    """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it, `agrees`
-    that recordings and model agree within the noise."""
-    unknown = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
+    """The location of the misfit in one sentence.
+
+    `reaches_all` says for each axis of the region whether the region spans all of it, `agrees` that recordings and
+    model agree within the noise.
+    """
+    unknown = [WORDS[result.axis][0] for result in axes if result.p_value is None]
     tail = f"; whether it depends on {listed(unknown)}, this design cannot tell" if unknown else ""
     if len(unknown) == len(axes) and unknown:
         return f"Whether the misfit depends on {listed(unknown)}, this design cannot tell."
-    beyond_chance = [entry for entry in axes if entry.significant]
+    beyond_chance = [result for result in axes if result.significant]
     if not beyond_chance:
         return f"The misfit changes with nothing that was varied, beyond chance{tail}."
-    telling = [entry for entry in beyond_chance if entry.telling]
-    named = sorted(telling or beyond_chance, key=lambda entry: entry.p_value or 0.0)
-    names = listed([WORDS[entry.axis][0] for entry in named])
+    telling = [result for result in beyond_chance if result.telling]
+    named = sorted(telling or beyond_chance, key=lambda result: result.p_value or 0.0)
+    names = listed([WORDS[result.axis][0] for result in named])
     if not telling and not agrees:
         return (
             f"The misfit changes with {names} beyond chance, but no more than a trace of it goes along with that{tail}."
@@ -149,15 +152,15 @@ def location_statement(
         return (
             f"What is left is within the noise, though more of it goes along with {names} than chance would give{tail}."
         )
-    return f"The misfit depends on {names}; {_where(region, whole)}, where {_size(effect)}{tail}."
+    return f"The misfit depends on {names}; {_where(region, reaches_all)}, where {_size(effect)}{tail}."
 
 
-def _where(region: Mapping[str, Sequence[float | str]], whole: Mapping[str, bool]) -> str:
-    """Along which ranges most of it lies, and at which sensor or on which day it is largest."""
+def _where(region: Mapping[str, Sequence[float | str]], reaches_all: Mapping[str, bool]) -> str:
+    """The ranges that hold most of the misfit, and the sensor or day where it is largest."""
     ranges: list[str] = []
     levels: list[str] = []
     for name, ends in region.items():
-        if not whole[name]:
+        if not reaches_all[name]:
             (levels if isinstance(ends[0], str) else ranges).append(_range(name, ends))
     parts = [f"most of it lies at {listed(ranges)}"] if ranges else []
     parts += [f"it is largest at {listed(levels)}"] if levels else []
@@ -183,7 +186,7 @@ def _size(effect: EffectSize) -> str:
 
 
 def _times(effect: EffectSize) -> str:
-    """A large effect as a factor: nothing is more than 100 % below, unless its sign has turned."""
+    """A large effect as a factor; more than 100 % below means the opposite sign."""
     factor, low, high = (1 + percent / 100 for percent in (effect.percent, effect.low, effect.high))
     span = f"{in_digits(low, 2)} to {in_digits(high, 2)}"
     if factor >= 0:
@@ -199,12 +202,12 @@ def _range(axis: str, ends: Sequence[float | str]) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names with commas and a last "and"."""
+    """Names joined with commas and a final "and"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 _STIFFENING = "strain_stiffening"
-_VARIED = {  # of curves, as `WORDS` else
+_VARIED = {  # axes of curves; others as in `WORDS`
     "displacement_mm": "depth",
     "force_n": "largest force",
     "sample_diameter_mm": "diameter of the sample",
@@ -214,7 +217,7 @@ _VARIED = {  # of curves, as `WORDS` else
 
 
 def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
-    """The document, in lab units; empty where nothing needs to be planned."""
+    """The plan as the report has it, in lab units; empty where nothing needs to be planned."""
     if plan is None:
         return {}
     return {
@@ -229,12 +232,12 @@ def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
 
 def _recordings(plan: NextRecordings) -> list[dict[str, Any]]:
     documents = []
-    for entry in dict.fromkeys(plan.recordings):
+    for recording in dict.fromkeys(plan.recordings):
         names = ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n")
-        described = {name: getattr(entry, name) for name in names}
-        described |= {"position_mm": list(entry.position_mm or ()), "dwell_s": entry.dwell_s}
-        known = {name: value for name, value in described.items() if value is not None}
-        documents.append({**known, "repeats": plan.recordings.count(entry)})
+        described = {name: getattr(recording, name) for name in names}
+        described |= {"position_mm": list(recording.position_mm or ()), "dwell_s": recording.dwell_s}
+        given = {name: value for name, value in described.items() if value is not None}
+        documents.append({**given, "repeats": plan.recordings.count(recording)})
     return documents
 
 
@@ -242,22 +245,22 @@ def _statement(plan: NextRecordings) -> str:
     first = plan.first
     assert first is not None
     beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
-    one = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
-    several = f"{len(plan.recordings)} recordings, of which that {one} tells most,"
+    contact = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
+    several = f"{len(plan.recordings)} recordings, of which that {contact} tells most,"
     return (
-        f"{several if len(plan.recordings) > 1 else f'One recording {one}'} should tell whether "
+        f"{several if len(plan.recordings) > 1 else f'One recording {contact}'} should tell whether "
         f"it is {_rivals(plan)}, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
     )
 
 
 def _block(plan: NextRecordings) -> str:
-    """That a compressed block or an indentation would tell, where that is promising."""
+    """A sentence on a compressed block or an indentation, where that promises to decide."""
     if plan.block is None:
         return ""
     stiffens = any(_STIFFENING in names for names in plan.rivals)
     also = "; compressed by a fifth of its height, a block shows strain stiffening too" if stiffens else ""
-    told = f"whether it is {in_words([WRONG_MODULUS])}, with a probability of {in_percent(plan.block)}{also}"
-    return f" A compressed block or an indentation of the same elastomer would tell E, and so {told}."
+    clause = f"whether it is {in_words([WRONG_MODULUS])}, with a probability of {in_percent(plan.block)}{also}"
+    return f" A compressed block or an indentation of the same elastomer would tell E, and so {clause}."
 
 
 def _why_none(plan: NextRecordings) -> str:
@@ -274,22 +277,25 @@ def _why_none(plan: NextRecordings) -> str:
 
 
 def _rivals(plan: NextRecordings) -> str:
-    """Each explanation in words, "with" between the mechanisms of one, so that "or" parts explanations alone."""
+    """The explanations in words, joined by "or", and the mechanisms of each by "with"."""
     *others, last = [" with ".join(in_words([name]) for name in names) for names in plan.rivals]
     return f"{', '.join(others)} or {last}" if others else last
 
 
-_LARGEST_FLOOR = 20.0  # % of the response: beyond it, recordings say too little of a level to quote it
-_MOST_NAMED = 2  # mechanisms that would not show, beside a value to quote
+_LARGEST_FLOOR = 20.0  # % of the response: noise above which no d33 is quoted
+_MOST_NAMED = 2  # mechanisms that would not show, named with a value to quote
 _ANSWERS = "several answers remain"
-BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
+BY_NUISANCES = ("d33", "noise")  # confounders of mechanisms that d33, E, h or the noise hide
 
 
 @dataclass(frozen=True)
 class StatedD33:
-    """The report's `d33` (None of curves), a finding where no PVDF has it, and the mechanisms that would not show here
-    and move it beyond its interval; those that are wrong declared numbers keep it from being quoted. `why_not`: what
-    else does, in words. `skin_pc_per_n`: the skin's declared d33, None where it declares none."""
+    """The report's `d33` and whether it is to be quoted.
+
+    `document` is None for curves. `findings`: one where no PVDF has such a value. `hidden`: mechanisms that would not
+    show here and move d33 beyond its interval; those that are wrong declared numbers prevent quoting it. `why_not`:
+    further reasons against quoting it, in words. `skin_pc_per_n`: the skin's declared d33, None where it declares none.
+    """
 
     document: Mapping[str, Any] | None
     findings: Sequence[Finding] = ()
@@ -299,14 +305,14 @@ class StatedD33:
 
     @property
     def deciding(self) -> list[HiddenShift]:
-        """What keeps d33 from being quoted: hidden wrong declared numbers, and what would change it as much, the
-        largest first; none where no declared number does."""
-        least = min((abs(entry.log_factor) for entry in self.hidden if entry.declared), default=np.inf)
-        chosen = [entry for entry in self.hidden if abs(entry.log_factor) >= least]
-        return sorted(chosen, key=lambda entry: -abs(entry.log_factor))
+        """Hidden mechanisms that prevent quoting d33, the largest first: wrong declared numbers and what would change
+        d33 as much; none where no declared number does."""
+        least = min((abs(shift.log_factor) for shift in self.hidden if shift.declared), default=np.inf)
+        chosen = [shift for shift in self.hidden if abs(shift.log_factor) >= least]
+        return sorted(chosen, key=lambda shift: -abs(shift.log_factor))
 
     def clause(self) -> str:
-        """The value to quote, or why none is; empty where there is no d33."""
+        """A clause on the value to quote, or on why none is quoted; empty where there is no d33."""
         if self.document is None:
             return ""
         if self.document["quotable"]:
@@ -314,23 +320,24 @@ class StatedD33:
         return f"d33 is not to be quoted: {self.interval()}"
 
     def quoted(self) -> str:
-        """The value with its interval, and which physics that would not show would change it most beyond that."""
+        """The value with its interval, and the hidden mechanisms that would change it most beyond that."""
         assert self.document is not None
         value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
-        largest = sorted(self.hidden, key=lambda entry: -abs(entry.log_factor))[:_MOST_NAMED]
-        named = " or ".join(f"{in_words([one.mechanism])} ({_percent(one)})" for one in largest)
+        largest = sorted(self.hidden, key=lambda shift: -abs(shift.log_factor))[:_MOST_NAMED]
+        named = " or ".join(f"{in_words([shift.mechanism])} ({_percent(shift)})" for shift in largest)
         hides = f", provided that no {named} hides" if named else ""
-        return f"{value} {self.document['unit']} (95 %: {low} to {high}{self._apart()}){self._beside_declared()}{hides}"
+        interval = f"95 %: {low} to {high}{self._relative_interval()}"
+        return f"{value} {self.document['unit']} ({interval}){self._over_declared()}{hides}"
 
-    def _apart(self) -> str:
-        """The interval without what the declared values may be off by."""
+    def _relative_interval(self) -> str:
+        """The interval without the tolerances of the declared values."""
         assert self.document is not None
         low, high = (f"{self.document['relative'][key]:.3g}" for key in ("low", "high"))
         return f" with what declared values may be off, {low} to {high} to compare sensors or dates"
 
-    def _beside_declared(self) -> str:
-        """How many times the skin's declared d33 it is, where the interval leaves that out: a peak-to-peak force or
-        charge taken for an amplitude halves or doubles every FRF, which nothing else in the recordings tells."""
+    def _over_declared(self) -> str:
+        """The ratio to the skin's declared d33, where the interval excludes it: a peak-to-peak force or charge taken
+        for an amplitude halves or doubles every FRF, which nothing else in the recordings reveals."""
         assert self.document is not None
         declared = self.skin_pc_per_n
         if declared is None or self.document["low"] <= declared <= self.document["high"]:
@@ -338,11 +345,11 @@ class StatedD33:
         return f", {self.document['value'] / declared:.2g} times the declared {declared:g} {self.document['unit']}"
 
     def interval(self) -> str:
-        """Where it lies, and why it is not to be quoted."""
+        """The interval of d33, and why it is not to be quoted."""
         assert self.document is not None
         low, high = (f"{self.document[key]:.3g}" for key in ("low", "high"))
-        lies = f"it lies from {low} to {high} {self.document['unit']}{self._beside_declared()}"
-        deciding = [f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.deciding[:_MOST_NAMED]]
+        lies = f"it lies from {low} to {high} {self.document['unit']}{self._over_declared()}"
+        deciding = [f"{in_words([shift.mechanism])} by {_percent(shift)}" for shift in self.deciding[:_MOST_NAMED]]
         if deciding:
             return f"{lies}, but what would not show here would change it, {listed(deciding)}"
         over = " over the answers that remain" if _ANSWERS in self.why_not else ""
@@ -351,24 +358,26 @@ class StatedD33:
 
     @property
     def reasons(self) -> list[str]:
-        """Why it is not to be quoted; none where it is."""
+        """Reasons against quoting d33; empty where it is to be quoted."""
         if self.document is None:
             return list(self.why_not) or ["no answer explains its recordings"]
-        hidden = in_words([one.mechanism for one in self.deciding[:_MOST_NAMED]])
+        hidden = in_words([shift.mechanism for shift in self.deciding[:_MOST_NAMED]])
         return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
 
     def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
-        """The report's entries, with what each would do to d33 beyond its interval."""
-        hidden = {entry.mechanism: entry for entry in self.hidden}
-        known = {entry.mechanism for entry in confounded if entry.confounded_with in BY_NUISANCES}
-        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.hidden]
+        """The report's entries, with the change of d33 by each beyond its interval."""
+        hidden = {shift.mechanism: shift for shift in self.hidden}
+        mechanisms = {
+            confounding.mechanism for confounding in confounded if confounding.confounded_with in BY_NUISANCES
+        }
+        further = [Confounding(shift.mechanism, "d33", Likeness.TAKEN_UP) for shift in self.hidden]
         return [
             {
-                "mechanism": entry.mechanism,
-                "confounded_with": entry.confounded_with,
-                "reason": _reason(entry, hidden.get(entry.mechanism)),
+                "mechanism": confounding.mechanism,
+                "confounded_with": confounding.confounded_with,
+                "reason": _reason(confounding, hidden.get(confounding.mechanism)),
             }
-            for entry in (*confounded, *(one for one in further if one.mechanism not in known))
+            for confounding in (*confounded, *(other for other in further if other.mechanism not in mechanisms))
         ]
 
 
@@ -387,17 +396,17 @@ def stated_d33(
 ) -> StatedD33:
     """The d33 averaged over all answers.
 
-    `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of its
-    search (`at_bounds`, in words), no unlisted `law` acts within the band, d33 is plausible, the answer fits the
+    It is quotable if one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of
+    its search (`at_bounds`, in words), no unlisted `law` acts within the band, d33 is plausible, the answer fits the
     recordings to their noise, which is a fifth of the response at most, and no wrong declared number that would not
-    show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that noise in their
-    channels leaves. `skin_pc_per_n`: the skin's declared one.
+    show here would move d33 beyond its interval. `unsure`: relative uncertainty of all FRFs due to noise in their
+    channels. `skin_pc_per_n`: the skin's declared d33.
     """
     d33 = None if problem.lines.curves else numbers.d33(search, problem, unsure)
     if d33 is None:
         return StatedD33(None)
     half_width = float(np.log(d33["high"] / d33["low"])) / 2
-    hidden = [entry for entry in shifts if abs(entry.log_factor) > half_width]
+    hidden = [shift for shift in shifts if abs(shift.log_factor) > half_width]
     implausible = plausibility.implausibility(d33["value"])
     floor, error = fit["noise_floor_percent"], fit["after"]["rmse_percent"]
     against = {
@@ -414,21 +423,21 @@ def stated_d33(
     why_not = [words for words, holds in against.items() if holds]
     finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
     findings = [finding] if implausible else []
-    # Beside other reasons not to quote it, a hidden one would not be what decides.
+    # Hidden mechanisms matter only where there is no other reason against quoting d33.
     quotable = {**d33, "quotable": not why_not}
     stated = StatedD33(quotable, findings, () if why_not else hidden, why_not, skin_pc_per_n)
     return replace(stated, document={**d33, "quotable": False}) if stated.deciding else stated
 
 
 def _acts_outside_band(law: LeadingLaw) -> bool:
-    """Whether an unlisted law leaves the size of the response as it is over most of the band: a peak, a notch, and a
-    turn of the phase over frequency."""
+    """Whether an unlisted law leaves the magnitude over most of the band unchanged: a peak, a notch, or a change of
+    phase over frequency."""
     return law.law.description.axis == "frequency_hz" and (law.is_phase or law.law.description.form == "peak")
 
 
-def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:
-    reason = CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with)
-    if hidden is None or entry.confounded_with not in BY_NUISANCES:
+def _reason(confounding: Confounding, hidden: HiddenShift | None) -> str:
+    reason = CONFOUNDED[confounding.why].format(mechanism=confounding.mechanism, other=confounding.confounded_with)
+    if hidden is None or confounding.confounded_with not in BY_NUISANCES:
         return reason
     return f"{reason}; d33 would then be {_percent(hidden)} too {'large' if hidden.log_factor > 0 else 'small'}"
 

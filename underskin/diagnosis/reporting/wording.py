@@ -1,4 +1,4 @@
-"""Names and numbers of a report as a page has them, numbers with a minus for a hyphen."""
+"""Names and numbers of a report as a page shows them, with a minus sign for the hyphen of negative numbers."""
 
 import math
 import re
@@ -46,17 +46,17 @@ _FINDINGS = {
     "sign_flipped": "sign reversed",
     "units_off_by_1000": "unit off by a factor of 1000",
     "unusual_magnitude": "unusual size",
-}  # by code; the other codes are words already
-_UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the end of an axis' name
+}  # by code; other codes are words already
+_UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the suffix of an axis' name
 _POWERS = 1e-4  # below which four digits are written as a power of ten
 _NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
 
 
 def readable(text: str) -> str:
-    """A statement with the names of mechanisms and axes as words, contact resonance for contact_resonance, and its
-    small forces and lengths in units in which they read well.
+    """A statement with mechanisms and axes as words (contact resonance for contact_resonance), and small forces and
+    lengths in readable units.
 
-    A stored report has sentences alone. This is for display; nothing is decided by it.
+    For display only, since a stored report has nothing but sentences.
     """
     pattern, names = _names()
     return with_minus(without_powers(pattern.sub(lambda match: names[match[0]], text)))
@@ -64,18 +64,18 @@ def readable(text: str) -> str:
 
 @cache
 def _names() -> tuple[re.Pattern[str], dict[str, str]]:
-    """What each name of the code is in words, and what matches any of them, the longest first."""
+    """A pattern that matches any identifier, the longest first, and the words for each."""
     names = {name: name.replace("_", " ") for name in CATALOGUE} | {name: words for name, (words, _) in WORDS.items()}
     return re.compile(rf"\b({'|'.join(sorted(names, key=len, reverse=True))})\b"), names
 
 
 def words(name: str) -> str:
-    """A name of the code as words."""
+    """An identifier as words."""
     return name.replace("_", " ")
 
 
 def finding(code: str) -> str:
-    """What a finding is about, in short."""
+    """A short name of a finding."""
     return _FINDINGS.get(code) or words(code)
 
 
@@ -85,29 +85,29 @@ def axis(name: str) -> str:
 
 
 def law_range(name: str, ends: Sequence[Any]) -> str:
-    """Where such a law was measured: "the preload 0.2 to 3 N", or the words that a column has."""
+    """The measured range of a law: "the preload 0.2 to 3 N", or the words of a column."""
     field = name.removesuffix("_over_own")
     unit = _UNITS.get(field.rpartition("_")[2], "")
     description = followed(field if field in FOLLOWED else field.removesuffix("_h"))
     if all(isinstance(end, str) for end in ends):
         return f"{description}: {', '.join(ends)}"
-    of_own = ", over its own range" if field != name else ""
-    return f"{description} {' to '.join(map(number, ends))} {unit}".rstrip() + of_own
+    relative_words = ", over its own range" if field != name else ""
+    return f"{description} {' to '.join(map(number, ends))} {unit}".rstrip() + relative_words
 
 
 def group(name: str) -> str:
-    """A group of recordings, "preload_n 3.0", by its axis and value; another as it is called."""
+    """A group of recordings such as "preload_n 3.0" by its axis and value; another name unchanged."""
     field, _, value = name.partition(" ")
     return f"{axis(field)}: {value}" if field in {*AXES, *WORDS, *FOLLOWED} else name
 
 
 def number(value: float | None) -> str:
-    """Four digits."""
+    """A number to four digits."""
     return "–" if value is None else with_minus(f"{value:.4g}")
 
 
 def as_stated(value: float | None) -> str:
-    """To the three digits of a statement, beside which it stands."""
+    """A number to three digits, as in the statement next to it."""
     return "–" if value is None else with_minus(f"{value:.3g}")
 
 
@@ -116,53 +116,53 @@ def error(value: float | None) -> str:
     return "–" if value is None else f"{value:.3g} %"
 
 
-def interval(entry: Mapping[str, Any]) -> str:
+def interval(parameter: Mapping[str, Any]) -> str:
     """From low to high."""
-    return f"{number(entry['low'])} to {number(entry['high'])}"
+    return f"{number(parameter['low'])} to {number(parameter['high'])}"
 
 
-def in_its_unit(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """A parameter in the unit in which its value reads well, where that would be a power of ten."""
-    field, ends = FIELD_OF.get(entry["unit"]), {name: entry[name] for name in ("value", "low", "high")}
+def in_its_unit(parameter: Mapping[str, Any]) -> dict[str, Any]:
+    """A parameter in a readable unit, where its value would be written as a power of ten."""
+    field, ends = FIELD_OF.get(parameter["unit"]), {name: parameter[name] for name in ("value", "low", "high")}
     if field is None or None in ends.values() or (largest := max(map(abs, ends.values()))) >= _POWERS:
-        return dict(entry)
+        return dict(parameter)
     unit, count = readable_unit(field, largest)
-    return {**entry, **{name: count * end for name, end in ends.items()}, "unit": unit}
+    return {**parameter, **{name: count * end for name, end in ends.items()}, "unit": unit}
 
 
 def not_quoted(report: Mapping[str, Any]) -> str:
-    """Where its d33 lies and why it is not to be quoted, as the report states it; empty where that is not stated."""
-    said = _NOT_QUOTED.search(report["statement"])
-    return readable(said[1]) if said else ""
+    """The interval of d33 and why it is not to be quoted, from the report's statement; empty where not stated."""
+    match = _NOT_QUOTED.search(report["statement"])
+    return readable(match[1]) if match else ""
 
 
 def unit(label: str) -> str:
-    """Empty for a pure number."""
+    """The unit; empty for a pure number."""
     return "" if label == "-" else label
 
 
 def quantity(parameter: str) -> str:
-    """A quantity of skins, in words."""
+    """A quantity of skins in words."""
     return capital(quantity_in_words(parameter))
 
 
-def columns(entries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The fields that any of them has, in the order in which they first come."""
-    return list(dict.fromkeys(name for entry in entries for name in entry))
+def columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """All fields of the rows, in the order of first occurrence."""
+    return list(dict.fromkeys(name for row in rows for name in row))
 
 
 def planned_columns(recordings: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Planned recordings as columns, None where a recording lacks the field; a position, two numbers, is one text."""
-    return {name: [in_a_cell(entry.get(name)) for entry in recordings] for name in columns(recordings)}
+    """Planned recordings as columns, None where a recording lacks the field; a position is one text."""
+    return {name: [in_a_cell(recording.get(name)) for recording in recordings] for name in columns(recordings)}
 
 
 def in_a_cell(value: Any) -> Any:
-    """A value of a planned recording; a position, which has two, with a blank between them."""
+    """A value of a planned recording as it stands in a cell; the two coordinates of a position joined by a blank."""
     return " ".join(map(str, value)) if isinstance(value, list) else value
 
 
 def plain(value: Any) -> str:
-    """A value of a planned recording."""
+    """A value of a planned recording as text."""
     if isinstance(value, list):
         return ", ".join(map(plain, value))
     if isinstance(value, float) and math.isfinite(value):

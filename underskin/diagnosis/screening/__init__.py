@@ -1,1 +1,1 @@
-"""What is wrong with recordings themselves, before any physics is blamed for it."""
+"""Errors in the recordings themselves, checked before any physics is fitted."""

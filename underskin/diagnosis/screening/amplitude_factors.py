@@ -1,7 +1,7 @@
-"""Recordings whose level is 2 or √2 times the others', or 1/2 or 1/√2: peak-to-peak or rms given for peak.
+"""Recordings whose level is off by 2, √2, 1/2 or 1/√2: peak-to-peak or rms given for peak amplitudes.
 
-Which recordings are off, a ∈ {0, 1}ⁿ, is sought for each factor c so that y − a ln c is best explained by the model of
-levels, each recording in turn taken for what it is nearer to. k of n such choices cost ln C(n, k).
+For each factor c the set a ∈ {0, 1}ⁿ of affected recordings is chosen so that the model of levels (`levels`) best
+explains y − a ln c. Choosing k of n recordings costs ln C(n, k) of evidence.
 """
 
 from collections.abc import Sequence
@@ -18,21 +18,21 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats, Mask
 
 _FACTORS = (2.0, 0.5, 2.0**0.5, 0.5**0.5)
-_MEANT = {True: "peak-to-peak", False: "rms"}
+_CONVENTION = {True: "peak-to-peak", False: "rms"}
 _LEAST = 6
-_GAIN, _GAIN_UNSURE, _COST = 7.5, 14.0, 1.0  # of ln evidence, where a chance is likelier, and per ln of choices
-_WELL, _APART = 0.7, 0.85  # of the recordings lie within a third of ln c of their level: at least, and of levels apart
-_MOST, _FEW, _MANY = 0.5, 0.1, 12  # the first two of the recordings
-_EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
-# Where a law along an axis may be at work as well: twice is no law, and √2 is a chance unless it is sharp.
+_GAIN, _GAIN_UNSURE, _COST = 7.5, 14.0, 1.0  # least gain of ln evidence, the same where chance is likelier; per ln C
+_WELL, _APART = 0.7, 0.85  # share of recordings within a third of ln c of their level: at least; for separate levels
+_MOST, _FEW, _MANY = 0.5, 0.1, 12  # shares of the recordings, and a number of them
+_EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and a tolerance, within which the factor must be c
+# Where a law along an axis may act as well: no law gives 2, and √2 may be chance unless it is sharp.
 _PLAIN_SIZE, _PLAIN_WITHIN, _SHARP_WITHIN = 0.5, 0.06, 0.02  # of ln c
-_SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
+_SEARCHED_SCATTER, _SEARCHED_SMOOTH_SIZES = (0.04, 0.12), (0.15, 1.0)
 
 
 @dataclass(frozen=True)
 class Step:
-    """A factor, the recordings that have it, by how much ln evidence gains on its cost, and the share of all recordings
-    that lie within a third of its logarithm of their level."""
+    """A factor, the recordings that have it, the gain of ln evidence after its cost, and the share of all recordings
+    that lie within a third of ln c of their level (`near`)."""
 
     factor: float
     off: Mask
@@ -41,7 +41,7 @@ class Step:
 
 
 def amplitude_step(levels: Levels) -> Step | None:
-    """The plainest such factor among the recordings, None where none is plain."""
+    """The factor of largest gain, None where none is significant."""
     if len(levels.value) < _LEAST:
         return None
     base = levels.fit(levels.value).evidence
@@ -51,10 +51,11 @@ def amplitude_step(levels: Levels) -> Step | None:
 
 
 def _least_gain(step: Step) -> float:
-    """A few of many recordings that are √2 off may have missed their place.
+    """The gain of ln evidence that a step must exceed.
 
-    One recording may be off by chance. Two levels of which one is half the other may be one where they overlap: presses
-    that miss their place only lower the level, and halves of such a skewed distribution fit better than the whole.
+    A few of many recordings that are √2 off may be position errors; one recording may be off by chance. Two levels, one
+    half the other, may be a single one where they overlap: position errors only lower the level, and two halves of such
+    a skewed distribution fit better than the whole.
     """
     if len(step.off) > _MANY and step.off.mean() < _FEW and abs(log(step.factor)) < _PLAIN_SIZE:
         return np.inf
@@ -62,47 +63,47 @@ def _least_gain(step: Step) -> float:
     return _GAIN_UNSURE if skewed or step.off.sum() == 1 else _GAIN
 
 
-def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
-    """The recordings with the factor taken out, those without a level left out, and the finding on it."""
-    off = levels.number[step.off].tolist()
+def without_step(recordings: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
+    """The recordings corrected for the factor, without those that have no level, and the finding."""
+    off = levels.index[step.off].tolist()
     arguments = {
         "factor": step.factor,
-        "meant": _MEANT[abs(log(step.factor)) > 0.5],
-        "of": [entries[number].id for number in off],
-        "recordings": len(entries),
-        "left_out": len(entries) - len(levels.number),
+        "meant": _CONVENTION[abs(log(step.factor)) > 0.5],
+        "of": [recordings[index].id for index in off],
+        "recordings": len(recordings),
+        "left_out": len(recordings) - len(levels.index),
     }
     right = [
-        _times(entries[number], 1 / step.factor) if number in off else entries[number]
-        for number in levels.number.tolist()
+        _times(recordings[index], 1 / step.factor) if index in off else recordings[index]
+        for index in levels.index.tolist()
     ]
     return right, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
 
 
 def _step(levels: Levels, factor: float, base: float) -> Step | None:
-    """The recordings that are off by a factor; None where there are none, or most, or the factor is another."""
+    """The recordings that are off by a factor; None where there are none or most, or the factor differs from c."""
     size = log(factor)
-    found: list[Step] = []
-    for scatter, bend in product(_SEARCHED_SCATTER, _SEARCHED_BEND):
-        off = _chosen(levels.value, levels.precision(scatter, bend), size)
-        if not off.any() or any((off == one.off).all() for one in found):
+    steps: list[Step] = []
+    for scatter, smooth_size in product(_SEARCHED_SCATTER, _SEARCHED_SMOOTH_SIZES):
+        off = _chosen(levels.value, levels.precision(scatter, smooth_size), size)
+        if not off.any() or any((off == step.off).all() for step in steps):
             continue
         value = levels.value - size * off
         fit = levels.fit(value)
-        away, deviation = fit.amplitude(value, off.astype(float))
-        exact = abs(away) < _EXACT * deviation + _EXACT_WITHIN
+        error, deviation = fit.amplitude(value, off.astype(float))
+        exact = abs(error) < _EXACT * deviation + _EXACT_WITHIN
         if exact and follows_an_axis(off, levels.axes):
             within = _PLAIN_WITHIN if abs(size) > _PLAIN_SIZE else _SHARP_WITHIN
-            exact = abs(away) + deviation < within
+            exact = abs(error) + deviation < within
         near = float((np.abs(fit.residual(value)) < 0.35 * abs(size)).mean())
         if exact and near > _WELL:
             cost = _COST * log(comb(len(off), int(off.sum())))
-            found.append(Step(factor, off, fit.evidence - base - cost, near))
-    return max(found, key=lambda step: step.gain, default=None)
+            steps.append(Step(factor, off, fit.evidence - base - cost, near))
+    return max(steps, key=lambda step: step.gain, default=None)
 
 
 def _chosen(value: Floats, precision: Floats, size: float) -> Mask:
-    """a that makes (y − a ln c)ᵀ C⁻¹ (y − a ln c) small, one recording after the other; of a and 1 − a the smaller."""
+    """The a that minimises (y − a ln c)ᵀ C⁻¹ (y − a ln c), one recording at a time; of a and 1 − a the smaller."""
     off: Mask = np.zeros(len(value), dtype=bool)
     for _ in range(3 * len(value)):
         pull = precision @ (value - size * off)
@@ -114,8 +115,8 @@ def _chosen(value: Floats, precision: Floats, size: float) -> Mask:
     return ~off if off.mean() > _MOST else off
 
 
-def _times(entry: FrfRecording, factor: float) -> FrfRecording:
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    real, imaginary = factor * entry.frf_re_pc_per_n, factor * entry.frf_im_pc_per_n
-    return replace(entry, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+def _times(recording: FrfRecording, factor: float) -> FrfRecording:
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    real, imaginary = factor * recording.frf_re_pc_per_n, factor * recording.frf_im_pc_per_n
+    return replace(recording, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)

@@ -1,8 +1,8 @@
-"""Declared values of the skin, and values shared by all recordings, that no skin and no rig has.
+"""Declared values of the skin, and values common to all recordings, of a magnitude that no skin and no rig has.
 
-An unlikely magnitude looks like a slip of units. Nothing else in the campaign would show it, and every law of contact
-would be fitted with a wrong force or modulus. So it is a finding, and nothing is concluded until it is corrected or
-`units_checked` confirms it.
+Such a value looks like a wrong unit, which nothing else in the campaign would reveal: every contact law would be fitted
+with a wrong force or modulus. It is a finding, and nothing is concluded until it is corrected, or confirmed by
+`units_checked`.
 """
 
 from collections.abc import Sequence
@@ -17,19 +17,19 @@ from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import pitch_mm
 from underskin.units import unit_guess, unusual
 
-_PRELOADS_N = (0.01, 150.0)  # the highest preload of a campaign, and the lowest
-_FREQUENCIES_HZ = (0.5, 2e4)  # the highest line of a campaign
-_LEAST_PAUSE_S = 5.0  # no sweep is made in less
-_SLOW_HZ = (0.02, 5.0)  # a sweep from below the one to no more than the other: a minute and more for each period
+_PRELOADS_N = (0.01, 150.0)  # least for the highest preload of a campaign, most for the lowest
+_FREQUENCIES_HZ = (0.5, 2e4)  # range of the highest line of a campaign
+_LEAST_PAUSE_S = 5.0  # no sweep takes less
+_SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency
 _ELASTOMERS_MPA = (0.02, 300.0)  # from gels to the hardest polyurethanes
 _WIDEST_PITCH_MM = 300.0
 _GEOMETRY = ("thickness_mm", "sensor_radius_mm", "width_mm", "length_mm")
 _SLIP = 1000.0
 
 
-def unlikely(campaign: Campaign, entries: Sequence[FrfRecording]) -> list[Finding]:
-    """Magnitudes of the skin, and shared by all recordings, that look like a slip of units."""
-    return [*_of_skin(campaign), *_of_recordings(entries)]
+def unlikely(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
+    """Findings on magnitudes of the skin, or common to all recordings, that look like a wrong unit."""
+    return [*_of_skin(campaign), *_of_recordings(recordings)]
 
 
 def _of_skin(campaign: Campaign) -> list[Finding]:
@@ -54,26 +54,29 @@ def _of_skin(campaign: Campaign) -> list[Finding]:
     return findings
 
 
-def _of_recordings(entries: Sequence[FrfRecording]) -> list[Finding]:
-    preload = np.array([entry.preload_n for entry in entries])
+def _of_recordings(recordings: Sequence[FrfRecording]) -> list[Finding]:
+    preload = np.array([recording.preload_n for recording in recordings])
     findings = []
     if preload.max() < _PRELOADS_N[0]:
         findings.append(Finding(Reason.PRELOADS_SMALL, "", "preload_n", {"highest_n": float(preload.max())}))
     if preload.min() > _PRELOADS_N[1]:
         findings.append(Finding(Reason.PRELOADS_LARGE, "", "preload_n", {"lowest_n": float(preload.min())}))
-    sphere = float(np.median([entry.indenter_radius_mm for entry in entries]))
+    sphere = float(np.median([recording.indenter_radius_mm for recording in recordings]))
     findings += _unusual("indenter_radius_mm", unusual("indenter_radius_mm", sphere))
-    return [*findings, *_of_frequencies(entries)]
+    return [*findings, *_of_frequencies(recordings)]
 
 
 def _unusual(field: str, findings: Sequence[Finding]) -> list[Finding]:
-    """Unusual magnitudes as slips of units of a declared field: nothing in the campaign says otherwise."""
-    return [Finding(Reason.DECLARED_UNUSUAL, "", field, entry.arguments) for entry in findings]
+    """Unusual magnitudes as wrong units of a declared field, which nothing else in the campaign checks."""
+    return [Finding(Reason.DECLARED_UNUSUAL, "", field, finding.arguments) for finding in findings]
 
 
-def _of_frequencies(entries: Sequence[FrfRecording]) -> list[Finding]:
-    lines = [lines_of(entry).frequency for entry in entries]
-    lowest, highest = min(float(own.min()) for own in lines), max(float(own.max()) for own in lines)
+def _of_frequencies(recordings: Sequence[FrfRecording]) -> list[Finding]:
+    lines = [lines_of(recording).frequency for recording in recordings]
+    lowest, highest = (
+        min(float(frequency.min()) for frequency in lines),
+        max(float(frequency.max()) for frequency in lines),
+    )
     slow = lowest < _SLOW_HZ[0] and highest < _SLOW_HZ[1]
     for wrong, too_large, unit in (
         (highest > _FREQUENCIES_HZ[1], True, "mHz"),
@@ -82,20 +85,20 @@ def _of_frequencies(entries: Sequence[FrfRecording]) -> list[Finding]:
         if wrong:
             arguments = {"lowest_hz": lowest, "highest_hz": highest, "too_large": too_large, "given_in": unit}
             return [Finding(Reason.FREQUENCIES, "", "frequency_hz", arguments)]
-    pause = _pause_s(entries)
+    pause = _pause_s(recordings)
     if pause is not None and pause * lowest < 1 and _SLIP * highest <= _FREQUENCIES_HZ[1]:
         arguments = {"lowest_hz": lowest, "pause_s": pause}
         return [Finding(Reason.PERIODS_TOO_LONG, "", "frequency_hz", arguments)]
     return []
 
 
-def _pause_s(entries: Sequence[FrfRecording]) -> float | None:
-    """From one recording of a sensor to its next, as a rule; what is stamped within seconds was made together."""
-    times = [entry.recorded_at for entry in entries]
+def _pause_s(recordings: Sequence[FrfRecording]) -> float | None:
+    """The median time from one recording of a sensor to its next [s]; stamps within seconds count as one recording."""
+    times = [recording.recorded_at for recording in recordings]
     if None in times:
         return None
     seconds = 3600 * hours(times)
-    sensors = np.array([entry.sensor for entry in entries])
+    sensors = np.array([recording.sensor for recording in recordings])
     steps = np.concatenate([np.diff(np.sort(seconds[sensors == name])) for name in np.unique(sensors)])
     pauses = steps[steps >= _LEAST_PAUSE_S]
     return float(np.median(pauses)) if len(pauses) else None

@@ -1,10 +1,10 @@
-"""Two sensors' cables exchanged from some recording on, told by their gains where every contact is on its own sensor.
+"""Cables of two sensors exchanged from some recording on, detected by gain where each contact is on its own sensor.
 
-Sensors of different gains answer with each other's level since. In the model of levels the columns a, b of X, which say
-which recordings are of either sensor, are then others, a', b': with U = (a, b, a', b'), D = t² diag(−1, −1, 1, 1),
-M = Uᵀ C⁻¹ U and v = Uᵀ C⁻¹ y the evidence gains −½ ln |1 + D M| + ½ vᵀ (1 + D M)⁻¹ D v at given s, t and p. All pairs
-and recordings are tried so; of the plainest few all is fitted. An exchange costs ln of how many were tried, and is held
-against a step of either sensor alone, of any size.
+After the exchange, sensors of different gain answer at each other's level. In the model of levels (`levels`) the
+columns a, b of X, which mark the recordings of either sensor, become a', b'. With U = (a, b, a', b'),
+D = t² diag(−1, −1, 1, 1), M = Uᵀ C⁻¹ U and v = Uᵀ C⁻¹ y, the evidence gains −½ ln |1 + D M| + ½ vᵀ (1 + D M)⁻¹ D v at
+given s, t and p. All pairs and starting recordings are tried this way, and the best few are fitted fully. An exchange
+costs ln of the number tried, and must also exceed a step of any size in one of the two sensors.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,15 +21,15 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats, Indices
 
 _SPREADS = (0.06, 0.25)  # t of sensors whose exchange would show
-_FITTED = 3  # of those tried
+_FITTED = 3  # exchanges that are fitted fully
 _STEP = 0.4  # prior standard deviation of a sensor's step
-_GAIN = log(100)  # of ln evidence beyond ln of how many were tried
+_GAIN = log(100)  # of ln evidence beyond ln of the number tried
 _OVER_STEP = log(4)  # of ln evidence beyond a step of one sensor
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Numbers of two sensors, the levels since, and by how much ln evidence gains on its cost."""
+    """Two sensors, the levels since the exchange, and the gain of ln evidence after its cost."""
 
     sensors: tuple[int, int]
     since: Indices
@@ -37,51 +37,60 @@ class Exchange:
 
 
 def exchanged_cables(levels: Levels) -> Exchange | None:
-    """The plainest exchange, None where none is plain."""
-    numbers = np.unique(levels.sensor).tolist()
+    """The exchange of largest gain, None where none is significant."""
+    sensors = np.unique(levels.sensor).tolist()
     base = levels.fit(levels.value)
-    tried = sorted((one for spread in _SPREADS for one in _tried(levels, base, spread)), key=lambda one: -one.gain)
+    tried = sorted(
+        (exchange for spread in _SPREADS for exchange in _tried(levels, base, spread)),
+        key=lambda exchange: -exchange.gain,
+    )
     cost = log(max(len(tried) / len(_SPREADS), 1))
-    fitted = [replace(one, gain=_fit(levels, one).evidence - base.evidence - cost) for one in tried[:_FITTED]]
-    best = max(fitted, key=lambda one: one.gain, default=None)
+    fitted = [
+        replace(exchange, gain=_fit(levels, exchange).evidence - base.evidence - cost) for exchange in tried[:_FITTED]
+    ]
+    best = max(fitted, key=lambda exchange: exchange.gain, default=None)
     if best is None or best.gain < _GAIN:
         return None
-    cost_of_step = log(max(len(levels.value) - len(numbers), 1))
+    cost_of_step = log(max(len(levels.value) - len(sensors), 1))
     steps = [levels.fit(levels.value, column).evidence - base.evidence for column in _steps(levels, best)]
     return best if best.gain > max(steps) - cost_of_step + _OVER_STEP else None
 
 
 def with_right_sensors(
-    entries: Sequence[FrfRecording], levels: Levels, found: Exchange, places: Mapping[str, tuple[float, float]]
+    recordings: Sequence[FrfRecording], levels: Levels, exchange: Exchange, positions: Mapping[str, tuple[float, float]]
 ) -> tuple[list[FrfRecording], Finding]:
-    """The recordings with the sensors that they are of, and the finding on it; contacts move with the sensors, whose
-    `places` [mm] are given."""
-    since = levels.number[found.since]
-    names = dict(zip(levels.sensor.tolist(), (entries[number].sensor for number in levels.number), strict=True))
-    first, second = (names[number] for number in found.sensors)
-    order = dict(zip(levels.number.tolist(), levels.order.tolist(), strict=True))
-    start = min(since.tolist(), key=lambda number: order[number])
-    arguments = {"first": first, "second": second, "since": entries[start].id, "recordings": len(since)}
-    right = list(entries)
-    for number in since.tolist():
-        entry = entries[number]
-        there = second if entry.sensor == first else first
-        right[number] = replace(entry, sensor=there, position_mm=_moved(entry, places[entry.sensor], places[there]))
+    """The recordings with their true sensors, and the finding; contacts move with the sensors, whose `positions` are in
+    mm."""
+    since = levels.index[exchange.since]
+    names = dict(zip(levels.sensor.tolist(), (recordings[index].sensor for index in levels.index), strict=True))
+    first, second = (names[sensor] for sensor in exchange.sensors)
+    order = dict(zip(levels.index.tolist(), levels.order.tolist(), strict=True))
+    start = min(since.tolist(), key=lambda index: order[index])
+    arguments = {"first": first, "second": second, "since": recordings[start].id, "recordings": len(since)}
+    right = list(recordings)
+    for index in since.tolist():
+        recording = recordings[index]
+        there = second if recording.sensor == first else first
+        right[index] = replace(
+            recording, sensor=there, position_mm=_moved(recording, positions[recording.sensor], positions[there])
+        )
     return right, Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
 
 
-def _moved(entry: FrfRecording, here: tuple[float, float], there: tuple[float, float]) -> tuple[float, float] | None:
-    """Where the contact lies beside the other sensor."""
-    if entry.position_mm is None:
+def _moved(
+    recording: FrfRecording, here: tuple[float, float], there: tuple[float, float]
+) -> tuple[float, float] | None:
+    """The position of the contact relative to the other sensor; None if it was not given."""
+    if recording.position_mm is None:
         return None
-    x, y = (at + new - old for at, new, old in zip(entry.position_mm, there, here, strict=True))
+    x, y = (at + new - old for at, new, old in zip(recording.position_mm, there, here, strict=True))
     return x, y
 
 
 def _tried(levels: Levels, base: LevelFit, spread: float) -> Iterator[Exchange]:
-    """Every pair and recording, with the gain at the base's s and p."""
-    own = np.equal.outer(levels.sensor, levels.sensor)
-    precision = np.linalg.inv(np.linalg.inv(base.precision) + (spread**2 - base.spread**2) * own)
+    """Every pair of sensors and first recording, with the gain at the base fit's s and p."""
+    same_sensor = np.equal.outer(levels.sensor, levels.sensor)
+    precision = np.linalg.inv(np.linalg.inv(base.precision) + (spread**2 - base.spread**2) * same_sensor)
     weighed = precision @ levels.value
     sign = spread**2 * np.array([-1.0, -1.0, 1.0, 1.0])[:, None]
     for pair in combinations(np.unique(levels.sensor).tolist(), 2):
@@ -97,14 +106,14 @@ def _tried(levels: Levels, base: LevelFit, spread: float) -> Iterator[Exchange]:
         yield from (Exchange(pair, both[k + 1 :], float(gain[k])) for k in range(len(gain)))
 
 
-def _fit(levels: Levels, found: Exchange) -> LevelFit:
-    first, second = found.sensors
+def _fit(levels: Levels, exchange: Exchange) -> LevelFit:
+    first, second = exchange.sensors
     sensor = levels.sensor.copy()
-    sensor[found.since] = np.where(levels.sensor[found.since] == first, second, first)
+    sensor[exchange.since] = np.where(levels.sensor[exchange.since] == first, second, first)
     return levels.fit(levels.value, sensor=sensor)
 
 
-def _steps(levels: Levels, found: Exchange) -> list[Floats]:
+def _steps(levels: Levels, exchange: Exchange) -> list[Floats]:
     """A step of either sensor since the exchange (recordings, 1)."""
-    late = np.isin(np.arange(len(levels.value)), found.since)
-    return [_STEP * (late & (levels.sensor == number)).astype(float)[:, None] for number in found.sensors]
+    late = np.isin(np.arange(len(levels.value)), exchange.since)
+    return [_STEP * (late & (levels.sensor == sensor)).astype(float)[:, None] for sensor in exchange.sensors]

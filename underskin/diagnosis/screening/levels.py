@@ -1,24 +1,18 @@
-"""Levels of recordings above the model, and what may cause them.
+"""Levels of recordings over the base model's, the model of these levels, and what may change them.
 
-The lines of recordings as FRFs in phase with the force: without a delay of the chain, which turns them. Whether
-something follows an axis along which recordings differ: then a law may be at work, and no slip need be.
-
-The level of each recording over the base model's, and what else than a slip may move it.
-
-With y_i = ln |level_i / shape_i| of recording i, the model of levels is
+A recording's level is the magnitude of its FRF in the flat zone. With y_i = ln |level_i / shape_i|, shape_i being the
+base model's, the model of levels is
     y = X b + ε,  b ~ N(0, P),  ε_i ~ N(0, s² + (g_i p)²),
-where X holds a gain, one gain a sensor (of standard deviation t), and smooth functions of what physics may follow
-(sphere, preload, place, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter of
-positions. The evidence is the largest ln N(y; 0, C) + ln p(s), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size
-of the smooth functions, p(s) the prior of a recording's gain: a slip is believed where taking it out of y raises the
-evidence by far more than its own description costs.
+where X holds a gain, one gain per sensor (of standard deviation t), and smooth functions of what physics may depend on
+(sphere, preload, position, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter
+of positions. The evidence is the largest ln N(y; 0, C) + ln p(s), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the
+size of the smooth functions, p(s) being the prior of a recording's gain. A recording error is accepted where removing
+it from y raises the evidence by far more than the cost of describing it.
 
-What may move the levels of recordings, how probable each is beforehand, and the evidence of levels over all of it.
-
-Either nothing does, or one mechanism of the catalogue, or something smooth (`levels`): several mechanisms, or a law
-that nobody listed. A mechanism's changes Δ of ln level, at K points drawn from the priors of its parameters, stand in
-the model of levels as a normal change of the same second moments, Σ Δ Δᵀ/K. Beside nothing and beside each mechanism,
-the declared modulus and thickness may be off as far as their priors allow.
+Causes of a change in level: none, one mechanism of the catalogue, or a smooth change (several mechanisms, or an
+unlisted law). The changes Δ of ln level under a mechanism, at K points from the priors of its parameters, enter as a
+normal change of the same second moments, Σ Δ Δᵀ/K. With no cause, and with each mechanism, the declared modulus and
+thickness may be off as far as their priors allow.
 """
 
 from collections.abc import Sequence
@@ -46,72 +40,79 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Complexes, Floats, Indices, Mask
 
 
-def aligned_lines(entries: Sequence[FrfRecording]) -> list[Complexes]:
-    """The values [C/N] of each recording's lines without the delay that all of them share."""
-    measured = [lines_of(entry) for entry in entries]
+def aligned_lines(recordings: Sequence[FrfRecording]) -> list[Complexes]:
+    """The values [C/N] of each recording's lines without the delay common to all."""
+    measured = [lines_of(recording) for recording in recordings]
     delay = common_delay(stacked(measured))
-    return [advanced(own.values, own.frequency, delay) if delay else own.values for own in measured]
+    return [advanced(frf.values, frf.frequency, delay) if delay else frf.values for frf in measured]
 
 
-_LEAST = 2  # recordings: a single one is extreme along some axis
-_BESIDE = 0.25  # of them, as many may be lacking or too many
-_TERMS, _SIZE = 4, 0.3  # cosines over the rank along an axis, and the prior standard deviation of each
+_LEAST = 2  # recordings: a single one is always extreme along some axis
+_MISMATCH = 0.25  # share of the recordings that may differ
+_TERMS, _SIZE = 4, 0.3  # number of cosines over the rank along an axis, and the prior standard deviation of each
 
 
 def follows_an_axis(chosen: Mask, axes: Sequence[Floats]) -> bool:
-    """Whether some recordings are, but for few, those on one side of an axis, or on one level of it."""
+    """Whether the chosen recordings are, but for a few, those on one side of an axis, or on one level of it.
+
+    Then a law along the axis may act, and the recordings need not be wrong.
+    """
     if chosen.sum() < _LEAST:
         return False
-    allowed = _BESIDE * chosen.sum()
+    allowed = _MISMATCH * chosen.sum()
     for axis in axes:
         for level in np.unique(axis):
             for part in (axis >= level, axis == level):
-                beside = int((part ^ chosen).sum())
-                if min(beside, len(chosen) - beside) <= allowed:
+                mismatches = int((part ^ chosen).sum())
+                if min(mismatches, len(chosen) - mismatches) <= allowed:
                     return True
     return False
 
 
 def smooth_along(axis: Floats) -> Floats:
     """Cosines over the rank along an axis, times their prior standard deviation (recordings, terms)."""
-    _, place = np.unique(axis, return_inverse=True)
-    share = place / max(int(place.max()), 1)
+    _, rank = np.unique(axis, return_inverse=True)
+    share = rank / max(int(rank.max()), 1)
     return np.asarray(_SIZE * np.cos(np.pi * np.outer(share, np.arange(1, _TERMS + 1))))
 
 
-_FLAT_HZ = 130.0  # the response is about flat below
-_LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a crossing of zero, a level says nothing
+_FLAT_HZ = 130.0  # below it the response is about flat
+_LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a zero crossing, a level is not informative
 SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s
 SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 _SPREAD = (0.01, 0.06, 0.25)  # t
-BENDS = (0.0, 0.1, 0.4, 1.0)  # of all smooth functions together; 0 where nothing moves the levels
-_PLACE_MM = (0.0, 0.1, 0.3)  # p
-_USUAL_SPREAD, _USUAL_PLACE_MM = 0.06, 0.1
-_OVERALL, _SMOOTH, _BEND = 3.0, 0.3, 0.15  # prior standard deviations of the other coefficients
+SMOOTH_SIZES = (0.0, 0.1, 0.4, 1.0)  # of all smooth functions together; 0 where nothing moves the levels
+_POSITION_MM = (0.0, 0.1, 0.3)  # p
+_USUAL_SPREAD, _USUAL_POSITION_MM = 0.06, 0.1
+_OVERALL, _SMOOTH, _CURVATURE = 3.0, 0.3, 0.15  # prior standard deviations of the other coefficients
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """Columns over the recordings that tell a level."""
+    """Columns over the recordings with an informative level."""
 
-    number: Indices  # of the recording among all entries
+    index: Indices  # of the recording among all
     value: Floats  # y
     sensor: Indices
     order: Floats  # 0, 1, … in time
     slope: Floats  # g [1/mm]
     smooth: Floats  # (recordings, columns) of X, times their prior standard deviation
     cycles: Floats | None
-    axes: tuple[Floats, ...]  # what else may move the level: each axis on which the recordings differ (recordings,)
+    axes: tuple[Floats, ...]  # each axis on which the recordings differ (recordings,)
 
     def fit(self, value: Floats, further: Floats | None = None, sensor: Indices | None = None) -> "LevelFit":
         """The best s, t, p and size of the smooth functions for `value` (recordings,).
 
-        `further` (recordings, columns) is added to X, scaled by its prior; `sensor` stands for the recordings' sensors.
+        `further` (recordings, columns), scaled by its prior, is added to X; `sensor` replaces the recordings' sensors.
         """
         added = 0.0 if further is None else further @ further.T
         best, chosen, best_spread = -np.inf, np.eye(len(value)), self.spreads[0]
-        for spread, place, bend in product(self.spreads, self.places, BENDS):
-            fixed = self.expected(spread, bend * self.smooth, sensor) + np.diag((self.slope * place) ** 2) + added
+        for spread, position_scatter, smooth_size in product(self.spreads, self.position_scatters, SMOOTH_SIZES):
+            fixed = (
+                self.expected(spread, smooth_size * self.smooth, sensor)
+                + np.diag((self.slope * position_scatter) ** 2)
+                + added
+            )
             for scatter in SCATTER:
                 covariance = fixed + np.diag(np.full(len(value), scatter**2))
                 density = _log_density(value, covariance) + float(SCATTER_PRIOR.log_density(log(scatter)))
@@ -119,15 +120,15 @@ class Levels:
                     best, chosen, best_spread = density, covariance, spread
         return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), best_spread)
 
-    def precision(self, scatter: float, bend: float) -> Floats:
-        """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
-        noise = scatter**2 + (_USUAL_PLACE_MM * self.slope) ** 2
-        return np.asarray(np.linalg.inv(self.expected(_USUAL_SPREAD, bend * self.smooth) + np.diag(noise)))
+    def precision(self, scatter: float, smooth_size: float) -> Floats:
+        """C⁻¹ (recordings, recordings) at a given s and size of the smooth functions."""
+        noise = scatter**2 + (_USUAL_POSITION_MM * self.slope) ** 2
+        return np.asarray(np.linalg.inv(self.expected(_USUAL_SPREAD, smooth_size * self.smooth) + np.diag(noise)))
 
     def expected(self, spread: float, columns: Floats, sensor: Indices | None = None) -> Floats:
-        """X P Xᵀ (recordings, recordings) at a sensors' spread t, of a gain, the sensors' and columns."""
-        own = np.eye(int(self.sensor.max()) + 1)[self.sensor if sensor is None else sensor]
-        return np.asarray(_OVERALL**2 + columns @ columns.T + spread**2 * own @ own.T)
+        """X P Xᵀ (recordings, recordings) at the sensors' spread t, for a gain, the sensors' gains and `columns`."""
+        indicator = np.eye(int(self.sensor.max()) + 1)[self.sensor if sensor is None else sensor]
+        return np.asarray(_OVERALL**2 + columns @ columns.T + spread**2 * indicator @ indicator.T)
 
     @property
     def spreads(self) -> tuple[float, ...]:
@@ -135,9 +136,9 @@ class Levels:
         return _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
 
     @property
-    def places(self) -> tuple[float, ...]:
+    def position_scatters(self) -> tuple[float, ...]:
         """The values of p that are tried."""
-        return _PLACE_MM if self.slope.max(initial=0.0) > 0.05 else _PLACE_MM[:1]
+        return _POSITION_MM if self.slope.max(initial=0.0) > 0.05 else _POSITION_MM[:1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,80 +151,88 @@ class LevelFit:
     spread: float
 
     def amplitude(self, value: Floats, column: Floats) -> tuple[float, float]:
-        """That of a column in y by generalised least squares, and its standard deviation."""
+        """The amplitude of a column in y by generalised least squares, and its standard deviation."""
         weight = self.precision @ column
         total = float(weight @ column)
         return float(weight @ value) / total, total**-0.5
 
     def residual(self, value: Floats) -> Floats:
-        """Each value less what all others let expect of it."""
+        """Each value minus its expectation given all others."""
         return np.asarray((self.precision @ value) / np.diag(self.precision))
 
 
-def levels(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTable) -> Levels:
-    """Those of a campaign's recordings, signs put right."""
-    whole = replace(campaign, recordings=tuple(entries))
-    model = compose((), whole, table, "frf")
+def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable) -> Levels:
+    """The levels of a campaign's recordings, whose signs are correct."""
+    subset = replace(campaign, recordings=tuple(recordings))
+    model = compose((), subset, table, "frf")
     prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
-    first = np.searchsorted(model.recording, np.arange(len(entries)))
+    first = np.searchsorted(model.recording, np.arange(len(recordings)))
     shape = np.abs(prediction.value[first].real)
-    level = np.array([flat_level(entry) for entry in entries])
+    level = np.array([flat_level(recording) for recording in recordings])
     chosen = np.flatnonzero(
         model.valid[first] & (shape > _LEAST_RESPONSE * shape.max(initial=0.0)) & (level > 0) & np.isfinite(level)
     )
-    slope = np.zeros(len(entries))
+    slope = np.zeros(len(recordings))
     if prediction.position_slopes is not None:
         slope = 1e-3 * np.hypot(*np.abs(prediction.position_slopes[:, first])) / np.where(shape > 0, shape, 1.0)
     ids = [sensor.id for sensor in campaign.skin.sensors]
-    cycles = [entry.load_cycles for entry in entries]
+    cycles = [recording.load_cycles for recording in recordings]
     counted = None if any(count is None for count in cycles) else np.array(cycles, dtype=float)[chosen]
     return Levels(
-        number=chosen,
+        index=chosen,
         value=np.log(level[chosen] / shape[chosen]),
-        sensor=np.array([ids.index(entries[number].sensor) for number in chosen.tolist()], dtype=np.intp),
-        order=recording_order(entries)[chosen],
+        sensor=np.array([ids.index(recordings[index].sensor) for index in chosen.tolist()], dtype=np.intp),
+        order=recording_order(recordings)[chosen],
         slope=slope[chosen],
-        smooth=_smooth(campaign, [entries[number] for number in chosen.tolist()], recording_order(entries)[chosen]),
+        smooth=_smooth(campaign, [recordings[index] for index in chosen.tolist()], recording_order(recordings)[chosen]),
         cycles=counted,
-        axes=tuple(axis.of([entries[number].id for number in chosen.tolist()]) for axis in axes_of(whole)),
+        axes=tuple(axis.of([recordings[index].id for index in chosen.tolist()]) for axis in axes_of(subset)),
     )
 
 
-def flat_level(entry: FrfRecording) -> float:
+def flat_level(recording: FrfRecording) -> float:
     """|FRF| in the flat zone [C/N]."""
-    measured = lines_of(entry)
+    measured = lines_of(recording)
     flat: Mask = measured.frequency <= _FLAT_HZ
     values = np.abs(measured.values[flat] if flat.any() else measured.values)
     return float(np.nanmedian(values))
 
 
-def _smooth(campaign: Campaign, entries: Sequence[FrfRecording], order: Floats) -> Floats:
+def _smooth(campaign: Campaign, recordings: Sequence[FrfRecording], order: Floats) -> Floats:
     """The smooth columns of X, times their prior standard deviations."""
-    if not entries:
+    if not recordings:
         return np.zeros((0, 0))
-    preload = _standard(np.log([entry.preload_n for entry in entries]))
-    sphere = np.array([entry.indenter_radius_mm for entry in entries])
+    preload = _standard(np.log([recording.preload_n for recording in recordings]))
+    sphere = np.array([recording.indenter_radius_mm for recording in recordings])
     columns = []
     for radius in np.unique(sphere):
-        own = (sphere == radius).astype(float)
-        columns += [_SMOOTH * own, _SMOOTH * own * preload, _BEND * own * preload**2, _BEND * own * preload**3]
-    known = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    away = [np.subtract(entry.position_mm or known[entry.sensor], known[entry.sensor]) for entry in entries]
-    x, y = np.array(away).T / (campaign.skin.thickness_mm or 1.0)
+        of_sphere = (sphere == radius).astype(float)
+        columns += [
+            _SMOOTH * of_sphere,
+            _SMOOTH * of_sphere * preload,
+            _CURVATURE * of_sphere * preload**2,
+            _CURVATURE * of_sphere * preload**3,
+        ]
+    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    offsets = [
+        np.subtract(recording.position_mm or positions[recording.sensor], positions[recording.sensor])
+        for recording in recordings
+    ]
+    x, y = np.array(offsets).T / (campaign.skin.thickness_mm or 1.0)
     columns += [_SMOOTH * column for column in (x, y, x**2 + y**2, x**2 - y**2, x * y)]
     columns += [_SMOOTH * column * np.hypot(x, y) ** 2 for column in (x, y, x**2 + y**2)]
-    columns += [_BEND * column * preload for column in (x, y, x**2 + y**2)]
+    columns += [_CURVATURE * column * preload for column in (x, y, x**2 + y**2)]
     along = _standard(order)
-    columns += [_BEND * along, _BEND * along**2]
+    columns += [_CURVATURE * along, _CURVATURE * along**2]
     for name in ("load_cycles", "dwell_s", "dynamic_force_n"):
-        noted = [getattr(entry, name) for entry in entries]
+        noted = [getattr(recording, name) for recording in recordings]
         if all(value is not None and value > 0 for value in noted):
-            columns.append(_BEND * _standard(np.log(np.array(noted, dtype=float))))
+            columns.append(_CURVATURE * _standard(np.log(np.array(noted, dtype=float))))
     return np.stack(columns, axis=1)
 
 
 def _standard(column: Floats) -> Floats:
-    """From −1 to 1."""
+    """The column scaled to −1 … 1."""
     middle, half = (np.max(column) + np.min(column)) / 2, (np.max(column) - np.min(column)) / 2
     return np.asarray((column - middle) / half if half > 0 else np.zeros(len(column)))
 
@@ -235,15 +244,14 @@ def _log_density(value: Floats, covariance: Floats) -> float:
     return float(-0.5 * white @ white - np.log(np.diag(root)).sum())
 
 
-_NO_CAUSE, _ONE_CAUSE, _SMOOTH_COURSE = 0.6, 0.25, 0.15  # prior probabilities
+_NO_CAUSE, _SINGLE_CAUSE, _SMOOTH_CAUSE = 0.6, 0.25, 0.15  # prior probabilities
 _DRAWS = 8
-_LEAST_RATIO = 1e-3  # of the base model's
+_LEAST_RATIO = 1e-3  # of the base model's response
 
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """The logarithm of its prior, and what it adds to X: columns times their prior standard deviations
-    (recordings, columns)."""
+    """The logarithm of its prior, and its columns of X times their prior standard deviations (recordings, columns)."""
 
     log_prior: float
     columns: Floats
@@ -251,24 +259,24 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """ln evidence of each alternative (alternatives,), and what is expected of its coefficients, over their prior
-    standard deviations (alternatives, columns)."""
+    """ln evidence of each alternative (alternatives,), and the means of its coefficients over their prior standard
+    deviations (alternatives, columns)."""
 
     evidence: Floats
     coefficient: Floats
 
 
-def causes_of(campaign: Campaign, entries: Sequence[FrfRecording], levels: Levels, table: SigmaTable) -> list[Cause]:
-    """All that may move the levels of a campaign's recordings, those that `levels` has."""
-    contacts = tuple(entry.without_measurements(frequency_hz=np.ones(1)) for entry in entries)
+def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Levels, table: SigmaTable) -> list[Cause]:
+    """All causes that may change the levels of a campaign's recordings, for the rows of `levels`."""
+    contacts = tuple(recording.without_measurements(frequency_hz=np.ones(1)) for recording in recordings)
     conditions = Conditions("contacts", campaign.skin, contacts)
     base = compose((), conditions, table, "frf")
     start = np.array([parameter.start for parameter in base.parameters])
     prediction = base.predict(start)
-    value = prediction.value[levels.number]
+    value = prediction.value[levels.index]
     declared = np.stack(
         [
-            (slope[levels.number] / value).real * parameter.prior.sd
+            (slope[levels.index] / value).real * parameter.prior.sd
             for parameter, slope in zip(base.parameters, prediction.slopes, strict=True)
             if isinstance(parameter.prior, Normal)
         ],
@@ -284,43 +292,44 @@ def causes_of(campaign: Campaign, entries: Sequence[FrfRecording], levels: Level
             continue
         assert isinstance(model, FrfModel)
         if not any(parameter.moves_covariance for parameter in model.parameters):
-            relative = np.abs([changed[levels.number] / value for changed in model.values(_drawn(model, start))])
+            relative = np.abs([changed[levels.index] / value for changed in model.values(_drawn(model, start))])
             change = np.log(np.maximum(relative, _LEAST_RATIO))
             laws.append(change.T / len(change) ** 0.5)
-    bends = [bend for bend in BENDS if bend > 0]
+    smooth_sizes = [smooth_size for smooth_size in SMOOTH_SIZES if smooth_size > 0]
     return [
         Cause(log(_NO_CAUSE), declared),
-        *(Cause(log(_ONE_CAUSE / len(laws)), np.hstack([declared, law])) for law in laws),
-        *(Cause(log(_SMOOTH_COURSE / len(bends)), bend * levels.smooth) for bend in bends),
+        *(Cause(log(_SINGLE_CAUSE / len(laws)), np.hstack([declared, law])) for law in laws),
+        *(Cause(log(_SMOOTH_CAUSE / len(smooth_sizes)), smooth_size * levels.smooth) for smooth_size in smooth_sizes),
     ]
 
 
 def explained(levels: Levels, causes: Sequence[Cause], further: Floats) -> Explained:
-    """The levels by each alternative, over all causes, at the best s, t, p (`levels`) of each.
+    """The evidence of each alternative, summed over all causes, at the best s, t, p of each.
 
-    `further` (alternatives, recordings, columns) is what each alternative adds to X, times prior standard deviations.
+    `further` (alternatives, recordings, columns): columns that each alternative adds to X, times their prior standard
+    deviations.
     """
-    each = [_by_cause(levels, cause.columns, further) for cause in causes]
-    joint = np.array([cause.log_prior + one.evidence for cause, one in zip(causes, each, strict=True)])
+    by_cause = [_by_cause(levels, cause.columns, further) for cause in causes]
+    joint = np.array([cause.log_prior + result.evidence for cause, result in zip(causes, by_cause, strict=True)])
     total = logsumexp(joint, axis=0)
     share = np.exp(joint - total)
-    coefficient = (share[:, :, None] * np.array([one.coefficient for one in each])).sum(axis=0)
+    coefficient = (share[:, :, None] * np.array([result.coefficient for result in by_cause])).sum(axis=0)
     return Explained(np.asarray(total), np.asarray(coefficient))
 
 
 def _by_cause(levels: Levels, columns: Floats, further: Floats) -> Explained:
-    """The same by one cause."""
+    """The evidence of each alternative under one cause."""
     alternatives, recordings, width = further.shape
     right = np.column_stack([levels.value, further.transpose(1, 0, 2).reshape(recordings, -1)])
     evidence, coefficient = np.full(alternatives, -np.inf), np.zeros((alternatives, width))
-    for spread, place in product(levels.spreads, levels.places):
-        fixed = levels.expected(spread, columns) + np.diag((levels.slope * place) ** 2)
+    for spread, position_scatter in product(levels.spreads, levels.position_scatters):
+        fixed = levels.expected(spread, columns) + np.diag((levels.slope * position_scatter) ** 2)
         for scatter in SCATTER:
             root = np.linalg.cholesky(fixed + scatter**2 * np.eye(recordings))
             white = solve_triangular(root, right, lower=True, check_finite=False)
-            value, own = white[:, 0], white[:, 1:].reshape(recordings, alternatives, width).transpose(1, 0, 2)
-            precision = np.eye(width) + own.transpose(0, 2, 1) @ own
-            along = value @ own
+            value, white_columns = white[:, 0], white[:, 1:].reshape(recordings, alternatives, width).transpose(1, 0, 2)
+            precision = np.eye(width) + white_columns.transpose(0, 2, 1) @ white_columns
+            along = value @ white_columns
             best = np.linalg.solve(precision, along[:, :, None])[:, :, 0]
             nothing = -0.5 * value @ value - np.log(np.diag(root)).sum() + SCATTER_PRIOR.log_density(log(scatter))
             density = nothing + 0.5 * (along * best).sum(axis=1) - 0.5 * np.linalg.slogdet(precision)[1]
@@ -331,10 +340,16 @@ def _by_cause(levels: Levels, columns: Floats, further: Floats) -> Explained:
 
 
 def _drawn(model: FrfModel, start: Floats) -> Array:
-    """Points (points, parameters) from the priors of a mechanism's parameters, declared values as they are."""
-    own = model.parameters[: len(model.parameters) - len(start)]
-    if not own:
+    """Points (points, parameters) from the priors of a mechanism's parameters, declared values unchanged."""
+    mechanism_parameters = model.parameters[: len(model.parameters) - len(start)]
+    if not mechanism_parameters:
         return start[None, :]
-    share = qmc.Halton(len(own), scramble=False).random(_DRAWS + 1)[1:]  # the first is 0
-    points = [[parameter.quantile(float(one)) for parameter, one in zip(own, row, strict=True)] for row in share]
+    share = qmc.Halton(len(mechanism_parameters), scramble=False).random(_DRAWS + 1)[1:]  # the first is 0
+    points = [
+        [
+            parameter.quantile(float(probability))
+            for parameter, probability in zip(mechanism_parameters, row, strict=True)
+        ]
+        for row in share
+    ]
     return np.hstack([points, np.tile(start, (len(points), 1))])

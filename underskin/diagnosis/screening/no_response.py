@@ -1,11 +1,11 @@
-"""Recordings without a response above their own noise: a sensor that is dead, or not connected.
+"""Recordings without a response above their own noise: a sensor that is dead or not connected.
 
-The noise of a line is read from how much neighbouring lines differ, σ² = median |z_j+1 − z_j|²/(2 ln 2) of the complex
-values without a delay, which a resonance between a few of them does not reach.
-A recording shows no response where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which
-noise alone exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ². Nor does one
-whose charge does not follow the force, by its coherence, and is a small share of what the others let expect: noise that
-is strong at low frequencies, hum, or magnitudes without a phase, are larger in the mean than neighbours differ.
+The noise of a line is estimated from differences of neighbouring lines, σ² = median |z_j+1 − z_j|²/(2 ln 2), z being
+the complex values without delay; a resonance between a few lines does not affect it. A recording shows no response
+where its mean over n lines is within noise, n |mean|²/σ² < 9 (which noise alone exceeds once in 8000 recordings), and
+so are its lines, mean |z|² < 3 σ². Nor does one whose charge is incoherent with the force and is a small share of what
+the other recordings let expect: strong low-frequency noise, hum, or magnitudes without a phase exceed in the mean what
+neighbouring lines differ by.
 """
 
 from collections.abc import Sequence
@@ -20,60 +20,68 @@ from underskin.units import Complexes, Floats, Mask
 
 _LEAST_LINES = 4
 _MEAN, _LINES = 9.0, 3.0  # over their variance
-_WEAK = 0.1  # of the level to be expected: what a sensor without response in most recordings shows in the others
-_EXPECTED = 16.0  # of the response that the others let expect: only then is a recording without one left out
+_WEAK = 0.1  # of the expected level: largest level of a sensor without response in most of its recordings
+_EXPECTED = 16.0  # squared expected response over noise variance above which a recording without one is left out
 _INCOHERENT = 0.5  # γ² below which a line's noise is larger than its response
-_PLAIN = 0.1  # of the largest response that is expected: a smaller one is near a crossing of zero, and may be none
+_PLAIN = 0.1  # of the largest expected response: a smaller one is near a zero crossing, and may vanish
 
 
 def no_response(aligned: Sequence[Complexes]) -> tuple[Mask, Floats]:
-    """Which recordings show none, of the lines (lines,) [C/N] of each without a common delay (see `levels`), and the
-    variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
+    """Which recordings show no response, and the variance of each mean [(C/N)²], 0 where there are too few lines.
+
+    `aligned` holds the lines of each recording (lines,) [C/N] without the common delay (see `levels`).
+    """
     unresponsive, variance = np.zeros(len(aligned), dtype=bool), np.zeros(len(aligned))
-    for number, values in enumerate(aligned):
+    for index, values in enumerate(aligned):
         lines = values[np.isfinite(values)]
         if len(lines) < _LEAST_LINES:
             continue
         noise = float(np.median(np.abs(np.diff(lines)) ** 2)) / (2 * np.log(2.0))
-        variance[number] = noise / len(lines)
-        small_mean = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[number]
-        unresponsive[number] = small_mean and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
+        variance[index] = noise / len(lines)
+        small_mean = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[index]
+        unresponsive[index] = small_mean and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
     return unresponsive, variance
 
 
 def dead(
-    entries: Sequence[FrfRecording],
+    recordings: Sequence[FrfRecording],
     aligned: Sequence[Complexes],
     unresponsive: Mask,
     variance: Floats,
     expected: Floats,
 ) -> tuple[Mask, list[Finding]]:
-    """Which recordings show no response though the others predict a response well above their noise.
+    """Which recordings show no response where the others let expect one well above their noise.
 
-    Each is a finding of its own, or its sensor is one, where that shows none in most of its recordings and a weak
-    one in the others, which noise alone does.
+    Each is a finding, or its sensor is one where it shows no response in most of its recordings and only a weak one,
+    within noise, in the others.
     """
     level = np.array([float(np.abs(np.nanmean(values))) for values in aligned])
-    silent = unresponsive | (_incoherent(entries) & (level < _WEAK * expected))
+    silent = unresponsive | (_incoherent(recordings) & (level < _WEAK * expected))
     missing: Mask = silent & (expected**2 > _EXPECTED * variance)
     findings = []
-    sensors = np.array([entry.sensor for entry in entries])
+    sensors = np.array([recording.sensor for recording in recordings])
     for name in dict.fromkeys(sensors[missing].tolist()):
-        own = sensors == name
-        if own.sum() > 1 and 2 * missing[own].sum() > own.sum() and (missing | (level < _WEAK * expected))[own].all():
-            missing = missing | own
-            arguments = {"recordings": int(own.sum()), "sensor": name}
+        of_sensor = sensors == name
+        if (
+            of_sensor.sum() > 1
+            and 2 * missing[of_sensor].sum() > of_sensor.sum()
+            and (missing | (level < _WEAK * expected))[of_sensor].all()
+        ):
+            missing = missing | of_sensor
+            arguments = {"recordings": int(of_sensor.sum()), "sensor": name}
             findings.append(Finding(Reason.SILENT_SENSOR, "", "frf_re_pc_per_n", arguments))
             continue
-        missing &= ~own | (expected > _PLAIN * expected.max())
+        missing &= ~of_sensor | (expected > _PLAIN * expected.max())
         findings += [
-            Finding(Reason.SILENT_RECORDING, entries[number].id, "frf_re_pc_per_n")
-            for number in np.flatnonzero(missing & own).tolist()
+            Finding(Reason.SILENT_RECORDING, recordings[index].id, "frf_re_pc_per_n")
+            for index in np.flatnonzero(missing & of_sensor).tolist()
         ]
     return missing, findings
 
 
-def _incoherent(entries: Sequence[FrfRecording]) -> Mask:
-    """Whether the noise of most of a recording's lines is larger than their response; False where nothing tells."""
-    known = [lines_of(entry).coherence for entry in entries]
-    return np.array([one is not None and float(np.nanmedian(one)) < _INCOHERENT for one in known])
+def _incoherent(recordings: Sequence[FrfRecording]) -> Mask:
+    """Whether the noise of most of a recording's lines exceeds their response; False where the coherence is unknown."""
+    coherences = [lines_of(recording).coherence for recording in recordings]
+    return np.array(
+        [coherence is not None and float(np.nanmedian(coherence)) < _INCOHERENT for coherence in coherences]
+    )

@@ -1,25 +1,17 @@
-"""The course of each recording's phase over frequency, and the nearest one that a causal, stable sensor can have.
+"""Imported FRFs in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
 
-In the convention e^(+iωt) every element between force and charge has a logarithm ln H(iω) whose phase is tied to its
-magnitude: a high pass ln(iωτ/(1+iωτ)) leads where it attenuates, a relaxation −ln(iω) or 1/(1+iω/ω_s) lags where it
-falls, a resonance −ln(1−(ω/ω0)²+2iζω/ω0) lags above it, and a delay −iω only lags. Elements in a row add up with
-weights that are not negative, which a conjugated FRF contradicts.
+In the convention e^(+iωt) the phase of every causal, stable element between force and charge is tied to its magnitude:
+a high pass, −ln(1 + f_c/(if)), leads where it attenuates; a low pass, −ln(1 + if/f_c), and a relaxation,
+−n ln(if) + ln(1 + s/(1 + if/f_s)), lag where they fall; the resonance of a tip, −ln(1 − r² + 2iζr), lags above it; a
+delay of the charge, −iωt0 with t0 ≥ 0, only lags. Elements in series add up with weights that are not negative, which
+a conjugated FRF contradicts. Strengths have the catalogue's priors, so that no relaxation far below the band, of an
+unphysical size, can stand for a conjugated high pass.
 
-How near the listed mechanisms come to a course of ln FRF over frequency, in the convention e^(+iωt).
-
-ln H of a high pass is −ln(1 + f_c/(if)): it leads where it attenuates. A low pass, −ln(1 + if/f_c), lags where it does,
-and so does a relaxation, −n ln(if) + ln(1 + s/(1 + if/f_s)). A delay −iωt0 lags. The resonance of a tip on its contact,
-−ln(1 − r² + 2iζr), lags where it rises. A conjugated FRF contradicts each of them. Strengths have the catalogue's
-priors, so that no relaxation far below the band, of a size that nothing has, stands for a conjugated high pass; a delay
-is one of the charge, t0 ≥ 0.
-
-Imported FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
-
-Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them
-best the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the
-phases must be of two signs rather than a channel's own phase in each recording. Of all: the listed mechanisms explain
-the conjugated course (laws of the phase), and neither they nor a vibrating part the course as it is. Where a lag of the
-force channel explains the course as well, both readings are stated and nothing is changed.
+Some recordings: phase i is q_i = ±1 times one smooth phase φ. With the best signs the evidence must exceed that of
+equal signs by the cost of choosing k of n recordings, and the sizes of the phases must be of two signs rather than a
+channel's own phase in each recording. All recordings: the listed mechanisms explain the conjugate, and neither they
+nor a vibrating part explain the phase as it is. Where a lag of the force channel explains it as well, both readings are
+stated and nothing is changed.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -42,42 +34,42 @@ from underskin.units import Complexes, Floats, Indices, Mask
 
 _BANDS = 24  # of equal width in the logarithm of frequency
 _LEAST_LINES = 6
-_MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # pick-up has a phase of its own
-_STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: beside a zero the phase may turn either way
-_UNSURE = 6.0  # of a line's noise
-_WIDEST = 0.3  # rad, of a line's noise: beyond it a phase cannot be followed from line to line
-_SECOND = 0.6745 * np.sqrt(6.0)  # median of the size of second differences over the noise of a line
-_ENOUGH = 12  # second differences in a band, or in it and the two beside it on either side
+_MAINS_HZ, _NEAR_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # mains pick-up has its own phase
+_STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: near a zero the phase may step either way
+_UNSURE = 6.0  # times a line's noise
+_WIDEST = 0.3  # rad, noise of a line above which the phase cannot be unwrapped
+_SECOND = 0.6745 * np.sqrt(6.0)  # median magnitude of second differences over the noise of a line
+_ENOUGH = 12  # second differences in a band, or in it and its two neighbours on either side
 
 
 @dataclass(frozen=True)
-class PhaseCourses:
-    """ln FRF without its real mean, in bands of frequency (recordings, bands), NaN where there is no line or the lines
-    are too noisy; the polarity is taken off. `deviation` is the noise of each part."""
+class LogFrfBands:
+    """ln FRF in bands of frequency (recordings, bands), without its real mean and the polarity; NaN where there is no
+    line or the lines are too noisy. `deviation` is the noise of the real and of the imaginary part."""
 
     frequency: Floats  # (bands,)
     value: Complexes
     deviation: Floats
-    followed: Mask  # below where the way round of the phase is lost: at a zero of the response or a sharp resonance
+    followed: Mask  # below the first band where unwrapping is ambiguous: at a zero of the response or sharp resonance
 
     @property
     def telling(self) -> Mask:
-        """Whether a recording has a course at all (recordings,)."""
+        """Whether a recording has a value in any band (recordings,)."""
         return np.asarray(np.isfinite(self.value).any(axis=1))
 
 
-def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
-    """Those of recordings."""
-    measured = [lines_of(entry) for entry in entries]
-    lowest = min(float(own.frequency.min()) for own in measured)
-    highest = max(float(own.frequency.max()) for own in measured)
+def log_frf_bands(recordings: Sequence[FrfRecording]) -> LogFrfBands:
+    """The bands of ln FRF of recordings."""
+    measured = [lines_of(recording) for recording in recordings]
+    lowest = min(float(frf.frequency.min()) for frf in measured)
+    highest = max(float(frf.frequency.max()) for frf in measured)
     edges = np.geomspace(lowest * (1 - 1e-9), highest * (1 + 1e-9), _BANDS + 1)
-    value = np.full((len(entries), _BANDS), np.nan + 0j)
+    value = np.full((len(recordings), _BANDS), np.nan + 0j)
     followed = np.zeros(value.shape, dtype=bool)
-    share, noises = np.full((len(entries), _BANDS), np.nan), np.full(len(entries), np.nan)
+    share, noises = np.full((len(recordings), _BANDS), np.nan), np.full(len(recordings), np.nan)
     rough: list[tuple[Indices, Floats]] = []
-    for number, own in enumerate(measured):
-        frequency, lines = _usable(own)
+    for index, frf in enumerate(measured):
+        frequency, lines = _usable(frf)
         if len(lines) < _LEAST_LINES:
             continue
         logarithm = _logarithm(lines)
@@ -87,30 +79,30 @@ def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
             continue
         band = np.clip(np.searchsorted(edges, frequency) - 1, 0, _BANDS - 1)
         rough += [(part, second / noise) for part in (band[:-2], band[1:-1], band[2:])]
-        followed[number] = np.arange(_BANDS) < _lost(logarithm, band, noise)
+        followed[index] = np.arange(_BANDS) < _lost(logarithm, band, noise)
         count = np.bincount(band, minlength=_BANDS)
         with np.errstate(invalid="ignore", divide="ignore"):
             real, imaginary = (
                 np.bincount(band, weights=part, minlength=_BANDS) / count for part in (logarithm.real, logarithm.imag)
             )
-            share[number] = 1 / np.sqrt(count)
-        value[number] = real - np.nanmean(real) + 1j * imaginary
-        noises[number] = noise
+            share[index] = 1 / np.sqrt(count)
+        value[index] = real - np.nanmean(real) + 1j * imaginary
+        noises[index] = noise
     if rough:
         noises = np.maximum(noises, np.nanmedian(noises))
-    return PhaseCourses(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough), followed)
+    return LogFrfBands(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough), followed)
 
 
 def _usable(measured: Frf) -> tuple[Floats, Complexes]:
-    """Frequency and value of the lines that are not 0 and not beside mains, by frequency."""
-    beside = np.min(np.abs(np.subtract.outer(measured.frequency, _MAINS_HZ)), axis=1) < _BESIDE_MAINS_HZ
-    kept = ~beside & np.isfinite(measured.values) & (np.abs(measured.values) > 0)
-    return measured.frequency[kept], measured.values[kept]
+    """Frequency and value of the lines that are finite, not 0 and not near mains frequencies."""
+    near_mains = np.min(np.abs(np.subtract.outer(measured.frequency, _MAINS_HZ)), axis=1) < _NEAR_MAINS_HZ
+    usable = ~near_mains & np.isfinite(measured.values) & (np.abs(measured.values) > 0)
+    return measured.frequency[usable], measured.values[usable]
 
 
 def _lost(logarithm: Complexes, band: Indices, noise: float) -> int:
-    """The band from which on the way round of the phase is not known: where it steps beside a zero of the response, or
-    by half a turn but for the noise of a line."""
+    """The first band where unwrapping is ambiguous: the phase steps near a zero of the response, or by half a turn
+    within the noise of a line."""
     near_zero = np.minimum(logarithm.real[1:], logarithm.real[:-1]) < np.median(logarithm.real) + np.log(_FAINT)
     step = np.abs(np.diff(logarithm.imag))
     steps = np.flatnonzero((near_zero & (step > _STEP)) | (step > np.pi - _UNSURE * noise))
@@ -118,13 +110,13 @@ def _lost(logarithm: Complexes, band: Indices, noise: float) -> int:
 
 
 def _unevenness(rough: Sequence[tuple[Indices, Floats]]) -> Floats:
-    """How noisy each band is beside the whole (bands,), from second differences `rough` of both parts (2, lines) of all
-    recordings: those of the smoother part, since a resonance bends the other."""
+    """Noise of each band relative to all (bands,), from second differences `rough` of both parts (2, lines) of all
+    recordings, using the smoother part, since a resonance adds curvature to the other."""
     profile = np.ones(_BANDS)
     if not rough:
         return profile
-    band = np.concatenate([own for own, _ in rough])
-    second = np.concatenate([own for _, own in rough], axis=1)
+    band = np.concatenate([part for part, _ in rough])
+    second = np.concatenate([part for _, part in rough], axis=1)
     for number in range(_BANDS):
         chosen = np.abs(band - number) <= (0 if (band == number).sum() >= _ENOUGH else 2)
         if chosen.sum() >= _ENOUGH:
@@ -133,7 +125,7 @@ def _unevenness(rough: Sequence[tuple[Indices, Floats]]) -> Floats:
 
 
 def _logarithm(lines: Complexes) -> Complexes:
-    """ln of the lines, the phase followed from the lowest ones, where it is nearest to 0 but for the polarity."""
+    """ln of the lines, the phase unwrapped from the lowest ones, where it is near 0 but for the polarity."""
     phase = np.unwrap(np.angle(lines))
     start = np.pi * np.round(np.median(phase[: max(3, len(phase) // 8)]) / np.pi)
     return np.asarray(np.log(np.abs(lines)) + 1j * (phase - start))
@@ -142,16 +134,16 @@ def _logarithm(lines: Complexes) -> Complexes:
 _CHANNEL_DEVIATION, _IDEALISED = (
     1.5e-3,
     0.08,
-)  # of ln H: what channels differ by, and the share by which a real course departs
-_TOLERANCE, _FARTHEST = 1e-3, 30.0  # of a fit, and of its logarithms
-_COST = 5.0  # of χ², for each of them
+)  # of ln H: difference between channels, and relative departure of a real FRF from the laws
+_TOLERANCE, _FARTHEST = 1e-3, 30.0  # of a fit, and the bound of its logarithms
+_COST = 5.0  # of χ², for each law
 
 
 @dataclass(frozen=True)
 class _Law:
-    """ln H(f; fit, spread), where fit starts, and the centre and the deviation of the prior of each parameter.
+    """ln H(f; fit, spread), starting points of `fit`, and centre and deviation of the prior of each parameter.
 
-    `spread` are the contacts' natural frequencies over the usual one.
+    `spread` holds the contacts' natural frequencies over the median one.
     """
 
     value: Callable[[Floats, Floats, Floats], Complexes]
@@ -197,8 +189,8 @@ def _loose_part(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
 
 _DELAY = _Law(_delay, lambda f: ((1e4 / f[-1],),), (0.0,), (300.0,))
 _LEAD = replace(_DELAY, value=_lead)
-# As the mechanisms' own files have them: corner 0.5 Hz, upper corner 300 Hz, n 0.08, s 0.4 at 20 Hz, 300 µs, ζ 0.05.
-# Where a tip resonates depends on contact and mass, 1 kHz within a factor of 10.
+# As in the mechanisms' files: corner 0.5 Hz, upper corner 300 Hz, n 0.08, s 0.4 at 20 Hz, 300 µs, ζ 0.05.
+# The resonance of a tip depends on contact and mass: 1 kHz within a factor of 10.
 _LAWS: Mapping[str, _Law] = {
     "amplifier_high_pass": _Law(
         _high_pass, lambda f: ((np.log(f[0] / 20),), (np.log(f[0]),)), (-0.7,), (1.5,)
@@ -220,8 +212,8 @@ _LAWS: Mapping[str, _Law] = {
         (2.3, 1.0),
     ),
 }  # fmt: skip
-# A part that vibrates inside the band, as of a cable or a loose screw, or a notch: 1 + (A r² + B r)/(r² + 2ζr + 1),
-# r = if/f1. No mechanism lists it, so that it may be of either sign.
+# A part that vibrates within the band, such as a cable or a loose screw, or a notch: 1 + (A r² + B r)/(r² + 2ζr + 1),
+# r = if/f1. It is unlisted, so that it may be of either sign.
 _UNLISTED = _Law(
     _loose_part,
     lambda f: tuple((np.log(f[0]) + share * np.log(f[-1] / f[0]), -1.0, size, 0.0)
@@ -232,9 +224,9 @@ _UNLISTED = _Law(
 
 
 @dataclass(frozen=True)
-class Course:
-    """A course of ln FRF (bands,), real part and phase each with its deviation; the natural frequencies (any number,)
-    of the contacts behind it over the usual one."""
+class LogFrf:
+    """ln FRF over frequency (bands,), real part and phase each with its deviation, and the natural frequencies (any
+    number,) of the contacts over the median one."""
 
     frequency: Floats
     value: Complexes
@@ -242,129 +234,136 @@ class Course:
     spread: Floats
 
     @property
-    def conjugated(self) -> "Course":
-        """The same in the other convention."""
-        return Course(self.frequency, self.value.conj(), self.deviation, self.spread)
+    def conjugated(self) -> "LogFrf":
+        """The same in the other sign convention."""
+        return LogFrf(self.frequency, self.value.conj(), self.deviation, self.spread)
 
 
 class Lead(NamedTuple):
-    """χ² of the nearest course with a lag of the force channel, as `misfit`, and that lag [µs]."""
+    """χ² of the best fit with a lag of the force channel, as `misfit`, and that lag [µs]."""
 
     misfit: float
     lag_us: float
 
 
-def misfit(course: Course) -> float:
-    """χ² of the nearest course that at most two mechanisms give, with what their priors and their number cost."""
-    alone = {name: _nearest(course, (law,))[0] for name, law in _LAWS.items()}
-    first = min(alone, key=lambda name: alone[name])
-    pairs = [_nearest(course, (_LAWS[first], law))[0] for name, law in _LAWS.items() if name != first]
-    return min(_nearest(course, ())[0], alone[first], *pairs)
+def misfit(log_frf: LogFrf) -> float:
+    """χ² of the best fit of at most two mechanisms, including the costs of their priors and number."""
+    single = {name: _nearest(log_frf, (law,))[0] for name, law in _LAWS.items()}
+    first = min(single, key=lambda name: single[name])
+    pairs = [_nearest(log_frf, (_LAWS[first], law))[0] for name, law in _LAWS.items() if name != first]
+    return min(_nearest(log_frf, ())[0], single[first], *pairs)
 
 
-def leading(course: Course) -> Lead:
-    """The nearest course of a lag of the force channel, alone or beside one mechanism."""
-    beside = [(), *((law,) for law in _LAWS.values() if law is not _DELAY)]
-    chi2, fit = min((_nearest(course, (_LEAD, *laws)) for laws in beside), key=lambda one: one[0])
+def leading(log_frf: LogFrf) -> Lead:
+    """The best fit of a lag of the force channel, alone or with one mechanism."""
+    combinations = [(), *((law,) for law in _LAWS.values() if law is not _DELAY)]
+    chi2, fit = min((_nearest(log_frf, (_LEAD, *laws)) for laws in combinations), key=lambda nearest: nearest[0])
     return Lead(chi2, abs(float(fit[0])))
 
 
-def unlisted_misfit(course: Course) -> float:
-    """χ² of the nearest course that a vibrating part or a notch gives, with the same costs."""
-    return _nearest(course, (_UNLISTED,))[0]
+def unlisted_misfit(log_frf: LogFrf) -> float:
+    """χ² of the best fit of a vibrating part or a notch, with the same costs."""
+    return _nearest(log_frf, (_UNLISTED,))[0]
 
 
-def _nearest(course: Course, laws: tuple[_Law, ...]) -> tuple[float, Floats]:
-    """χ² with its costs, and the parameters of the laws."""
+def _nearest(log_frf: LogFrf, laws: tuple[_Law, ...]) -> tuple[float, Floats]:
+    """χ² of the best fit including its costs, and the parameters of the laws."""
     ends = np.cumsum([0, *(len(law.centre) for law in laws)])
     centre = np.concatenate([[], *(law.centre for law in laws)])
     deviation = np.concatenate([[], *(law.deviation for law in laws)])
-    size = _IDEALISED * np.abs(course.value)
+    size = _IDEALISED * np.abs(log_frf.value)
     weight = [
         1 / np.hypot(np.hypot(part, _CHANNEL_DEVIATION), size)
-        for part in (course.deviation.real, course.deviation.imag)
+        for part in (log_frf.deviation.real, log_frf.deviation.imag)
     ]
     level = weight[0] ** 2 / (weight[0] ** 2).sum()
 
     def residual(fit: Floats) -> Floats:
-        left = course.value - sum(
-            law.value(course.frequency, fit[first:last], course.spread)
+        difference = log_frf.value - sum(
+            law.value(log_frf.frequency, fit[first:last], log_frf.spread)
             for law, first, last in zip(laws, ends, ends[1:], strict=False)
         )
-        parts = [(left.real - level @ left.real) * weight[0], left.imag * weight[1], (fit - centre) / deviation]
+        parts = [
+            (difference.real - level @ difference.real) * weight[0],
+            difference.imag * weight[1],
+            (fit - centre) / deviation,
+        ]
         return np.concatenate(parts)
 
     if not laws:
         return float((residual(np.zeros(0)) ** 2).sum()), np.zeros(0)
-    starts = [np.concatenate(start) for start in product(*(law.starts(course.frequency) for law in laws))]
+    starts = [np.concatenate(start) for start in product(*(law.starts(log_frf.frequency) for law in laws))]
     fitted = (least_squares(residual, start, method="lm", ftol=_TOLERANCE, xtol=_TOLERANCE) for start in starts)
-    best = min(fitted, key=lambda one: float(one.cost))
+    best = min(fitted, key=lambda solution: float(solution.cost))
     return float(2 * best.cost) + _COST * len(laws), best.x
 
 
-_LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
-_LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more
-_RELAXATIONS, _COEFFICIENT = 4, 0.1  # of a smooth course, and the prior standard deviation of its terms [rad]
+_LEAST = 3  # recordings with a phase, so that some can contradict the others
+_LARGEST = 0.7  # rad: limit that reduces the weight of sharp resonances, whose frequency differs between recordings
+_RELAXATIONS, _COEFFICIENT = 4, 0.1  # terms of a smooth phase, and the prior standard deviation of each [rad]
 _PLAIN_SIGNS = 9.0  # of ln likelihood: about one campaign in a hundred has conjugated recordings
-_OVER_CHANNELS = 6.0  # of ln likelihood: that of channels is ten times as frequent
+_OVER_CHANNELS = 6.0  # of ln likelihood: phases of channels are ten times as frequent
 _CHANNEL = tuple(np.array([0.0, 0.5, 1, 2, 4, 8, 16]) * 1e-3)  # rad, a channel's own phase
 _USUAL_CHANNEL = 3e-3
-_VARIED = (0.0, 0.2, 0.5, 1.0)  # of the mean course: what contacts differ by
-_STRAY, _STRAY_SIZE = 0.05, 3.0  # share of recordings of any phase, and how large, of the mean course
-_PLAIN = 14.0  # χ² by which the listed mechanisms explain the one orientation better
+_VARIED = (0.0, 0.2, 0.5, 1.0)  # of the mean phase: variation between contacts
+_STRAY, _STRAY_SIZE = 0.05, 3.0  # share of recordings of any phase, and its size over the mean phase
+_PLAIN = 14.0  # χ² by which the listed mechanisms must explain one orientation better
 _RARER = 10.0  # χ² by which an unlisted part must explain it better, since it is rarer
 _STILL = 1.5e-3  # rad
-_QUANTILES = np.linspace(0.0625, 0.9375, 8)  # of the contacts' natural frequencies, which go as (force · radius)^(1/6)
+_QUANTILES = np.linspace(0.0625, 0.9375, 8)  # of the contacts' natural frequencies, ∝ (force · radius)^(1/6)
 
 
-def in_one_convention(
-    entries: Sequence[FrfRecording], imported: Collection[str]
+def in_common_convention(
+    recordings: Sequence[FrfRecording], imported: Collection[str]
 ) -> tuple[list[FrfRecording], list[Finding]]:
-    """The recordings with conjugated ones put right, and the finding on them; of those `imported` as FRFs (ids) alone:
-    FRFs that were computed here are in the convention."""
-    foreign, findings = _in_one_convention([entry for entry in entries if entry.id in imported])
-    right = {entry.id: entry for entry in foreign}
-    return [right.get(entry.id, entry) for entry in entries], findings
+    """The recordings with conjugated ones corrected, and the finding; among those `imported` as FRFs (ids) only, since
+    FRFs computed here are in the convention."""
+    foreign, findings = _conjugation_undone([recording for recording in recordings if recording.id in imported])
+    right = {recording.id: recording for recording in foreign}
+    return [right.get(recording.id, recording) for recording in recordings], findings
 
 
-def _in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
-    if not entries:
+def _conjugation_undone(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
+    if not recordings:
         return [], []
-    courses = phase_courses(entries)
-    if not courses.telling.any():
-        return list(entries), []
-    signs = _aligned(courses)
-    orientation, lag_us = _orientation(entries, courses, signs)
+    bands = log_frf_bands(recordings)
+    if not bands.telling.any():
+        return list(recordings), []
+    signs = _aligned(bands)
+    orientation, lag_us = _orientation(recordings, bands, signs)
     findings = list[Finding]()
-    if orientation == 0:  # both may be: most recordings decide
+    if orientation == 0:  # undecided: the majority of recordings decides
         orientation = 1 if (signs < 0).sum() <= (signs > 0).sum() else -1
         if lag_us is not None and orientation == 1:
             findings.append(Finding(Reason.ALL_CONJUGATED, "", "frf_im_pc_per_n", {"lag_us": lag_us}))
     turned = orientation * signs < 0
     if not turned.any():
-        return list(entries), findings
-    ids = [entry.id for entry, wrong in zip(entries, turned, strict=True) if wrong]
-    if turned[courses.telling].all():
-        turned = np.ones(len(entries), dtype=bool)
+        return list(recordings), findings
+    ids = [recording.id for recording, wrong in zip(recordings, turned, strict=True) if wrong]
+    if turned[bands.telling].all():
+        turned = np.ones(len(recordings), dtype=bool)
         findings.append(Finding(Reason.ALL_CONJUGATED, "", "frf_im_pc_per_n", {"lag_us": None}))
     else:
-        arguments = {"conjugated": ids, "recordings": len(entries)}
+        arguments = {"conjugated": ids, "recordings": len(recordings)}
         about = ids[0] if len(ids) == 1 else ""
         findings.append(Finding(Reason.RECORDINGS_CONJUGATED, about, "frf_im_pc_per_n", arguments))
-    return [_conjugated(entry) if wrong else entry for entry, wrong in zip(entries, turned, strict=True)], findings
+    return [
+        _conjugated(recording) if wrong else recording for recording, wrong in zip(recordings, turned, strict=True)
+    ], findings
 
 
-def _aligned(courses: PhaseCourses) -> Floats:
-    """±1 of each recording (recordings,), all 1 where nothing contradicts; 0 where it tells no phase."""
-    telling = courses.telling
+def _aligned(bands: LogFrfBands) -> Floats:
+    """The sign ±1 of each recording's phase (recordings,): all 1 where none contradicts the others, 0 without a
+    phase."""
+    telling = bands.telling
     same = telling.astype(float)
     if telling.sum() < _LEAST:
         return same
-    phase, weight = _phases(courses)
-    smooth = _SmoothCourse(courses.frequency, weight)
+    phase, weight = _phases(bands)
+    smooth = _SmoothPhase(bands.frequency, weight)
     signs = _leading_signs(phase, weight) * same
     for _ in range(10):
-        better = np.where(_along(phase, weight, smooth.of(phase, signs)) < 0, -1.0, 1.0) * same
+        better = np.where(_projection(phase, weight, smooth.of(phase, signs)) < 0, -1.0, 1.0) * same
         if (better == signs).all():
             break
         signs = better
@@ -376,9 +375,9 @@ def _aligned(courses: PhaseCourses) -> Floats:
     return signs if _of_two_signs(phase, weight, signs) > _OVER_CHANNELS else same
 
 
-class _SmoothCourse:
-    """One phase over frequency, times the sign of each recording: a sum of what delay, loss, relaxation and high pass
-    do, of normal coefficients."""
+class _SmoothPhase:
+    """A smooth phase over frequency, times the sign of each recording: a sum of the phases of delay, loss, relaxation
+    and high pass with normal coefficients."""
 
     def __init__(self, frequency: Floats, weight: Floats) -> None:
         ratio = frequency[:, None] / np.geomspace(frequency[0], frequency[-1], _RELAXATIONS)
@@ -388,11 +387,11 @@ class _SmoothCourse:
         self.information = self.shapes.T @ (weight.sum(axis=0)[:, None] * self.shapes) + np.eye(self.shapes.shape[1])
 
     def of(self, phase: Floats, signs: Floats) -> Floats:
-        """The course (bands,) of phases (recordings, bands) and signs (recordings,)."""
+        """The phase (bands,) from phases (recordings, bands) and signs (recordings,)."""
         return np.asarray(self.shapes @ np.linalg.solve(self.information, self._pull(phase, signs)))
 
     def evidence(self, phase: Floats, signs: Floats) -> float:
-        """Its logarithm, over that of no phase."""
+        """ln evidence, relative to no phase."""
         pull = self._pull(phase, signs)
         explained = float(pull @ np.linalg.solve(self.information, pull))
         return 0.5 * (explained - float(np.linalg.slogdet(self.information)[1]))
@@ -402,32 +401,35 @@ class _SmoothCourse:
 
 
 def _of_two_signs(phase: Floats, weight: Floats, signs: Floats) -> float:
-    """ln likelihood of courses ±1 times the mean one, over that of one course and a channel's own phase in each
-    recording, a few of them stray."""
-    course = _mean(phase, weight, signs)
-    information = (weight * course**2).sum(axis=1)
-    told = (signs != 0) & (information > 0)
-    amplitude, variance = _along(phase, weight, course)[told] / information[told], 1 / information[told]
-    size = np.sqrt((weight * course**2).sum() / weight.sum())
-    share = min((signs[told] < 0).mean(), (signs[told] > 0).mean())
+    """ln likelihood of phases ±1 times the mean, relative to one phase plus a channel's own in each recording; in both
+    a few recordings are stray."""
+    mean_phase = _mean(phase, weight, signs)
+    information = (weight * mean_phase**2).sum(axis=1)
+    informative = (signs != 0) & (information > 0)
+    amplitude, variance = (
+        _projection(phase, weight, mean_phase)[informative] / information[informative],
+        1 / information[informative],
+    )
+    size = np.sqrt((weight * mean_phase**2).sum() / weight.sum())
+    share = min((signs[informative] < 0).mean(), (signs[informative] > 0).mean())
     usual = 1.0 if (signs < 0).sum() < (signs > 0).sum() else -1.0
     stray = np.log(_STRAY) + norm.logpdf(amplitude, 0.0, _STRAY_SIZE)
-    apart, alike = [], []
-    for own, varied in product(_CHANNEL, _VARIED):
-        spread = np.sqrt(variance + (own / size) ** 2)
-        one, other = (_log_density(sign * usual * amplitude, spread, varied) for sign in (1, -1))
+    two_signs, one_sign = [], []
+    for channel, varied in product(_CHANNEL, _VARIED):
+        spread = np.sqrt(variance + (channel / size) ** 2)
+        same, opposite = (_log_density(sign * usual * amplitude, spread, varied) for sign in (1, -1))
         mean = float(np.average(amplitude, weights=spread**-2))
-        shifted = norm.logpdf(amplitude, mean, np.hypot(spread, varied)) if varied < 1 else one
-        either = np.logaddexp(np.log1p(-share) + one, np.log(share) + other)
-        prior = -0.5 * (own / _USUAL_CHANNEL) ** 2
-        apart.append(prior + float(np.logaddexp(either + np.log1p(-_STRAY), stray).sum()))
-        alike.append(prior + float(np.logaddexp(shifted + np.log1p(-_STRAY), stray).sum()))
-    return max(apart) - max(alike)
+        shifted = norm.logpdf(amplitude, mean, np.hypot(spread, varied)) if varied < 1 else same
+        either = np.logaddexp(np.log1p(-share) + same, np.log(share) + opposite)
+        prior = -0.5 * (channel / _USUAL_CHANNEL) ** 2
+        two_signs.append(prior + float(np.logaddexp(either + np.log1p(-_STRAY), stray).sum()))
+        one_sign.append(prior + float(np.logaddexp(shifted + np.log1p(-_STRAY), stray).sum()))
+    return max(two_signs) - max(one_sign)
 
 
 def _log_density(amplitude: Floats, spread: Floats, varied: float) -> Floats:
-    """Of amplitudes near 1 that contacts vary by `varied`, or if that is 1 by an exponential law, and of noise
-    `spread`."""
+    """Log density of amplitudes near 1 that vary by `varied` between contacts, or exponentially if that is 1, with
+    noise `spread`."""
     if varied < 1:
         return np.asarray(norm.logpdf(amplitude, 1.0, np.hypot(spread, varied)))
     size = float(np.abs(amplitude).mean())
@@ -435,54 +437,54 @@ def _log_density(amplitude: Floats, spread: Floats, varied: float) -> Floats:
     return np.asarray(ratio**2 / 2 - amplitude / size - np.log(size) + log_ndtr(amplitude / spread - ratio))
 
 
-def _orientation(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> tuple[int, float | None]:
-    """1 where the listed mechanisms explain the aligned course and not its conjugate, −1 where they explain that and
-    neither an unlisted part nor a lag of the force channel explains the course itself, 0 where both may be; and that
-    lag [µs] where it is the other explanation."""
-    course = _mean_course(entries, courses, signs)
-    phase = course.value.imag / np.hypot(course.deviation.imag, _STILL)
+def _orientation(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: Floats) -> tuple[int, float | None]:
+    """1 where the listed mechanisms explain the aligned phase and not its conjugate; −1 where they explain the
+    conjugate, and neither an unlisted part nor a lag of the force channel explains the phase itself; 0 where both are
+    possible. Second, that lag [µs] where it is the alternative."""
+    log_frf = _mean_log_frf(recordings, bands, signs)
+    phase = log_frf.value.imag / np.hypot(log_frf.deviation.imag, _STILL)
     if phase @ phase < len(phase) + _PLAIN:
         return 0, None
-    given, turned = misfit(course), misfit(course.conjugated)
+    given, turned = misfit(log_frf), misfit(log_frf.conjugated)
     if turned - given > _PLAIN:
         return 1, None
-    if given - turned <= _PLAIN or turned - unlisted_misfit(course) >= _RARER:
+    if given - turned <= _PLAIN or turned - unlisted_misfit(log_frf) >= _RARER:
         return 0, None
-    lead = leading(course)
+    lead = leading(log_frf)
     if turned - lead.misfit > _PLAIN:
         return 1, None
     return (-1, None) if lead.misfit - turned > _PLAIN else (0, lead.lag_us)
 
 
-def _mean_course(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> Course:
-    """The mean of the aligned courses; its deviation is the recordings' own noise, or their scatter if larger."""
-    aligned = np.where(signs[:, None] < 0, courses.value.conj(), courses.value)
-    known = np.isfinite(aligned) & np.isfinite(courses.deviation) & courses.followed
-    weight = np.where(known, courses.deviation, np.inf) ** -2.0
-    aligned = np.where(known, aligned, 0.0)
+def _mean_log_frf(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: Floats) -> LogFrf:
+    """The mean of the aligned ln FRFs; its deviation is from the recordings' noise, or their scatter if larger."""
+    aligned = np.where(signs[:, None] < 0, bands.value.conj(), bands.value)
+    usable = np.isfinite(aligned) & np.isfinite(bands.deviation) & bands.followed
+    weight = np.where(usable, bands.deviation, np.inf) ** -2.0
+    aligned = np.where(usable, aligned, 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        own = total**-0.5
+        noise = total**-0.5
         mean = (weight * aligned).sum(axis=0) / total
-        parts = [np.sqrt((weight * part**2).sum(axis=0) / total / known.sum(axis=0)) for part in (
+        parts = [np.sqrt((weight * part**2).sum(axis=0) / total / usable.sum(axis=0)) for part in (
             (aligned - mean).real, (aligned - mean).imag)]  # fmt: skip
-    real, imaginary = (np.maximum(own, part) for part in parts)
+    real, imaginary = (np.maximum(noise, part) for part in parts)
     used = total > 0
-    natural = np.array([(entry.preload_n * entry.indenter_radius_mm) ** (1 / 6) for entry in entries])
+    natural = np.array([(recording.preload_n * recording.indenter_radius_mm) ** (1 / 6) for recording in recordings])
     spread = np.quantile(natural / np.median(natural), _QUANTILES)
-    return Course(courses.frequency[used], mean[used], (real + 1j * imaginary)[used], spread)
+    return LogFrf(bands.frequency[used], mean[used], (real + 1j * imaginary)[used], spread)
 
 
-def _phases(courses: PhaseCourses) -> tuple[Floats, Floats]:
-    """Phase and weight (recordings, bands) [rad, rad⁻²], 0 where there is none."""
-    known = np.isfinite(courses.value) & np.isfinite(courses.deviation) & courses.followed
-    phase = np.clip(np.where(known, courses.value, 0).imag, -_LARGEST, _LARGEST)
-    return phase, np.where(known, courses.deviation, np.inf) ** -2.0
+def _phases(bands: LogFrfBands) -> tuple[Floats, Floats]:
+    """Phase [rad] and weight [rad⁻²] (recordings, bands), 0 where there is none."""
+    usable = np.isfinite(bands.value) & np.isfinite(bands.deviation) & bands.followed
+    phase = np.clip(np.where(usable, bands.value, 0).imag, -_LARGEST, _LARGEST)
+    return phase, np.where(usable, bands.deviation, np.inf) ** -2.0
 
 
 def _leading_signs(phase: Floats, weight: Floats) -> Floats:
-    left, _, _ = np.linalg.svd(phase * np.sqrt(weight), full_matrices=False)
-    return np.where(left[:, 0] * np.sign(left[:, 0].sum() or 1.0) < 0, -1.0, 1.0)
+    vectors, _, _ = np.linalg.svd(phase * np.sqrt(weight), full_matrices=False)
+    return np.where(vectors[:, 0] * np.sign(vectors[:, 0].sum() or 1.0) < 0, -1.0, 1.0)
 
 
 def _mean(phase: Floats, weight: Floats, signs: Floats) -> Floats:
@@ -490,10 +492,10 @@ def _mean(phase: Floats, weight: Floats, signs: Floats) -> Floats:
     return np.asarray((signs[:, None] * weight * phase).sum(axis=0) / np.where(total > 0, total, 1.0))
 
 
-def _along(phase: Floats, weight: Floats, course: Floats) -> Floats:
-    return np.asarray((weight * phase * course).sum(axis=1))
+def _projection(phase: Floats, weight: Floats, mean_phase: Floats) -> Floats:
+    return np.asarray((weight * phase * mean_phase).sum(axis=1))
 
 
-def _conjugated(entry: FrfRecording) -> FrfRecording:
-    assert entry.frf_im_pc_per_n is not None
-    return replace(entry, frf_im_pc_per_n=-entry.frf_im_pc_per_n)
+def _conjugated(recording: FrfRecording) -> FrfRecording:
+    assert recording.frf_im_pc_per_n is not None
+    return replace(recording, frf_im_pc_per_n=-recording.frf_im_pc_per_n)

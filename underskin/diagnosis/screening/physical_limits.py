@@ -1,5 +1,6 @@
-"""Numbers beyond any instrument and any skin (`recordings/campaign.py`): a recording that holds one is left out;
-where the skin has one, nothing can be concluded.
+"""Numbers beyond any instrument or skin (`recordings/campaign.py`).
+
+A recording that holds one is left out; where the skin does, nothing can be concluded.
 """
 
 from collections.abc import Iterator
@@ -16,23 +17,26 @@ _WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below
 
 
 def without_extremes(campaign: Campaign) -> Inspected:
-    """The campaign without recordings that hold such numbers, each a finding; `lacking` where its skin does."""
-    of_skin = _of_skin(campaign.skin, any(isinstance(entry, FrfRecording) for entry in campaign.recordings))
+    """The campaign without recordings that hold impossible numbers, each a finding; `lacking` where its skin does."""
+    of_skin = _of_skin(campaign.skin, any(isinstance(recording, FrfRecording) for recording in campaign.recordings))
     if of_skin:
-        arguments = {"fields": [entry.field for entry in of_skin], "confirmable": False}
+        arguments = {"fields": [finding.field for finding in of_skin], "confirmable": False}
         return Inspected(replace(campaign, recordings=()), of_skin, Lacking(Lack.IMPOSSIBLE_DECLARATION, arguments))
     findings, usable = [], []
-    for entry in campaign.recordings:
-        wrong = [*_found(entry, Reason.IMPOSSIBLE_RECORDING, entry.id)]
+    for recording in campaign.recordings:
+        wrong = [*_excess_findings(recording, Reason.IMPOSSIBLE_RECORDING, recording.id)]
         findings += wrong
-        usable += [] if wrong else [entry]
+        usable += [] if wrong else [recording]
     lacking = None if usable else Lacking(Lack.NO_RECORDING)
     return Inspected(replace(campaign, recordings=tuple(usable)), findings, lacking)
 
 
 def _of_skin(skin: SkinDescription, has_frf: bool) -> list[Finding]:
-    """Of the skin's fields; the sensors' size is of use to FRFs alone."""
-    findings = [replace(found, field=f"skin.{found.field}") for found in _found(skin, Reason.IMPOSSIBLE_SKIN, "")]
+    """Findings on the skin's fields; the sensors' size matters for FRFs only."""
+    findings = [
+        replace(finding, field=f"skin.{finding.field}")
+        for finding in _excess_findings(skin, Reason.IMPOSSIBLE_SKIN, "")
+    ]
     thickness, radius = skin.thickness_mm, skin.sensor_radius_mm
     if has_frf and thickness and radius and radius > _WIDEST_SENSOR * thickness:
         arguments = {"radius_mm": radius, "thicknesses": _WIDEST_SENSOR}
@@ -40,7 +44,7 @@ def _of_skin(skin: SkinDescription, has_frf: bool) -> list[Finding]:
     return findings
 
 
-def _found(model: Any, reason: Reason, recording: str) -> Iterator[Finding]:
+def _excess_findings(model: Any, reason: Reason, recording: str) -> Iterator[Finding]:
     for excess in excesses(model):
         arguments = {"largest": excess.largest, "low": excess.low, "high": excess.high}
         yield Finding(reason, recording, excess.field, arguments)

@@ -1,7 +1,7 @@
-"""Two sensors that fall silent together while others answer.
+"""Two sensors that stop responding together while others respond.
 
-Their cables may be exchanged, so that each was recorded while the other one was pressed. A connector or an amplifier
-that they share may as well have failed: they answer nothing, so that nothing tells which.
+Either their cables are exchanged, so that each was recorded while the other was pressed, or a connector or amplifier
+that they share has failed. As neither gives a response, the recordings cannot tell which.
 """
 
 from collections.abc import Sequence
@@ -15,33 +15,33 @@ from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.axes import recording_order
 from underskin.recordings.campaign import FrfRecording
 
-_FEWEST = 2  # silent recordings of each of them
+_FEWEST = 2  # silent recordings of each of the two sensors
 
 
-def without_silent_pair(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
-    """The recordings without those since two sensors show no response, and the finding on it."""
-    since = _silent_since(entries)
+def without_silent_pair(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
+    """The recordings without those of two sensors since they show no response, and the finding."""
+    since = _silent_since(recordings)
     if not since:
-        return list(entries), []
-    first, second = sorted({entries[number].sensor for number in since})
-    arguments = {"first": first, "second": second, "since": entries[since[0]].id, "recordings": len(since)}
-    left = [entry for number, entry in enumerate(entries) if number not in since]
-    return left, [Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)]
+        return list(recordings), []
+    first, second = sorted({recordings[index].sensor for index in since})
+    arguments = {"first": first, "second": second, "since": recordings[since[0]].id, "recordings": len(since)}
+    remaining = [recording for index, recording in enumerate(recordings) if index not in since]
+    return remaining, [Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)]
 
 
-def _silent_since(entries: Sequence[FrfRecording]) -> list[int]:
-    """The recordings, in time, of the two sensors that answer until some recording and never since, where others do;
-    none where not two do so."""
-    silent, _ = no_response(aligned_lines(entries))
-    order = np.argsort(recording_order(entries), kind="stable").tolist()
+def _silent_since(recordings: Sequence[FrfRecording]) -> list[int]:
+    """The recordings, in time, of two sensors since both stopped responding while others respond; empty where these
+    are not exactly two."""
+    silent, _ = no_response(aligned_lines(recordings))
+    order = np.argsort(recording_order(recordings), kind="stable").tolist()
     falling = set[str]()
-    for name in {entry.sensor for entry in entries}:
-        answers = [bool(~silent[number]) for number in order if entries[number].sensor == name]
+    for name in {recording.sensor for recording in recordings}:
+        answers = [bool(~silent[index]) for index in order if recordings[index].sensor == name]
         if answers[0] and not any(answers[-_FEWEST:]) and answers == sorted(answers, reverse=True):
             falling.add(name)
     if len(falling) != 2:
         return []
-    own = [number for number in order if entries[number].sensor in falling]
-    since = own[int((~silent[own]).sum()) :]
-    others = [number for number in order[order.index(since[0]) :] if number not in own]
+    of_pair = [index for index in order if recordings[index].sensor in falling]
+    since = of_pair[int((~silent[of_pair]).sum()) :]
+    others = [index for index in order[order.index(since[0]) :] if index not in of_pair]
     return since if silent[since].all() and others and not silent[others].any() else []

@@ -1,7 +1,6 @@
-"""Slips of units among the recordings: a force in kN, a sphere in m or a frequency in kHz beside the others.
+"""Wrong units among the recordings: a force in kN, a sphere in m or a frequency in kHz where others are not.
 
-A recording with a single such value is left out. Where the forces of all recordings contradict each other, that is a
-finding.
+A recording with a single such value is left out. A dynamic force that is far too small in all recordings is a finding.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,15 +14,15 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Mask
 
-_SLIP, _WITHIN = 1000.0, 3.0  # a value is back among the others, within this factor, once the slip is undone
-_ALONE = 0.25  # of the recordings at most, or one of three
-_FEW = 4  # recordings below which the others must agree, each within the same factor
+_SLIP, _WITHIN = 1000.0, 3.0  # a corrected value must be within this factor of the others
+_MOST_SHARE = 0.25  # of the recordings at most, or one of three
+_FEW = 4  # recordings below which the others must agree within the same factor
 _FAINT = 5e-4  # dynamic force over preload
 
 
 @dataclass(frozen=True)
 class _Field:
-    """A field whose values can be held against each other, and the units that its slips come from."""
+    """A field whose values are compared between recordings, and the units that cause its errors."""
 
     name: str
     of: Callable[[FrfRecording], float]
@@ -32,41 +31,41 @@ class _Field:
 
 
 _FIELDS = (
-    _Field("preload_n", lambda entry: entry.preload_n, "mN", "kN"),
-    _Field("dynamic_force_n", lambda entry: entry.dynamic_force_n, "mN", "kN"),
-    _Field("indenter_radius_mm", lambda entry: entry.indenter_radius_mm, "µm", "m"),
-    _Field("frequency_hz", lambda entry: float(np.median(lines_of(entry).frequency)), "mHz", "kHz"),
+    _Field("preload_n", lambda recording: recording.preload_n, "mN", "kN"),
+    _Field("dynamic_force_n", lambda recording: recording.dynamic_force_n, "mN", "kN"),
+    _Field("indenter_radius_mm", lambda recording: recording.indenter_radius_mm, "µm", "m"),
+    _Field("frequency_hz", lambda recording: float(np.median(lines_of(recording).frequency)), "mHz", "kHz"),
 )
 
 
-def single_unit_errors(entries: Sequence[FrfRecording]) -> tuple[Mask, list[Finding]]:
-    """Which recordings have a value about 1000 × off all others, and the findings on them."""
-    off = np.zeros(len(entries), dtype=bool)
+def single_unit_errors(recordings: Sequence[FrfRecording]) -> tuple[Mask, list[Finding]]:
+    """Which recordings have a value off all others by a factor of about 1000, and the findings on them."""
+    off = np.zeros(len(recordings), dtype=bool)
     findings: list[Finding] = []
-    if not entries:
+    if not recordings:
         return off, findings
     for field in _FIELDS:
-        values = np.array([field.of(entry) for entry in entries])
+        values = np.array([field.of(recording) for recording in recordings])
         usual = float(np.median(values))
         for factor, unit in ((_SLIP, field.too_large), (1 / _SLIP, field.too_small)):
             far = values / usual > _SLIP / 30 if factor > 1 else values / usual < 30 / _SLIP
-            if not far.any() or far.sum() > max(_ALONE * len(entries), 1.0) or len(entries) < 3:
+            if not far.any() or far.sum() > max(_MOST_SHARE * len(recordings), 1.0) or len(recordings) < 3:
                 continue
             others = values[~far]
-            if len(entries) < _FEW and others.max() > _WITHIN * others.min():
+            if len(recordings) < _FEW and others.max() > _WITHIN * others.min():
                 continue
-            meant = values / factor
-            back = far & (meant > others.min() / _WITHIN) & (meant < others.max() * _WITHIN)
-            for number in np.flatnonzero(back & ~off).tolist():
-                arguments = {"value": float(values[number]), "too_large": factor > 1, "given_in": unit}
-                findings.append(Finding(Reason.BESIDE_OTHERS, entries[number].id, field.name, arguments))
-            off |= back
+            corrected = values / factor
+            plausible = far & (corrected > others.min() / _WITHIN) & (corrected < others.max() * _WITHIN)
+            for index in np.flatnonzero(plausible & ~off).tolist():
+                arguments = {"value": float(values[index]), "too_large": factor > 1, "given_in": unit}
+                findings.append(Finding(Reason.BESIDE_OTHERS, recordings[index].id, field.name, arguments))
+            off |= plausible
     return off, findings
 
 
-def faint_oscillation(entries: Sequence[FrfRecording]) -> list[Finding]:
-    """A dynamic force that is hardly there, as one in kN would be; only the laws of large amplitudes use it."""
-    ratio = max(entry.dynamic_force_n / entry.preload_n for entry in entries)
+def faint_oscillation(recordings: Sequence[FrfRecording]) -> list[Finding]:
+    """The finding on a negligible dynamic force, as one given in kN; only laws of large amplitudes use it."""
+    ratio = max(recording.dynamic_force_n / recording.preload_n for recording in recordings)
     if ratio > _FAINT:
         return []
     return [Finding(Reason.DYNAMIC_FORCE_SMALL, "", "dynamic_force_n", {"ratio": ratio})]

@@ -1,5 +1,4 @@
-"""Curves that nothing can be fitted to are named, and left out of a diagnosis; so are those that no law of a sphere can
-describe."""
+"""Curves that nothing can be fitted to, or that no law of a sphere describes: findings, left out of a diagnosis."""
 
 from dataclasses import replace
 
@@ -17,47 +16,49 @@ from underskin.units import Floats, to_si
 
 
 def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:
-    """The campaign without the curves of one kind that have too few samples, do not load, or are beyond a sphere's law;
-    and a finding on each, and on those under a tip that looks like a cone."""
-    thinned = {entry.id: entry for entry in curve_lines(campaign, kind).campaign.recordings}
+    """The campaign without the curves of one kind that have too few samples, do not load, or are beyond a sphere's law.
+
+    Each of these is a finding, and so are curves under a tip that looks like a cone.
+    """
+    thinned = {recording.id: recording for recording in curve_lines(campaign, kind).campaign.recordings}
     findings, usable = [], []
-    for entry in campaign.recordings:
+    for recording in campaign.recordings:
         lacking, doubt = None, None
-        if entry.kind == kind:
-            lacking = _exchanged(entry) or _lacking(thinned.get(entry.id), campaign.skin)
-        if lacking is None and isinstance(entry, IndentationRecording) and entry.kind == kind:
-            lacking, doubt = _of_other_tip(entry, campaign.skin)
+        if recording.kind == kind:
+            lacking = _exchanged(recording) or _lacking(thinned.get(recording.id), campaign.skin)
+        if lacking is None and isinstance(recording, IndentationRecording) and recording.kind == kind:
+            lacking, doubt = _of_other_tip(recording, campaign.skin)
         if lacking is None:
-            usable.append(entry)
+            usable.append(recording)
         else:
-            findings.append(Finding(Reason.CURVE_NOT_USABLE, entry.id, lacking.field, {"refusal": lacking}))
+            findings.append(Finding(Reason.CURVE_NOT_USABLE, recording.id, lacking.field, {"refusal": lacking}))
         if doubt is not None:
-            findings.append(Finding(Reason.TIP_SHAPE, entry.id, doubt.field, {"refusal": doubt}))
+            findings.append(Finding(Reason.TIP_SHAPE, recording.id, doubt.field, {"refusal": doubt}))
     return replace(campaign, recordings=tuple(usable)), findings
 
 
-def _exchanged(entry: object) -> InvalidInput | None:
-    """The refusal of a curve whose columns look exchanged, which its raw samples tell."""
+def _exchanged(recording: object) -> InvalidInput | None:
+    """The refusal of a curve whose columns look exchanged, from its raw samples."""
     try:
-        if isinstance(entry, IndentationRecording | CompressionRecording):
-            require_own_columns(entry)
+        if isinstance(recording, IndentationRecording | CompressionRecording):
+            require_own_columns(recording)
     except InvalidInput as refusal:
         return refusal
     return None
 
 
-def _lacking(entry: object, skin: SkinDescription) -> InvalidInput | None:
-    """Why nothing can be concluded from a curve, thinned."""
-    if isinstance(entry, IndentationRecording | CompressionRecording) and not np.ptp(entry.displacement_mm):
-        return unusable("displacement_mm", float(entry.displacement_mm[0]), "must change")
+def _lacking(recording: object, skin: SkinDescription) -> InvalidInput | None:
+    """Why nothing can be concluded from a thinned curve; None if it is usable."""
+    if isinstance(recording, IndentationRecording | CompressionRecording) and not np.ptp(recording.displacement_mm):
+        return unusable("displacement_mm", float(recording.displacement_mm[0]), "must change")
     try:
-        if isinstance(entry, IndentationRecording):
-            found = estimate(*_columns(entry), skin.poisson_ratio, _thickness(skin))
-            modulus = found.modulus
+        if isinstance(recording, IndentationRecording):
+            modulus_estimate = estimate(*_columns(recording), skin.poisson_ratio, _thickness(skin))
+            modulus = modulus_estimate.modulus
             if modulus > 0:
-                require_depth(found)
-        elif isinstance(entry, CompressionRecording):
-            modulus = of_compression(entry).modulus
+                require_depth(modulus_estimate)
+        elif isinstance(recording, CompressionRecording):
+            modulus = of_compression(recording).modulus
         else:
             return too_few("force_n", "too few finite samples", "must have at least 5")
     except InvalidInput as refusal:
@@ -66,23 +67,23 @@ def _lacking(entry: object, skin: SkinDescription) -> InvalidInput | None:
 
 
 def _of_other_tip(
-    entry: IndentationRecording, skin: SkinDescription
+    recording: IndentationRecording, skin: SkinDescription
 ) -> tuple[InvalidInput | None, InvalidInput | None]:
-    """Why nothing can be concluded from a curve, with every sample, that another tip than a sphere explains to its
-    noise; and why the tip may be another."""
+    """The refusal of a curve (every sample) that a tip other than a sphere explains to its noise, and the doubt where
+    the tip may be another."""
     try:
-        tip = tip_of(*_columns(entry), skin.poisson_ratio, _thickness(skin))
-    except InvalidInput:  # of a way of too few samples, which its means do not have
+        tip = tip_of(*_columns(recording), skin.poisson_ratio, _thickness(skin))
+    except InvalidInput:  # loading or unloading has too few samples, unlike the thinned curve
         return None, None
     if tip is None or not tip.is_plain:
         return None, None
     return (tip.refusal, None) if tip.is_blunt else (None, tip.refusal)
 
 
-def _columns(entry: IndentationRecording) -> tuple[Floats, Floats, float]:
+def _columns(recording: IndentationRecording) -> tuple[Floats, Floats, float]:
     """Displacement [m], force [N] and radius [m]."""
-    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
-    return to_si("displacement_mm", entry.displacement_mm), to_si("force_n", entry.force_n), radius
+    radius = float(to_si("indenter_radius_mm", recording.indenter_radius_mm))
+    return to_si("displacement_mm", recording.displacement_mm), to_si("force_n", recording.force_n), radius
 
 
 def _thickness(skin: SkinDescription) -> float | None:

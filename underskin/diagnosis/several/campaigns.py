@@ -1,9 +1,9 @@
-"""Campaigns of one skin diagnosed together: what acts in all of them, and what is there from a campaign on.
+"""Campaigns of one skin diagnosed together: which mechanisms act in all of them, and which from some date on.
 
-Curves of campaigns without FRFs are of the same material: they count once, with the first campaign of FRFs that
-says something. Each of those is diagnosed as it would be alone, which gives its noise, its findings and the sets of
-mechanisms that it asks for; then one set a campaign is chosen for all together (course.py). What a sensor's d33 did
-between them is told with the mechanisms taken into account (sensors.py).
+Each campaign with FRFs is first diagnosed alone, which gives its noise, findings and candidate sets of mechanisms; then
+one set per campaign is chosen for all together (course.py). Curves of campaigns without FRFs are of the same material
+and count once, with the first campaign of FRFs that has a result. Changes of the sensors' d33 between campaigns are
+corrected for the mechanisms (sensors.py).
 """
 
 import math
@@ -46,16 +46,16 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        Two at least, one of them with FRFs; those are put in the order of their first recordings' times where all have
-        one.
+        Two at least, one of them with FRFs; those with FRFs are sorted by the time of their first recordings where all
+        have one.
     table
         σ.
     name
-        What the report calls them.
+        Their name in the report.
     without
         Mechanisms to leave out of the catalogue.
     progress
-        Told the share that is done.
+        Called with the share that is done.
 
     Returns
     -------
@@ -65,7 +65,8 @@ def diagnose_together(
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns, none with FRFs, skins that are declared otherwise, or FRFs that are in two campaigns.
+        Fewer than two campaigns, none with FRFs, skins that are declared differently, or FRFs that are in two
+        campaigns.
     """
     with_frf, of_curves = by_frfs(curves_once(campaigns, set()))
     _check(with_frf, of_curves)
@@ -83,82 +84,89 @@ def _report(
     without: Collection[str],
     progress: Callable[[float], None],
 ) -> dict[str, Any]:
-    """Of campaigns with FRFs in their order, and what curves of others tell; of one alone its own."""
+    """The report on campaigns with FRFs in their order, with the curves of others; of a single usable one its own."""
     ordered, results = list[Campaign](), list[DiagnosisResult]()
-    for number, campaign in enumerate(with_frf):
+    for index, campaign in enumerate(with_frf):
         counted = any(result.search is not None for result in results)
         ordered.append(campaign if counted else with_curves(campaign, of_curves))
         results.append(diagnose(ordered[-1], table, without=without))
-        progress((number + 1) / (len(with_frf) + 1))
-    alone = [_standing_alone(result) for result in results]
-    results = _with_changed_sensors(ordered, results, alone, table, without)
+        progress((index + 1) / (len(with_frf) + 1))
+    outliers = [_outlying_sensors(result) for result in results]
+    results = _with_changed_sensors(ordered, results, outliers, table, without)
     reports = [reported(result) for result in results]
-    usable = [number for number, result in enumerate(results) if result.search is not None]
+    usable = [index for index, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
-        lacking = (own.document for number, own in enumerate(reports) if number not in usable)
+        lacking = (report.document for index, report in enumerate(reports) if index not in usable)
         return next(lacking, reports[0].document)
-    dated = CampaignDates([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
-    return together_report(name, ordered, results, reports, usable, dated, alone, table)
+    dated = CampaignDates([ordered[index].name for index in usable], [date_of(ordered[index]) for index in usable])
+    return together_report(name, ordered, results, reports, usable, dated, outliers, table)
 
 
 def _with_changed_sensors(
     campaigns: Sequence[Campaign],
     results: Sequence[DiagnosisResult],
-    alone: Sequence[frozenset[str]],
+    outliers: Sequence[frozenset[str]],
     table: SigmaTable,
     without: Collection[str],
 ) -> list[DiagnosisResult]:
-    """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
-    apart = [_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = changes(apart, alone, [0.0] * len(apart), np.arange(len(apart), dtype=float))
+    """The results, diagnosed again where single sensors changed since the previous campaign, which is no physics of the
+    skin."""
+    sensors = [_sensors(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
+    single = changes(sensors, outliers, [0.0] * len(sensors), np.arange(len(sensors), dtype=float))
     again = []
-    for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
-        as_before = corrected(campaign, single, number)
+    for index, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
+        as_before = corrected(campaign, single, index)
         again.append(result if as_before is campaign else diagnose(as_before, table, without=without))
     return again
 
 
-def _standing_alone(result: DiagnosisResult) -> frozenset[str]:
+def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:
     reasons = (Reason.SENSOR_WEAKER, Reason.SENSOR_STRONGER)
     return frozenset(str(finding.arguments["sensor"]) for finding in result.findings if finding.reason in reasons)
 
 
-def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:
-    """The sensors under the answer of the campaign alone, or without any mechanism."""
+def _sensors(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:
+    """The sensors of a campaign under its own answer, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
-    strengths: Values = {} if leader is None else {name: _of_one(leader, name) for name in leader.names}
+    strengths: Values = {} if leader is None else {name: _strengths_of(leader, name) for name in leader.names}
     return sensors_of(campaign, strengths, table, used_recordings(result))
 
 
-def _of_one(explanation: Explanation, name: str) -> dict[str, float]:
+def _strengths_of(explanation: Explanation, name: str) -> dict[str, float]:
     shared = Shared.of(explanation, [name], skin=False)
     return values(shared.parameters, shared.mean)
 
 
 def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaign]]:
-    """Those with FRFs, and those of curves alone."""
+    """The campaigns with FRFs, and those with curves only."""
     parts: tuple[list[Campaign], list[Campaign]] = ([], [])
     for campaign in campaigns:
-        parts[not any(isinstance(one, FrfRecording) for one in campaign.recordings)].append(campaign)
+        parts[not any(isinstance(recording, FrfRecording) for recording in campaign.recordings)].append(campaign)
     return parts
 
 
 def with_curves(campaign: Campaign, of_curves: Sequence[Campaign]) -> Campaign:
-    """The campaign with the curves of others of its skin, each called by its own campaign's name."""
-    curves = [replace(entry, id=f"{other.name}: {entry.id}") for other in of_curves for entry in other.recordings]
+    """The campaign with the curves of other campaigns of its skin, whose names precede the curves' ids."""
+    curves = [replace(curve, id=f"{other.name}: {curve.id}") for other in of_curves for curve in other.recordings]
     return replace(campaign, recordings=(*campaign.recordings, *curves)) if curves else campaign
 
 
 def curves_once(campaigns: Sequence[Campaign], seen: set[bytes]) -> list[Campaign]:
-    """The campaigns without curves that an earlier one, or one `seen` before, has number for number: a block that was
-    joined to the FRFs of two dates is one measurement."""
-    found = []
+    """The campaigns without curves that are identical to one of an earlier campaign or to one `seen` before: a block
+    that was added to the FRFs of two dates is one measurement."""
+    distinct = []
     for campaign in campaigns:
-        curves = {one.id: _curve(one) for one in campaign.recordings if not isinstance(one, FrfRecording)}
-        kept = tuple(one for one in campaign.recordings if curves.get(one.id) not in seen)
-        found.append(replace(campaign, recordings=kept) if len(kept) < len(campaign.recordings) else campaign)
+        curves = {
+            recording.id: _curve(recording)
+            for recording in campaign.recordings
+            if not isinstance(recording, FrfRecording)
+        }
+        remaining = tuple(recording for recording in campaign.recordings if curves.get(recording.id) not in seen)
+        distinct.append(
+            replace(campaign, recordings=remaining) if len(remaining) < len(campaign.recordings) else campaign
+        )
         seen |= set(curves.values())
-    return found
+    return distinct
 
 
 def _curve(recording: CurveRecording) -> bytes:
@@ -166,21 +174,21 @@ def _curve(recording: CurveRecording) -> bytes:
 
 
 def refuse_copies(campaigns: Sequence[Campaign]) -> None:
-    """Raise InvalidInput where an FRF is in two campaigns, number for number: it would count twice."""
+    """Raise InvalidInput where two campaigns hold the identical FRF, which would count twice."""
     owners: dict[bytes, str] = {}
     for campaign in campaigns:
-        for place, recording in enumerate(campaign.recordings):
+        for index, recording in enumerate(campaign.recordings):
             if not isinstance(recording, FrfRecording):
                 continue
             owner = owners.setdefault(_measured(recording), campaign.name)
             if owner != campaign.name:
                 allowed = f"must not hold the same numbers as a recording of {owner}: it would count twice"
-                raise InvalidInput(f"{campaign.name}: recordings[{place}]", recording.sensor, allowed)
+                raise InvalidInput(f"{campaign.name}: recordings[{index}]", recording.sensor, allowed)
 
 
 def _measured(recording: FrfRecording) -> bytes:
     series = (recording.frf_re_pc_per_n, recording.frf_im_pc_per_n, recording.force_n, recording.charge_pc)
-    return b"".join(b"-" if one is None else one.tobytes() for one in series)
+    return b"".join(b"-" if column is None else column.tobytes() for column in series)
 
 
 def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
@@ -193,10 +201,10 @@ def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
         if names.count(campaign.name) > 1:
             raise InvalidInput("campaigns", campaign.name, "must each have a name of its own")
     first = campaigns[0].skin
-    for number, campaign in enumerate(campaigns):
+    for index, campaign in enumerate(campaigns):
         for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio"):
             here, there = getattr(first, field), getattr(campaign.skin, field)
-            if there is None and number >= len(with_frf):
+            if there is None and index >= len(with_frf):
                 continue  # which curves do not need
             if here != there and not (here and there and math.isclose(here, there, rel_tol=1e-9)):
                 allowed = f"must be {here:g}, as {campaigns[0].name} has it: they are to be of one skin"

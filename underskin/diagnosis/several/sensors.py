@@ -24,7 +24,7 @@ import numpy as np
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.residuals import with_unseen
-from underskin.diagnosis.reporting.numbers import place_of, rounded
+from underskin.diagnosis.reporting.numbers import parameter_index, rounded
 from underskin.diagnosis.several.course import Candidate, Course, Shared, same_strength
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
@@ -425,7 +425,7 @@ def causes(candidate: Candidate, names: Sequence[str], change: Change) -> tuple[
     """The mechanisms that, appearing beside a campaign's own `names`, would change d33 of all sensors so: ageing, which
     is d33 itself and only falls, then the most probable first."""
     explanation = _moving(candidate, names)
-    before = float(explanation.point.fit[place_of(explanation, "d33")] - np.log1p(change.value))
+    before = float(explanation.point.fit[parameter_index(explanation, "d33")] - np.log1p(change.value))
     weights = {AGEING: float(_normal(np.log1p([change.value]), USUAL)[0])} if change.value < 0 else {}
     width = float(np.hypot(change.uncertainty, _BETWEEN))
     for name in candidate.problem.lines.mechanisms.named:
@@ -461,7 +461,7 @@ def _variance(fit: Explanation, common: Sequence[str]) -> float:
     places = own_places(fit.names, hypothesis.lines)
     known = [place for name in common for place in range(places[name].start, places[name].stop)]
     rows = [hypothesis.mean_places.index(place) for place in known if place in hypothesis.mean_places]
-    d33 = hypothesis.mean_places.index(place_of(fit, "d33"))
+    d33 = hypothesis.mean_places.index(parameter_index(fit, "d33"))
     with_known = covariance[d33, rows]
     return float(covariance[d33, d33] - with_known @ np.linalg.solve(covariance[np.ix_(rows, rows)], with_known))
 
