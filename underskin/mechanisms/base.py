@@ -135,7 +135,7 @@ class Mechanism:
     def common(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
         """What values of its parameters on recordings of one kind mean for those of another: fit coordinates there, by
         the parameter's name."""
-        stated = {entry.name: entry for entry in self.parameters_stated}
+        stated = {parameter.name: parameter for parameter in self.parameters_stated}
         return {
             name: log(value) if name in stated and stated[name].scale == "log" else value
             for name, value in values.items()

@@ -69,7 +69,7 @@ class Catalogue(Mapping[str, Mechanism]):
         """Why files of the lab's folder cannot be used."""
         return self.load().refused
 
-    def require_whole(self) -> None:
+    def require_complete(self) -> None:
         """Raises FileError where a file of the lab's folder cannot be used: a diagnosis without it would be another."""
         for error in self.refused:
             raise FileError(error.file, error.place, error.reason, code=error.code)
@@ -92,7 +92,7 @@ class ActiveCatalogue(Mapping[str, Mechanism]):
     def __init__(self, without: Collection[str] = ()) -> None:
         """Raises InvalidInput where `without` names something that is not in the catalogue, and FileError where a file
         of the lab's folder cannot be used."""
-        CATALOGUE.require_whole()
+        CATALOGUE.require_complete()
         without = [current_name(name) for name in without]
         for name in without:
             if name not in CATALOGUE:
@@ -200,4 +200,4 @@ def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechan
 
 
 def _in_order(mechanisms: Iterator[Mechanism] | list[Mechanism]) -> tuple[Mechanism, ...]:
-    return tuple(sorted(mechanisms, key=lambda entry: (entry.stage.place, entry.order, entry.name)))
+    return tuple(sorted(mechanisms, key=lambda mechanism: (mechanism.stage.place, mechanism.order, mechanism.name)))

@@ -256,8 +256,8 @@ class CurveScreening:
             depth_mm=max(depths),
             force_n=float(np.abs(self._lines.value.real).max()),
             time_s=max(float(np.ptp(own)) for own in times.values()),
-            begins={name: float(own[0]) for name, own in times.items()},
-            turns={name: float(own[turns[name]]) for name, own in times.items()} if back else {},
+            start_times={name: float(own[0]) for name, own in times.items()},
+            turn_times={name: float(own[turns[name]]) for name, own in times.items()} if back else {},
         )
         self.laws = curve_laws(extent, timed=all(one.time_s is not None for one in curves))
 
@@ -429,7 +429,7 @@ def _admit(problem: FittingProblem, score: Score) -> None:
     """Let models hold the law, and fits begin where the screening found it."""
     law = score.law
     law.log_share = score.log_share
-    law.found = (*law.found, score.guess, *score.others)
+    law.screened_fits = (*law.screened_fits, score.guess, *score.others)
     problem.lines.mechanisms.add(law)
 
 

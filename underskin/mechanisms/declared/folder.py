@@ -36,9 +36,9 @@ def in_folder() -> LabFolder:
     return LabFolder(tuple(usable), tuple(refused))
 
 
-def checked(content: bytes, file: str, *, apart: bool = False) -> DeclaredMechanism:
+def checked(content: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredMechanism:
     """The mechanism of a document, as `parse` has it, whose law gives finite numbers; raises FileError."""
-    mechanism = parse(content, file, apart=apart)
+    mechanism = parse(content, file, in_sandbox=in_sandbox)
     try:
         check_numbers(mechanism)
     except InvalidInput as error:
@@ -48,22 +48,22 @@ def checked(content: bytes, file: str, *, apart: bool = False) -> DeclaredMechan
 
 def digest() -> str:
     """SHA-256 of the folder's files, with their names; empty where there are none."""
-    whole, count = sha256(), 0
+    total, count = sha256(), 0
     for file in _files():
         try:
             content = _content(file)
         except FileError as error:
             content = error.reason.encode()
-        whole.update(os.fsencode(file.name) + b"\0" + sha256(content).digest())
+        total.update(os.fsencode(file.name) + b"\0" + sha256(content).digest())
         count += 1
-    return whole.hexdigest() if count else ""
+    return total.hexdigest() if count else ""
 
 
 def _files() -> Iterator[Path]:
     """Those of the folder, where there is one, in the order of their names."""
-    where = os.environ.get(FOLDER)
-    if where:
-        yield from sorted(Path(where).glob("*.yaml"))
+    path = os.environ.get(FOLDER)
+    if path:
+        yield from sorted(Path(path).glob("*.yaml"))
 
 
 def _content(file: Path) -> bytes:

@@ -50,47 +50,49 @@ class Expression:
         return _value(self._tree, values)
 
 
-def read(text: str, field: str, known: Collection[str]) -> Expression:
+def read(text: str, field: str, allowed: Collection[str]) -> Expression:
     """Read an expression in these names; raises InvalidInput that names the field, the place and what is allowed."""
     if not isinstance(text, str) or not text.strip() or len(text) > LONGEST:
         raise InvalidInput(field, text, f"must be an expression of 1 to {LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        place = f" at column {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
-        raise InvalidInput(field, text, f"cannot be read as an expression{place}") from None
+        location = f" at column {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
+        raise InvalidInput(field, text, f"cannot be read as an expression{location}") from None
     nodes = list(ast.walk(tree.body))
     if len(nodes) > _MOST_NODES:
         raise InvalidInput(field, text, "is too long to be a law: take several")
     called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
     for node in nodes:
-        _check(node, field, known, called)
+        _check(node, field, allowed, called)
     names = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called}
     return Expression(text.strip(), frozenset(names - set(CONSTANTS)), tree.body)
 
 
-def _check(node: ast.AST, field: str, known: Collection[str], called: Collection[int]) -> None:
+def _check(node: ast.AST, field: str, allowed_names: Collection[str], called: Collection[int]) -> None:
     """Raises InvalidInput for everything that is not on the list."""
     if isinstance(node, ast.expr_context | ast.operator | ast.unaryop):
         allowed = isinstance(node, ast.Load | ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow | ast.USub | ast.UAdd)
         if not allowed:
             raise InvalidInput(field, type(node).__name__, "may use + − * / ** only")
         return
-    place = f"{field}, column {getattr(node, 'col_offset', 0) + 1}"
+    location = f"{field}, column {getattr(node, 'col_offset', 0) + 1}"
     if isinstance(node, ast.Constant):
         number = type(node.value) in (int, float) and abs(node.value) <= _LARGEST  # type: ignore[arg-type]
         if not number:
-            raise InvalidInput(place, repr(node.value)[:40], "must be a number of usual size")
+            raise InvalidInput(location, repr(node.value)[:40], "must be a number of usual size")
     elif isinstance(node, ast.Name):
-        if id(node) not in called and node.id not in CONSTANTS and node.id not in known:
-            raise InvalidInput(place, node.id, f"must be one of {', '.join([*sorted(known), *CONSTANTS])}")
+        if id(node) not in called and node.id not in CONSTANTS and node.id not in allowed_names:
+            raise InvalidInput(location, node.id, f"must be one of {', '.join([*sorted(allowed_names), *CONSTANTS])}")
     elif isinstance(node, ast.Call):
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS or node.keywords or len(node.args) != FUNCTIONS[name][0]:
             arguments = ", ".join(f"{key} of {count}" for key, (count, _) in FUNCTIONS.items())
-            raise InvalidInput(place, ast.unparse(node)[:40], f"must be a function with its arguments: {arguments}")
+            raise InvalidInput(location, ast.unparse(node)[:40], f"must be a function with its arguments: {arguments}")
     elif not isinstance(node, ast.BinOp | ast.UnaryOp):
-        raise InvalidInput(place, type(node).__name__, "is not allowed: numbers, names, + − * / ** and functions are")
+        raise InvalidInput(
+            location, type(node).__name__, "is not allowed: numbers, names, + − * / ** and functions are"
+        )
 
 
 def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
@@ -105,7 +107,7 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
         case ast.BinOp(left=left, op=op, right=right):
             return _combined(op, _value(left, values), _value(right, values))
         case ast.Call(func=ast.Name(id=name), args=args):
-            return FUNCTIONS[name][1](*(_value(entry, values) for entry in args))
+            return FUNCTIONS[name][1](*(_value(argument, values) for argument in args))
     raise AssertionError(node)  # `read` lets nothing else through
 
 
@@ -166,7 +168,7 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # how many argume
 
 def together(expressions: Sequence[Expression]) -> frozenset[str]:
     """The names in several."""
-    return frozenset().union(*(entry.names for entry in expressions))
+    return frozenset().union(*(expression.names for expression in expressions))
 
 
 FREQUENCY = "frequency_hz"
@@ -210,7 +212,7 @@ class DeclaredMechanism(Mechanism):
         """Of what the file says."""
         self.name = name
         self.plain = description
-        self.law = f"{acts_on}: {', '.join(entry.text for entry in laws)}"
+        self.law = f"{acts_on}: {', '.join(expression.text for expression in laws)}"
         self.assumptions = "As declared by the lab; what other mechanisms do to its factor is left out."
         self.source = source
         self.needs = f"{' and '.join(axes)} {self.needs_axes}"
@@ -238,15 +240,15 @@ class DeclaredOfFrf(DeclaredMechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Axes that recordings lack, or on which they do not differ."""
-        known = self.bound.axes if self.bound is not None else _bound(conditions).axes
-        own = [entry.id for entry in conditions.recordings]
+        axes = self.bound.axes if self.bound is not None else _bound(conditions).axes
+        ids = [recording.id for recording in conditions.recordings]
         for name in self.axes_read:
             if name == FREQUENCY:
                 continue
-            if name not in known:
+            if name not in axes:
                 return f"not every recording has {name}, as a number"
         differing = [name for name in self.axes_read if name != FREQUENCY]
-        same = all(len({known[name][key] for key in own}) == 1 for name in differing)
+        same = all(len({axes[name][key] for key in ids}) == 1 for name in differing)
         return f"{differing[0]} is the same in all recordings" if differing and same and not self._of_lines else None
 
     @property
@@ -321,19 +323,21 @@ class DeclaredOfCurves(DeclaredMechanism):
     kinds = ("indentation",)
     stage = Stage.CURVE
     needs_axes = "of every sample"
-    begins: Mapping[str, float] | None = None  # when each recording begins [s], by its id
+    start_times: Mapping[str, float] | None = None  # when each recording begins [s], by its id
 
     def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredOfCurves":
         """The same, bound to the recordings of a campaign."""
         other = copy(self)
         curves = curves_of(conditions)
-        other.begins = {entry.id: float(entry.time_s[0]) for entry in curves if entry.time_s is not None}
+        other.start_times = {
+            recording.id: float(recording.time_s[0]) for recording in curves if recording.time_s is not None
+        }
         return other
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times that recordings lack."""
-        curves = [entry for entry in conditions.recordings if isinstance(entry, IndentationConditions)]
-        untimed = "time_s" in self.axes_read and any(entry.time_s is None for entry in curves)
+        curves = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
+        untimed = "time_s" in self.axes_read and any(recording.time_s is None for recording in curves)
         return "not every recording has time_s" if untimed else None
 
     def on_curve(self, curve: Curve, values: Values) -> None:
@@ -348,16 +352,16 @@ class DeclaredOfCurves(DeclaredMechanism):
             "time_s": self._since_the_beginning(samples),
         }
         with np.errstate(all="ignore"):
-            found = np.asarray(self.laws[0]({**values, **axes})) + np.zeros(np.broadcast(samples.travel, force).shape)
+            result = np.asarray(self.laws[0]({**values, **axes})) + np.zeros(np.broadcast(samples.travel, force).shape)
         return np.clip(
-            np.nan_to_num(found, nan=_LARGEST_FACTOR, posinf=_LARGEST_FACTOR, neginf=-_LARGEST_FACTOR),
+            np.nan_to_num(result, nan=_LARGEST_FACTOR, posinf=_LARGEST_FACTOR, neginf=-_LARGEST_FACTOR),
             -_LARGEST_FACTOR,
             _LARGEST_FACTOR,
         )
 
     def _since_the_beginning(self, samples: Samples) -> Floats:
-        known = self.begins or {}
-        first = [known.get(name, float(own[0])) for name, own in zip(samples.ids, samples.time, strict=True)]
+        start_times = self.start_times or {}
+        first = [start_times.get(name, float(times[0])) for name, times in zip(samples.ids, samples.time, strict=True)]
         return np.asarray(samples.time - np.array(first)[:, None])
 
 
@@ -368,13 +372,13 @@ class _Bound:
     law: DeclaredOfCurves
     values: Mapping[str, Floats]
 
-    def moved(self, samples: Samples, travel: Floats) -> Floats:
+    def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
         """The travel [m] at which a sphere presses."""
         if self.law.acts_on != "position":
             return travel
         return travel + 1e-3 * self.law.change(samples, np.zeros_like(travel), self.values)
 
-    def read(self, samples: Samples, force: Floats) -> Floats:
+    def measured_force(self, samples: Samples, force: Floats) -> Floats:
         """The force [N] that is read where the contact bears `force`."""
         if self.law.acts_on == "position":
             return force

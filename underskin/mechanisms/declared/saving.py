@@ -23,12 +23,14 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
     law = report.get("unnamed")
     if law is None:
         raise InvalidInput("report", report.get("verdict"), "must hold a law that nobody listed (unnamed)")
-    found = report["provenance"].get("unnamed")
-    if found is None:
+    provenance = report["provenance"].get("unnamed")
+    if provenance is None:
         raise InvalidInput("report", "an older report", "says too little of its law: diagnose the campaign again")
-    values: dict[str, float] = {key.removeprefix("law_"): float(value) for key, value in found["parameters"].items()}
-    expressions, bending = _expressions(law, found["law"], values)
-    units = {entry["name"]: entry["unit"] for entry in law.get("parameters", ())}
+    values: dict[str, float] = {
+        key.removeprefix("law_"): float(value) for key, value in provenance["parameters"].items()
+    }
+    expressions, bending = _expressions(law, provenance["law"], values)
+    units = {parameter["name"]: parameter["unit"] for parameter in law.get("parameters", ())}
     strengths = {key for key in values if key.startswith(("change", "lag"))} or {"exponent"}
     parameters: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
@@ -39,7 +41,7 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
         else:
             declared = {**_linear_in(value), **({"limit": 0} if key in strengths else {})}
         parameters[key] = {"unit": units.get(key, "-"), **declared}
-    axes = [law["axis"], *(["preload_n"] if "__relative__" in found["law"] else [])]
+    axes = [law["axis"], *(["preload_n"] if "__relative__" in provenance["law"] else [])]
     body = {
         "schema": SCHEMA,
         "name": name,
@@ -94,7 +96,7 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
     variant = parts[-1]
     if law["form"] in ("peak", "notch") and "centre" in bending:
         bending.discard("centre")  # along an axis of recordings a place may be negative
-    kind = next((entry for entry in parts if entry in ("angle", "delay", "power", "corner")), None)
+    kind = next((part for part in parts if part in ("angle", "delay", "power", "corner")), None)
     if law["acts_on"] == "frequency_response":
         raise InvalidInput("report", kind, "a lag that follows an axis of the recordings: write its file by hand")
     amplitudes = [key for key in values if key.startswith("change")]
@@ -160,7 +162,7 @@ _SHAPES: Mapping[str, Callable[[str, float, float, str], list[str]]] = {
 def _over_frequency(variant: str, middle: float) -> str:
     ratio = f"frequency_hz / {middle:.6g}"
     resonance = "(1 - u ** 2 + 2 * i * damping * u)".replace("u", "(frequency_hz / centre)")
-    told = {
+    expressions = {
         "phase": f"exp(-i * lag * ({ratio}) ** exponent)",
         "delay": f"exp(-i * lag * {ratio})",
         "high_pass": "exp(-exponent * log(1 + corner / (i * frequency_hz)))",
@@ -172,6 +174,6 @@ def _over_frequency(variant: str, middle: float) -> str:
         "loss": f"1 + change * 2 * i * damping * (frequency_hz / centre) / {resonance}",
         "spring": f"1 + change / {resonance}",
     }
-    if variant not in told:
+    if variant not in expressions:
         raise InvalidInput("report", variant, "a smooth course is no expression: it cannot be kept")
-    return told[variant]
+    return expressions[variant]

@@ -41,7 +41,7 @@ class Ageing(Mechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Counts that differ are needed."""
-        cycles = {entry.id: entry.load_cycles for entry in frf_of(conditions)}
+        cycles = {recording.id: recording.load_cycles for recording in frf_of(conditions)}
         lacking = [name for name, value in cycles.items() if value is None]
         if lacking:
             return f"recording {lacking[0]!r} has no load_cycles"
@@ -49,9 +49,9 @@ class Ageing(Mechanism):
 
     def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
         """The factor on each recording."""
-        left = 1.0 - values["saturation"]
-        power = values["saturation"] / left
-        age = log(1.0 + left * (design.load_cycles / values["onset"]))
+        remaining = 1.0 - values["saturation"]
+        power = values["saturation"] / remaining
+        age = log(1.0 + remaining * (design.load_cycles / values["onset"]))
         # (1 − e^(−p x))/p = x · mean_decay(p x)
         lost = age * _mean_decay(power * age) / (np.log(10.0) * _mean_decay(np.log(10.0) * power))
         return _positive(1.0 - values["loss"] * lost)

@@ -60,6 +60,6 @@ class AmplifierLowPass(Mechanism):
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _highest_hz(conditions: Conditions) -> float:
     """The highest line of all recordings [Hz]; ∞ without one."""
-    of_frf = [entry.frequency_hz for entry in conditions.recordings if isinstance(entry, FrfConditions)]
-    highest = [float(np.max(lines, initial=0.0, where=np.isfinite(lines))) for lines in of_frf if lines is not None]
+    columns = [recording.frequency_hz for recording in conditions.recordings if isinstance(recording, FrfConditions)]
+    highest = [float(np.max(lines, initial=0.0, where=np.isfinite(lines))) for lines in columns if lines is not None]
     return max(highest, default=math.inf)

@@ -108,17 +108,17 @@ class ContactCreep(Mechanism):
         """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
         if kind != "frf":
             curves = [
-                entry
-                for entry in conditions.recordings
-                if isinstance(entry, IndentationConditions | CompressionConditions) and entry.kind == kind
+                recording
+                for recording in conditions.recordings
+                if isinstance(recording, IndentationConditions | CompressionConditions) and recording.kind == kind
             ]
-            lacking = [entry.id for entry in curves if entry.time_s is None]
+            lacking = [recording.id for recording in curves if recording.time_s is None]
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
             if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
             return _again(conditions)
-        dwell = {entry.id: entry.dwell_s for entry in conditions.recordings if entry.kind == kind}
+        dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
         lacking = [name for name, value in dwell.items() if value is None]
         if lacking:
             return f"recording {lacking[0]!r} has no dwell_s"
@@ -127,9 +127,9 @@ class ContactCreep(Mechanism):
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Creep under the preload."""
         fraction = values["relaxed_fraction"]
-        left = 1.0 - fraction
-        times = -contacts.dwell * left / values["relaxation_time"]
-        contacts.relaxed = 1.0 / (1.0 + fraction / left * (1.0 - exp(times)))
+        unrelaxed = 1.0 - fraction
+        times = -contacts.dwell * unrelaxed / values["relaxation_time"]
+        contacts.relaxed = 1.0 / (1.0 + fraction / unrelaxed * (1.0 - exp(times)))
         contacts.modulus = contacts.modulus * contacts.relaxed
 
     def on_curve(self, curve: Curve, values: Values) -> None:
@@ -145,15 +145,19 @@ class ContactCreep(Mechanism):
 
 def _times(conditions: Conditions) -> list[Floats]:
     """Those of the indentations that have them [s]."""
-    indentations = (entry for entry in conditions.recordings if isinstance(entry, IndentationConditions))
-    return [entry.time_s for entry in indentations if entry.time_s is not None and len(entry.time_s) > 1]
+    indentations = (recording for recording in conditions.recordings if isinstance(recording, IndentationConditions))
+    return [
+        recording.time_s for recording in indentations if recording.time_s is not None and len(recording.time_s) > 1
+    ]
 
 
 def _again(conditions: Conditions) -> str | None:
     """The first indentation that goes in again after it had come back."""
-    for entry in conditions.recordings:
-        if isinstance(entry, IndentationConditions) and _presses_again(entry.displacement_mm):
-            return f"recording {entry.id!r} presses again after it was drawn back: give each way in and back by itself"
+    for recording in conditions.recordings:
+        if isinstance(recording, IndentationConditions) and _presses_again(recording.displacement_mm):
+            return (
+                f"recording {recording.id!r} presses again after it was drawn back: give each way in and back by itself"
+            )
     return None
 
 

@@ -80,8 +80,8 @@ class LayeredContact(Mechanism):
 def _contact_radius_mm(conditions: Conditions) -> float:
     """About the largest of the recordings, √(R δ), with half of the travel for the depth."""
     radii = [
-        math.sqrt(one.indenter_radius_mm * max(0.5 * float(np.ptp(one.displacement_mm)), 1e-12))
-        for one in conditions.recordings
-        if isinstance(one, IndentationConditions)
+        math.sqrt(recording.indenter_radius_mm * max(0.5 * float(np.ptp(recording.displacement_mm)), 1e-12))
+        for recording in conditions.recordings
+        if isinstance(recording, IndentationConditions)
     ]
     return max(radii, default=1.0)

@@ -20,7 +20,7 @@ _WIDTH_HZ = 1.5  # where it is asked which mains stand out
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
 _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
-_BESIDE = 9  # lines, the next in frequency, that say what is usual
+_NEIGHBOURS = 9  # lines, the next in frequency, that say what is usual
 _LEAST_STRAY = 1e-6  # relative; of recordings without noise
 _CHARGE = "unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC"
 _WIDTH = "the analyser's window and the mains' drift make lines a few Hz wide"
@@ -58,8 +58,8 @@ class MainsPickup(Mechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Lines near the mains are needed."""
-        for entry in frf_of(conditions):
-            if any(np.abs(frequencies(entry) - mains).min() < HARMONIC_WIDTH_HZ for mains in MAINS_HZ):
+        for recording in frf_of(conditions):
+            if any(np.abs(frequencies(recording) - mains).min() < HARMONIC_WIDTH_HZ for mains in MAINS_HZ):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
@@ -88,9 +88,9 @@ def _pickup(conditions: Conditions, design: FrfDesign) -> Pickup:
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _outstanding_mains(conditions: Conditions) -> float:
     """The mains frequency [Hz] whose lines stand out; where none does, the one that has a line nearest."""
-    lines = np.concatenate([frequencies(entry) for entry in frf_of(conditions)])
+    lines = np.concatenate([frequencies(recording) for recording in frf_of(conditions)])
     nearest = {mains: float(np.abs(lines - mains).min()) for mains in MAINS_HZ}
-    measured = [lines_of(entry) for entry in conditions.recordings if isinstance(entry, FrfRecording)]
+    measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]
     return max(MAINS_HZ, key=lambda mains: (_excess(measured, mains), -nearest[mains]))
 
 
@@ -110,7 +110,7 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
         size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
         stray = _stray(lines, size, reach.near, reach.far)
         others = _stray(lines, size, reach.far[1::2], reach.far[::2])
-        usual = np.median(others[reach.beside] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
+        usual = np.median(others[reach.neighbours] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
         score += float((reach.shape**2 * (stray**2 - usual) / np.maximum(usual, _LEAST_STRAY**2)).sum())
         weight += float((reach.shape**4).sum())
     return score / np.sqrt(weight) if weight else 0.0
@@ -124,19 +124,19 @@ class _Reach:
     near: Indices
     shape: Floats
     far: Indices
-    beside: Indices
+    neighbours: Indices
 
     @classmethod
     def of(cls, frequency: Floats, mains: float) -> "_Reach":
         shape = _shape(frequency, mains)
         near, far = np.flatnonzero(shape > _REACHED), np.flatnonzero(shape <= _REACHED)
-        beside = np.abs(frequency[near, None] - frequency[far[1::2]]).argsort(axis=1)[:, :_BESIDE]
-        return cls(near, shape[near], far, beside)
+        neighbours = np.abs(frequency[near, None] - frequency[far[1::2]]).argsort(axis=1)[:, :_NEIGHBOURS]
+        return cls(near, shape[near], far, neighbours)
 
 
-def _stray(lines: Frf, size: Floats, rows: Indices, beside: Indices) -> Floats:
+def _stray(lines: Frf, size: Floats, rows: Indices, neighbours: Indices) -> Floats:
     """How far rows are from a straight line between others, relative to `size`."""
-    between = np.interp(lines.frequency[rows], lines.frequency[beside], lines.values[beside])
+    between = np.interp(lines.frequency[rows], lines.frequency[neighbours], lines.values[neighbours])
     return np.asarray(np.abs(lines.values[rows] - between) / size[rows])
 
 

@@ -54,12 +54,12 @@ class Misalignment(Mechanism):
         """Centred presses need the offset's length alone; a length without its direction serves no others."""
         if "offset" not in values:
             return {**values, "offset": float(np.hypot(values["offset_x"], values["offset_y"]))}
-        beside = offsets(conditions).any(axis=1)
-        if beside.any():
-            entry = frf_of(conditions)[int(np.argmax(beside))]
-            known = "the adopted model knows how far presses miss it, not in which direction"
-            allowed = f"must be the sensor's centre: {known}"
-            raise conflicting(f"recordings[{entry.id}].position_mm", entry.position_mm, allowed)
+        off_centre = offsets(conditions).any(axis=1)
+        if off_centre.any():
+            recording = frf_of(conditions)[int(np.argmax(off_centre))]
+            reason = "the adopted model knows how far presses miss it, not in which direction"
+            allowed = f"must be the sensor's centre: {reason}"
+            raise conflicting(f"recordings[{recording.id}].position_mm", recording.position_mm, allowed)
         return values
 
     def offset(self, values: Values) -> tuple[Differentiated, Differentiated]:

@@ -36,9 +36,9 @@ class PlatenFriction(Mechanism):
     def hidden_in_modulus(self, conditions: Conditions) -> Sequence[float]:
         """Of samples of one shape."""
         shapes = [
-            (0.25 * entry.sample_diameter_mm / entry.sample_height_mm) ** 2
-            for entry in conditions.recordings
-            if isinstance(entry, CompressionConditions)
+            (0.25 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2
+            for recording in conditions.recordings
+            if isinstance(recording, CompressionConditions)
         ]
         if not shapes or max(shapes) > _ONE_SHAPE * min(shapes):
             return ()

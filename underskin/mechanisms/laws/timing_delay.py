@@ -53,6 +53,6 @@ class TimingDelay(Mechanism):
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _shown(conditions: Conditions) -> list[tuple[float]]:
     """The delay [µs]."""
-    measured = [lines_of(entry) for entry in conditions.recordings if isinstance(entry, FrfRecording)]
+    measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]
     delay = common_delay(stacked(measured)) if measured else 0.0
     return [(1e6 * delay,)] if delay else []

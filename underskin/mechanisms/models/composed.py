@@ -26,7 +26,7 @@ def compose(
     conditions: Conditions,
     table: SigmaTable,
     kind: Kind | None = None,
-    known: Mapping[str, Mechanism] = CATALOGUE,
+    catalogue: Mapping[str, Mechanism] = CATALOGUE,
 ) -> Model:
     """The model of some mechanisms for all recordings of one kind, where these can support the mechanisms.
 
@@ -53,7 +53,7 @@ def compose(
     """
     kind = kind or kind_of(conditions)
     _require_kind(conditions, kind)
-    mechanisms = chosen(names, known)
+    mechanisms = chosen(names, catalogue)
     check_supported(mechanisms, conditions, kind)
     return forward_model(mechanisms, conditions, table, kind)
 

@@ -126,12 +126,12 @@ class Composition:
     ) -> None:
         """Take the parameters of each mechanism, then the nuisances."""
         self.mechanisms = tuple(mechanisms)
-        own = parameters_together(mechanisms, conditions, kind)
-        self.parameters = (*(parameter for group in own.values() for parameter in group), *nuisances)
-        starts = np.cumsum([0, *(len(group) for group in own.values())])
+        groups = parameters_together(mechanisms, conditions, kind)
+        self.parameters = (*(parameter for group in groups.values() for parameter in group), *nuisances)
+        starts = np.cumsum([0, *(len(group) for group in groups.values())])
         self.places = {
             name: {parameter.name: start + index for index, parameter in enumerate(group)}
-            for (name, group), start in zip(own.items(), starts[:-1], strict=True)
+            for (name, group), start in zip(groups.items(), starts[:-1], strict=True)
         }
         self.nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
@@ -154,21 +154,23 @@ class Composition:
         value = np.concatenate(
             [np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1
         )
-        by_own = np.zeros((count + further, *points, count + further))
+        seed_slopes = np.zeros((count + further, *points, count + further))
         every = np.arange(count + further)
-        by_own[every, ..., every] = np.moveaxis(
+        seed_slopes[every, ..., every] = np.moveaxis(
             np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
         )
-        seeds = variables(value, by_own if slopes else by_own[count:])
-        own = {name: {key: seeds[place] for key, place in places.items()} for name, places in self.places.items()}
+        seeds = variables(value, seed_slopes if slopes else seed_slopes[count:])
+        by_mechanism = {
+            name: {key: seeds[index] for key, index in places.items()} for name, places in self.places.items()
+        }
         for name, places in self.places.items():
-            for key, place in places.items():
-                other = self.parameters[place].relative_to
+            for key, index in places.items():
+                other = self.parameters[index].relative_to
                 if other is not None:
-                    own[name][key] = own[name][key] * own[name][other]
+                    by_mechanism[name][key] = by_mechanism[name][key] * by_mechanism[name][other]
         return (
-            dict(own),
-            {name: seeds[place] for name, place in self.nuisances.items()},
+            dict(by_mechanism),
+            {name: seeds[index] for name, index in self.nuisances.items()},
             seeds[count:],
         )
 

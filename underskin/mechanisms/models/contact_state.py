@@ -53,8 +53,8 @@ class Contacts:
         """Contacts of the same structure at several sets of points, of so many each."""
         if len(parts) == 1:
             return parts[0]
-        each = [part._differentiated() for part in parts]
-        return parts[0]._with({name: stacked([own[name] for own in each], points) for name in each[0]})
+        fields = [part._differentiated() for part in parts]
+        return parts[0]._with({name: stacked([values[name] for values in fields], points) for name in fields[0]})
 
     def _with(self, changed: dict[str, Any]) -> Contacts:
         other = copy(self)

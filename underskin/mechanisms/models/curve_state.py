@@ -24,10 +24,10 @@ class Samples:
 class SampleLaw(Protocol):
     """What a law that nobody listed changes of samples."""
 
-    def moved(self, samples: Samples, travel: Floats) -> Floats:
+    def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
         """The travel at which a sphere presses [m] (points, curves, samples)."""
 
-    def read(self, samples: Samples, force: Floats) -> Floats:
+    def measured_force(self, samples: Samples, force: Floats) -> Floats:
         """The force that is read where the contact bears `force` [N] (points, curves, samples)."""
 
 

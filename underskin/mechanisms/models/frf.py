@@ -70,18 +70,18 @@ class ParameterBatch:
         count = fit.shape[1] if slopes else 0
         self.variables = count + further
         self.position = []
-        for place in range(count, self.variables):
-            by_place = np.zeros((self.variables, 1, 1))
-            by_place[place] = 1.0
-            self.position.append(Differentiated(np.zeros((1, 1)), by_place))
+        for index in range(count, self.variables):
+            seed = np.zeros((self.variables, 1, 1))
+            seed[index] = 1.0
+            self.position.append(Differentiated(np.zeros((1, 1)), seed))
 
     def of(self, points: Indices, places: Indices) -> Differentiated:
         """The parameters that are at these places of each model, at some of the points: (points, 1)."""
-        place = places[self.owner[points]]
+        columns = places[self.owner[points]]
         slopes = np.zeros((self.variables, len(points), 1))
         if self._slopes:
-            slopes[place, np.arange(len(points)), 0] = self._slope[points, place]
-        return Differentiated(self._value[points, place][:, None], slopes)
+            slopes[columns, np.arange(len(points)), 0] = self._slope[points, columns]
+        return Differentiated(self._value[points, columns][:, None], slopes)
 
 
 class MechanismInModels:
@@ -92,16 +92,18 @@ class MechanismInModels:
         self.mechanism = mechanism
         self.has = np.zeros(models, dtype=bool)
         self._places = {name: np.zeros(models, dtype=np.intp) for name in parameters}
-        self._relative = [(name, entry.relative_to) for name, entry in parameters.items() if entry.relative_to]
+        self._relative = [
+            (name, parameter.relative_to) for name, parameter in parameters.items() if parameter.relative_to
+        ]
         self._hooks = _overridden(type(mechanism))
 
     def add(self, model: int, places: Mapping[str, int]) -> None:
         """Note that a model has it, its parameters at these places."""
         self.has[model] = True
-        for name, place in places.items():
-            self._places[name][model] = place
+        for name, index in places.items():
+            self._places[name][model] = index
 
-    def on(self, *hooks: str) -> bool:
+    def has_hook(self, *hooks: str) -> bool:
         """Whether it has one of these hooks."""
         return not self._hooks.isdisjoint(hooks)
 
@@ -116,10 +118,12 @@ class MechanismInModels:
 _HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # what each class has of its own
 
 
-def _overridden(own: type[Mechanism]) -> frozenset[str]:
-    if own not in _HOOKS:
-        _HOOKS[own] = frozenset(name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name))
-    return _HOOKS[own]
+def _overridden(mechanism_type: type[Mechanism]) -> frozenset[str]:
+    if mechanism_type not in _HOOKS:
+        _HOOKS[mechanism_type] = frozenset(
+            name for name in dir(Mechanism) if getattr(mechanism_type, name) is not getattr(Mechanism, name)
+        )
+    return _HOOKS[mechanism_type]
 
 
 _POSITION = 2  # two more variables: the contact's x and y
@@ -140,9 +144,9 @@ class FrfModels:
         mechanisms: dict[Hashable, MechanismInModels] = {}
         self._alike: dict[Hashable, list[int]] = {}
         for number, model in enumerate(models):
-            self._log[number, : len(model.parameters)] = [entry.scale == "log" for entry in model.parameters]
-            for name, place in model.places_of_nuisances.items():
-                self._nuisances[name][number] = place
+            self._log[number, : len(model.parameters)] = [parameter.scale == "log" for parameter in model.parameters]
+            for name, index in model.places_of_nuisances.items():
+                self._nuisances[name][number] = index
             for mechanism in model.mechanisms:
                 places = model.places_of(mechanism)
                 key = mechanism.name, tuple(places)
@@ -152,7 +156,7 @@ class FrfModels:
                     )
                 mechanisms[key].add(number, places)
             self._alike.setdefault(model.structure, []).append(number)
-        self._mechanisms = sorted(mechanisms.values(), key=_place_in_order)
+        self._mechanisms = sorted(mechanisms.values(), key=_composition_order)
         self._with_hook: dict[str, list[MechanismInModels]] = {}
 
     def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
@@ -179,19 +183,21 @@ class FrfModels:
         together."""
         sets: dict[tuple[MechanismInModels, ...], list[int]] = {}
         for number in rows:
-            key = tuple(entry for entry in self._mechanisms if entry.has[number] and entry.on(*_MATERIAL))
+            key = tuple(
+                candidate for candidate in self._mechanisms if candidate.has[number] and candidate.has_hook(*_MATERIAL)
+            )
             sets.setdefault(key, []).append(number)
         alike: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
         for acting, numbers in sets.items():
             points = np.concatenate([rows[number] for number in numbers])
             contacts = self._contacts(self._models[numbers[0]], points, seeds)
-            own = [(entry.mechanism, entry.values(points, seeds)) for entry in acting]
-            for mechanism, values in own:
+            acting_values = [(candidate.mechanism, candidate.values(points, seeds)) for candidate in acting]
+            for mechanism, values in acting_values:
                 mechanism.on_declared(contacts, values)
-            for mechanism, values in own:
+            for mechanism, values in acting_values:
                 mechanism.on_material(contacts, values)
             needs_layer = contacts.layered or self._models[numbers[0]].needs_stiffness
-            for some, part in _of_one_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
+            for some, part in _split_by_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
                 layer = layer_of(part) if needs_layer else as_in_the_table(part)
                 structure = part.layered, *(x is None for x in (part.slip, part.work_of_adhesion, part.relaxed)), layer
                 alike.setdefault(structure, []).append((points[some], part))
@@ -220,14 +226,14 @@ class FrfModels:
         """The mechanisms with this hook: each with those among the points whose models have it, None where all have,
         and their values."""
         if hook not in self._with_hook:
-            self._with_hook[hook] = [entry for entry in self._mechanisms if entry.on(hook)]
+            self._with_hook[hook] = [candidate for candidate in self._mechanisms if candidate.has_hook(hook)]
         owner = seeds.owner[points]
-        for entry in self._with_hook[hook]:
-            some = np.flatnonzero(entry.has[owner])
+        for candidate in self._with_hook[hook]:
+            some = np.flatnonzero(candidate.has[owner])
             if len(some) == len(points):
-                yield entry.mechanism, None, entry.values(points, seeds)
+                yield candidate.mechanism, None, candidate.values(points, seeds)
             elif len(some):
-                yield entry.mechanism, some, entry.values(points[some], seeds)
+                yield candidate.mechanism, some, candidate.values(points[some], seeds)
 
     def _level_and_inside(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
@@ -280,12 +286,15 @@ class FrfModels:
             return Differentiated(distance, np.zeros((seeds.variables, *distance.shape)))
         still = constant(0.0, seeds.variables, (len(points),))
         x, y = (
-            own + shift
-            for own, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
+            coordinate + shift
+            for coordinate, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
         )
         for some, shift in moved:
             if shift is not None:
-                x, y = (place.plus(by, some, len(points)) for place, by in zip((x, y), shift, strict=True))
+                x, y = (
+                    coordinate.plus(displacement, some, len(points))
+                    for coordinate, displacement in zip((x, y), shift, strict=True)
+                )
         distance = np.hypot(x.value, y.value)
         away = np.where(distance > 0, distance, 1.0)
         return chain(distance, (x.value / away, x), (y.value / away, y))
@@ -295,13 +304,13 @@ class FrfModels:
     ) -> Differentiated:
         """The FRF of each recording before the dynamics [C/N]."""
         design, count = model.design, len(points)
-        own = {mechanism.name: values for mechanism, _, values in self._acting("mobility", points, seeds)}
+        mobility_values = {mechanism.name: values for mechanism, _, values in self._acting("mobility", points, seeds)}
         oscillating = sigma[0]
         for mechanism, nodes, weights in model.increments:
             rate = sigma[nodes[0]] * weights[0][design.point_contact]
             for node, weight in zip(nodes[1:], weights[1:], strict=True):
                 rate = rate + sigma[node] * weight[design.point_contact]
-            oscillating = oscillating + mechanism.mobility(own[mechanism.name]) * (rate - oscillating)
+            oscillating = oscillating + mechanism.mobility(mobility_values[mechanism.name]) * (rate - oscillating)
         rho = model.sensor_radius / contacts.thickness
         charge = oscillating * (1.5e-12 * seeds.of(points, self._nuisances["d33"]) * rho * rho)
         for mechanism, some, values in self._acting("on_d33", points, seeds):
@@ -329,32 +338,32 @@ class FrfModels:
             if product is None and some is None:
                 product = factor
             elif factor is not None:
-                one = (
+                base = (
                     constant(np.ones(1, dtype=complex), seeds.variables, (count,)).spread(lines)
                     if product is None
                     else product
                 )
-                product = one.times(factor, some, count)
+                product = base.times(factor, some, count)
         return product
 
 
 def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: ParameterBatch) -> Response:
     """With the derivatives by the contact's place apart from the others."""
-    count, place = seeds.variables - len(seeds.position), None
+    count, position_slopes = seeds.variables - len(seeds.position), None
     if seeds.position:
-        place = level.slopes[count:]
+        position_slopes = level.slopes[count:]
     if lines is not None:
         lines = Differentiated(lines.value, lines.slopes[:count])
-    return Response(Differentiated(level.value, level.slopes[:count]), place, lines, inside)
+    return Response(Differentiated(level.value, level.slopes[:count]), position_slopes, lines, inside)
 
 
-def _place_in_order(entry: MechanismInModels) -> tuple[int, int, str]:
+def _composition_order(candidate: MechanismInModels) -> tuple[int, int, str]:
     """Of composition."""
-    mechanism = entry.mechanism
+    mechanism = candidate.mechanism
     return mechanism.stage.place, mechanism.order, mechanism.name
 
 
-def _of_one_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
+def _split_by_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
     """The points' contacts, such that all of a part are on the same linear layer."""
     layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
     if all(bool((value == value.flat[0]).all()) for value in layers):
@@ -378,9 +387,9 @@ class FrfModel:
         mechanisms: Sequence[Mechanism],
         conditions: Conditions,
         table: SigmaTable,
-        beside: Sequence[Mechanism] = (),
+        further_mechanisms: Sequence[Mechanism] = (),
     ) -> None:
-        """Work out everything that no parameter changes; σ with room for the mechanisms `beside` as well."""
+        """Work out everything that no parameter changes; σ with room for the mechanisms `further_mechanisms` as well."""
         self._composition = Composition(mechanisms, conditions, "frf", frf_nuisances(conditions.skin))
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
@@ -396,9 +405,11 @@ class FrfModel:
         self.thickness = _required("thickness_mm", skin.thickness_mm)
         self.sensor_radius = _required("sensor_radius_mm", skin.sensor_radius_mm)
         self.poisson_ratio = skin.poisson_ratio
-        room = (*mechanisms, *beside)
+        room = (*mechanisms, *further_mechanisms)
         further = max((mechanism.largest_offset for mechanism in room), default=0.0)
-        bounds = max(max(1 / entry.low, entry.high) for entry in self.parameters if entry.name == "thickness")
+        bounds = max(
+            max(1 / parameter.low, parameter.high) for parameter in self.parameters if parameter.name == "thickness"
+        )
         stretch = _ROOM * bounds * max((mechanism.largest_stretch for mechanism in room), default=1.0)
         reached = min(PROFILE_END, stretch * largest_offset(design, further) / self.thickness)
         self.sigma = offset_sigma(table, self.sensor_radius / self.thickness, stretch, reached)
@@ -435,7 +446,7 @@ class FrfModel:
         fit = np.asarray(fit, dtype=float)
         if fit.ndim != 1:
             raise InvalidInput("fit", fit.shape, "must be one point: (parameters,)", code=ErrorCode.UNEQUAL_LENGTHS)
-        own, _, _ = self._composition.values(fit)
+        values, _, _ = self._composition.values(fit)
         response = self.respond(fit, slopes=slopes, place=place)
         value, by_all = response.on_rows(self.design)
         count = len(response.level.slopes)
@@ -443,7 +454,7 @@ class FrfModel:
             value=value,
             slopes=by_all[:count],
             position_slopes=by_all[count:] if place else None,
-            pickup=None if self.pickup is None else self.pickup.on_rows(self.pickup.deviation(_by_name(own))),
+            pickup=None if self.pickup is None else self.pickup.on_rows(self.pickup.deviation(_by_name(values))),
             pickup_rows=None if self.pickup is None else self.pickup.rows,
             inside=response.inside[self.recording],
         )
@@ -522,9 +533,9 @@ def _force_nodes(
     return np.stack(forces), increments
 
 
-def _by_name(own: dict[str, Values]) -> dict[str, Floats]:
+def _by_name(values_by_mechanism: dict[str, Values]) -> dict[str, Floats]:
     """The mechanisms' parameters (1,), whosever they are."""
-    return {name: value.value for values in own.values() for name, value in values.items()}
+    return {name: value.value for values in values_by_mechanism.values() for name, value in values.items()}
 
 
 def _required(name: str, value: float | None) -> float:

@@ -48,9 +48,9 @@ def together(pickups: Sequence[Pickup]) -> Pickup | None:
     rows = np.unique(np.concatenate([pickup.rows for pickup in pickups]))
 
     def deviation(values: Mapping[str, Floats]) -> Floats:
-        each = [(np.searchsorted(rows, pickup.rows), pickup.on_rows(pickup.deviation(values))) for pickup in pickups]
-        variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in each)), len(rows)))
-        for places, sd in each:
+        parts = [(np.searchsorted(rows, pickup.rows), pickup.on_rows(pickup.deviation(values))) for pickup in pickups]
+        variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in parts)), len(rows)))
+        for places, sd in parts:
             variance[..., places] += sd**2
         return np.sqrt(variance)
 
@@ -69,21 +69,21 @@ class FrfDesign:
         recordings = frf_of(conditions)
         count = len(recordings)
         self._conditions = weakref.ref(conditions)  # which keep the design in a cache
-        self.ids = tuple(entry.id for entry in recordings)
+        self.ids = tuple(recording.id for recording in recordings)
         number = {sensor.id: index for index, sensor in enumerate(conditions.skin.sensors)}
         places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
         # Of each recording
-        self.sensor: Indices = np.array([number[entry.sensor] for entry in recordings])
-        cycles = [np.nan if entry.load_cycles is None else entry.load_cycles for entry in recordings]
+        self.sensor: Indices = np.array([number[recording.sensor] for recording in recordings])
+        cycles = [np.nan if recording.load_cycles is None else recording.load_cycles for recording in recordings]
         self.load_cycles: Floats = np.array(cycles)
         position = np.array(
             [
-                places[own] if entry.position_mm is None else to_si("thickness_mm", entry.position_mm)
-                for own, entry in zip(self.sensor, recordings, strict=True)
+                places[sensor_index] if recording.position_mm is None else to_si("thickness_mm", recording.position_mm)
+                for sensor_index, recording in zip(self.sensor, recordings, strict=True)
             ]
         )
         # Of each contact; the dynamic force and the dwell are 0 where no mechanism asks
-        keys = np.array([_contact_key(entry, fields) for entry in recordings])
+        keys = np.array([_contact_key(recording, fields) for recording in recordings])
         if "id" in fields:
             keys = np.column_stack([keys, np.arange(count)])
         contacts, first, contact = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -94,25 +94,25 @@ class FrfDesign:
         pairs = _neighbours(places) if neighbours else np.zeros((len(places), len(places)), dtype=bool)
         self.neighbour_recording, other = np.nonzero(pairs[self.sensor])
         every = np.concatenate([np.arange(count), self.neighbour_recording])
-        beside = position[every] - places[np.concatenate([self.sensor, other])]
-        points, point = np.unique(np.column_stack([contact[every], np.round(beside, 12)]), axis=0, return_inverse=True)
+        offset = position[every] - places[np.concatenate([self.sensor, other])]
+        points, point = np.unique(np.column_stack([contact[every], np.round(offset, 12)]), axis=0, return_inverse=True)
         self.point_contact: Indices = points[:, 0].astype(np.intp)
         self.point_x, self.point_y = points[:, 1], points[:, 2]
         self.point, self.neighbour_point = point[:count], point[count:]
         # Of each row, and of each distinct line
-        lines_hz = [frequencies(entry) for entry in recordings]
+        lines_hz = [frequencies(recording) for recording in recordings]
         self.recording: Indices = np.repeat(np.arange(count), [len(column) for column in lines_hz])
-        self._dynamic_forces = np.array([entry.dynamic_force_n for entry in recordings])
+        self._dynamic_forces = np.array([recording.dynamic_force_n for recording in recordings])
         distinct, frequency = _distinct(lines_hz)
         self.line: Indices
-        own_line = contact[self.recording] * len(distinct) + frequency
-        if len(contacts) * len(distinct) > _SPARSE * len(own_line):
-            lines, self.line = np.unique(own_line, return_inverse=True)
+        line_of_row = contact[self.recording] * len(distinct) + frequency
+        if len(contacts) * len(distinct) > _SPARSE * len(line_of_row):
+            lines, self.line = np.unique(line_of_row, return_inverse=True)
         else:  # without sorting all rows
             measured = np.zeros(len(contacts) * len(distinct), dtype=bool)
-            measured[own_line] = True
+            measured[line_of_row] = True
             lines = np.flatnonzero(measured)
-            self.line = (np.cumsum(measured) - 1)[own_line]
+            self.line = (np.cumsum(measured) - 1)[line_of_row]
         self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
 
     @property
@@ -133,19 +133,19 @@ class FrfDesign:
         return conditions
 
 
-_kept = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of models of one campaign
+_cached_design = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of models of one campaign
 
 
 def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
     """The design, kept for the next model of the same conditions."""
-    return _kept(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n", "id"}, neighbours)
+    return _cached_design(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n", "id"}, neighbours)
 
 
-def frequencies(entry: FrfConditions) -> Floats:
+def frequencies(recording: FrfConditions) -> Floats:
     """The lines of one FRF [Hz]; raises InvalidInput where they are yet to be estimated from a time series."""
-    if entry.frequency_hz is None:
-        raise required(f"recordings[{entry.id}].frequency_hz", "required for a prediction")
-    return entry.frequency_hz
+    if recording.frequency_hz is None:
+        raise required(f"recordings[{recording.id}].frequency_hz", "required for a prediction")
+    return recording.frequency_hz
 
 
 def _distinct(columns: Sequence[Floats]) -> tuple[Floats, Indices]:
@@ -165,10 +165,10 @@ def _neighbours(places: Floats) -> Mask:
     return near
 
 
-def _contact_key(entry: FrfConditions, fields: Collection[str]) -> tuple[float, float, float, float]:
-    dwell = entry.dwell_s if "dwell_s" in fields and entry.dwell_s is not None else 0.0
-    dynamic_force = entry.dynamic_force_n if "dynamic_force_n" in fields else 0.0
-    return entry.preload_n, float(to_si("indenter_radius_mm", entry.indenter_radius_mm)), dynamic_force, dwell
+def _contact_key(recording: FrfConditions, fields: Collection[str]) -> tuple[float, float, float, float]:
+    dwell = recording.dwell_s if "dwell_s" in fields and recording.dwell_s is not None else 0.0
+    dynamic_force = recording.dynamic_force_n if "dynamic_force_n" in fields else 0.0
+    return recording.preload_n, float(to_si("indenter_radius_mm", recording.indenter_radius_mm)), dynamic_force, dwell
 
 
 def largest_offset(design: FrfDesign, further: float) -> float:
@@ -193,9 +193,9 @@ class Response:
 
         These are by the parameters, then by the place where those were asked for.
         """
-        place = np.zeros((0, *self.level.value.shape)) if self.place_slopes is None else self.place_slopes
+        position_slopes = np.zeros((0, *self.level.value.shape)) if self.place_slopes is None else self.place_slopes
         level = self.level.value[design.recording]
-        slopes = np.concatenate([self.level.slopes, place])[:, design.recording]
+        slopes = np.concatenate([self.level.slopes, position_slopes])[:, design.recording]
         if self.lines is None:
             return level.astype(complex), slopes.astype(complex)
         factor = self.lines.value[design.line]
@@ -211,8 +211,10 @@ class Response:
         def of(x: Differentiated) -> Differentiated:
             return Differentiated(x.value[index], x.slopes[:, index])
 
-        place = None if self.place_slopes is None else self.place_slopes[:, index]
-        return Response(of(self.level), place, None if self.lines is None else of(self.lines), self.inside[index])
+        position_slopes = None if self.place_slopes is None else self.place_slopes[:, index]
+        return Response(
+            of(self.level), position_slopes, None if self.lines is None else of(self.lines), self.inside[index]
+        )
 
 
 def joined(responses: Sequence[Response]) -> Response:
@@ -223,11 +225,11 @@ def joined(responses: Sequence[Response]) -> Response:
             np.concatenate([part.value for part in parts]), np.concatenate([part.slopes for part in parts], axis=1)
         )
 
-    place = [entry.place_slopes for entry in responses if entry.place_slopes is not None]
-    lines = [entry.lines for entry in responses if entry.lines is not None]
+    position_slopes = [response.place_slopes for response in responses if response.place_slopes is not None]
+    lines = [response.lines for response in responses if response.lines is not None]
     return Response(
-        of([entry.level for entry in responses]),
-        np.concatenate(place, axis=1) if place else None,
+        of([response.level for response in responses]),
+        np.concatenate(position_slopes, axis=1) if position_slopes else None,
         of(lines) if lines else None,
-        np.concatenate([entry.inside for entry in responses]),
+        np.concatenate([response.inside for response in responses]),
     )

@@ -151,32 +151,32 @@ class Layers:
     """The layers that each point of the fit coordinates has: their thickness [m] (points, 1, 1) and functions."""
 
     thickness: Floats
-    each: Sequence[LayerRatios]  # of each point, or one for all
+    by_point: Sequence[LayerRatios]  # one for each point of the fit coordinates, or one for all
 
     @cached_property
     def cubics(self) -> Floats:
         """The functions as cubics (points or 1, cells, powers, 4)."""
-        return np.stack([ratios.cubics for ratios in self.each])
+        return np.stack([ratios.cubics for ratios in self.by_point])
 
     def radius_of(self, root: Floats) -> Floats:
         """a of √(δR) [m] without adhesion."""
         relative = root / self.thickness
-        if len(self.each) == 1:
-            return self.each[0].alpha_of(relative) * self.thickness
-        parts = [ratios.alpha_of(of_point) for ratios, of_point in zip(self.each, relative, strict=True)]
+        if len(self.by_point) == 1:
+            return self.by_point[0].alpha_of(relative) * self.thickness
+        parts = [ratios.alpha_of(of_point) for ratios, of_point in zip(self.by_point, relative, strict=True)]
         return np.stack(parts) * self.thickness
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """Spheres of `radius` on elastomer of reduced modulus E' = E/(1 − ν²); `give` is 1/k of the stage [m/N]."""
+    """Spheres of `radius` on elastomer of reduced modulus E' = E/(1 − ν²); `compliance` is 1/k of the stage [m/N]."""
 
     modulus: Floats
     radius: Floats
     layers: Layers | None = None
     stiffening: Stiffening | None = None
-    give: Floats | float = 0.0
-    whole: Floats | float = 0.0  # 1 where it is pressed so deep that it is no paraboloid (curves, 1), else 0
+    compliance: Floats | float = 0.0
+    deep: Floats | float = 0.0  # 1 where it is pressed so deep that it is no paraboloid (curves, 1), else 0
     strain_share: Floats | float = 0.0  # of finite strain's correction of the depth
 
     def at(self, a: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -191,12 +191,12 @@ class Sphere:
         """δ + F/k in equilibrium."""
         force, depth, stiffness, unit = self.at(a)
         stretch = unit * np.sqrt(work)
-        return np.asarray(depth - stretch + self.give * (force - stiffness * stretch))
+        return np.asarray(depth - stretch + self.compliance * (force - stiffness * stretch))
 
     def force_at(self, travel: Floats, a: Floats) -> Floats:
         """F at a travel, where the edge is at a: as its stretch then is."""
         force, depth, stiffness, _ = self.at(a)
-        stretch = (depth + self.give * force - travel) / (1 + self.give * stiffness)
+        stretch = (depth + self.compliance * force - travel) / (1 + self.compliance * stiffness)
         return np.asarray(force - stiffness * stretch)
 
     def radius_at(self, travel: Floats, work: Floats | None, least: Floats | float = 0.0) -> Floats:
@@ -204,11 +204,11 @@ class Sphere:
         depth = np.maximum(travel, _SMALLEST)
         root = np.sqrt(self.radius * depth)
         start = root if self.layers is None else self.layers.radius_of(root)
-        if work is None and not (np.any(self.give) or np.any(self.whole) or np.any(self.strain_share)):
+        if work is None and not (np.any(self.compliance) or np.any(self.deep) or np.any(self.strain_share)):
             return start
         if work is None:
             work = np.zeros((1, 1, 1))
-        pulled = np.sqrt(1.5 * np.pi * work * self.give) * self.radius
+        pulled = np.sqrt(1.5 * np.pi * work * self.compliance) * self.radius
         start = start + (1.0 if self.layers is None else 1.3) * (self._unit(work) + pulled)
         shape = np.broadcast_shapes(np.shape(start), np.shape(travel), self._body.shape[:-1])
         a = np.array(np.broadcast_to(start, shape))
@@ -232,11 +232,11 @@ class Sphere:
         thickness = 0.0 if self.layers is None else self.layers.thickness
         law = self.stiffening
         stiffening = (-1.0, 0.0, 0.0) if law is None else (law.coefficient, law.form, law.exponent)
-        columns = (self.modulus, self.radius, self.give, thickness, *stiffening, self.whole, self.strain_share)
-        whole = np.empty((*np.broadcast_shapes(*map(np.shape, columns)), len(columns)))
+        columns = (self.modulus, self.radius, self.compliance, thickness, *stiffening, self.deep, self.strain_share)
+        rows = np.empty((*np.broadcast_shapes(*map(np.shape, columns)), len(columns)))
         for number, column in enumerate(columns):
-            whole[..., number] = column
-        return whole.reshape((1,) * (4 - whole.ndim) + whole.shape)
+            rows[..., number] = column
+        return rows.reshape((1,) * (4 - rows.ndim) + rows.shape)
 
     def _wide_body(self, shape: tuple[int, ...]) -> Floats:
         """For points and curves of a shape."""
@@ -259,10 +259,10 @@ class Sphere:
 
 def _wide(values: Floats | float, shape: tuple[int, ...], last: tuple[int, ...] = ()) -> Floats:
     """Broadcast to a shape, but along the last axis to what is `last`; contiguous."""
-    whole = (*shape[:-1], *last) if last else shape
-    if isinstance(values, np.ndarray) and values.shape == whole:
+    target = (*shape[:-1], *last) if last else shape
+    if isinstance(values, np.ndarray) and values.shape == target:
         return contiguous(values)
-    return contiguous(np.broadcast_to(values, whole))
+    return contiguous(np.broadcast_to(values, target))
 
 
 def in_contact(travel: Floats, pull_off: Floats) -> Mask:
@@ -305,20 +305,20 @@ class Adhesion:
 
 @dataclass(frozen=True)
 class Path:
-    """What is commanded: `travel` [m] and `time` [s] of samples (points, curves, samples).
+    """The commanded `travel` [m] and `time` [s] of the samples (points, curves, samples).
 
-    `begins` (points, curves) is the sample with which contact starts: the first, or one put where it touches; the
-    number of samples where there is none.
+    `first_contact` (points, curves): index of the sample at which contact starts, the first or one that was moved to
+    the touch; the number of samples without contact.
     """
 
     travel: Floats
     time: Floats
-    begins: Indices
+    first_contact: Indices
 
     @property
     def touched(self) -> Mask:
         """From the touch on."""
-        return np.asarray(np.arange(self.travel.shape[-1]) >= self.begins[..., None])
+        return np.asarray(np.arange(self.travel.shape[-1]) >= self.first_contact[..., None])
 
 
 def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path) -> tuple[Floats, Mask]:
@@ -326,12 +326,14 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
 
     The sphere's own stage is not looked at.
     """
-    if np.any(sphere.give):
-        sphere = replace(sphere, give=0.0)
-    begins, started = np.minimum(path.begins, path.travel.shape[-1] - 1)[..., None], path.touched
+    if np.any(sphere.compliance):
+        sphere = replace(sphere, compliance=0.0)
+    first_contact, started = np.minimum(path.first_contact, path.travel.shape[-1] - 1)[..., None], path.touched
     number = np.arange(path.travel.shape[-1])
     depth = np.where(started, path.travel, 0.0)
-    time = np.maximum(path.time, np.take_along_axis(path.time, begins, axis=-1))  # what is felt at the touch is at once
+    time = np.maximum(
+        path.time, np.take_along_axis(path.time, first_contact, axis=-1)
+    )  # what is felt at the touch is at once
     work = None if adhesion is None else adhesion.work
     least, lowest = sphere.pull_off(work)
     held = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
@@ -341,18 +343,18 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     depth_memory, force_memory = memories(depth, time, relaxation), memories(force, time, relaxation)
     growing = relaxation.convolved(force, force_memory)
     record = np.maximum.accumulate(np.where(depth >= np.maximum.accumulate(depth, axis=-1), number, 0), axis=-1)
-    record = np.maximum(record, begins)
+    record = np.maximum(record, first_contact)
     back = started & (record < number)
     if not back.any():
         return np.where(held, stiffer * growing, 0.0), held
-    edge, carried, kept = (np.zeros(depth.shape) for _ in range(3))
+    edge, carried, memory_force = (np.zeros(depth.shape) for _ in range(3))
     stuck = np.zeros(depth.shape, dtype=bool)
-    reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, begins[..., 0])
-    creep_edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, kept, stuck)
+    reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, first_contact[..., 0])
+    creep_edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, memory_force, stuck)
     answer, some = stiffer * growing, np.s_[..., np.flatnonzero(back.any(axis=(0, 1)))]
     a = sphere.radius_at(contiguous(edge[some]), work, np.maximum(least, 1e-12))
     ring, stiffness, _, _, stiffer_ring = _elastic(sphere, a, adhesion)
-    receding = stiffer_ring * (relaxation.unrelaxed * ring + kept[some] + stiffness * carried[some])
+    receding = stiffer_ring * (relaxation.unrelaxed * ring + memory_force[some] + stiffness * carried[some])
     answer[some] = np.where(back[some], receding, answer[some])
     held = np.where(back, stuck, held)
     touch = back & ~held
@@ -366,20 +368,20 @@ def relaxing_on_stage(
     sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
 ) -> tuple[Floats, Mask]:
     """The same where the travel is δ + F/k of a stage that gives: depths by secant steps at all samples together."""
-    give, travel, touched = sphere.give, path.travel, path.touched
+    compliance, travel, touched = sphere.compliance, path.travel, path.touched
     work = None if adhesion is None else adhesion.work
     least, _ = sphere.pull_off(work)
     a = sphere.radius_at(travel, work, np.maximum(least, 1e-12))
     elastic = sphere.force_at(travel, a) if work is not None else sphere.at(a)[0]
-    depth = np.where(touched, travel - give * elastic, travel)
+    depth = np.where(touched, travel - compliance * elastic, travel)
     slope = sphere.at(a)[2]
     scale = np.abs(travel).max(axis=-1, keepdims=True) + 1e-15
     force, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=depth))
     for _ in range(_ITERATIONS):
-        left = np.where(touched, depth + give * force - travel, 0.0)
-        if (np.abs(left) <= _SETTLED * scale).all():
+        residual = np.where(touched, depth + compliance * force - travel, 0.0)
+        if (np.abs(residual) <= _SETTLED * scale).all():
             break
-        moved = depth - left / (1 + give * slope)
+        moved = depth - residual / (1 + compliance * slope)
         after, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=moved))
         change = moved - depth
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -387,7 +389,7 @@ def relaxing_on_stage(
         far = np.abs(change) > 1e-12 * scale
         slope = np.where(far & np.isfinite(secant) & (secant > 0), 0.5 * (slope + np.minimum(secant, 4 * slope)), slope)
         depth, force = moved, after
-    lost = np.maximum.accumulate(np.abs(left) > _UNSETTLED * scale, axis=-1) & touched
+    lost = np.maximum.accumulate(np.abs(residual) > _UNSETTLED * scale, axis=-1) & touched
     held = held & ~lost
     return np.where(held, force, 0.0), held
 
@@ -415,13 +417,13 @@ def _first_touch(
     time: Floats,
 ) -> tuple[Floats, Mask]:
     """F of what is left of the first touch, at the first of the times, and whether it holds."""
-    left = relaxation.remaining(time - time[..., :1])
-    relaxed = relaxation.convolved(depth, memory) / left
-    work = adhesion.separation / left**2
+    remaining = relaxation.remaining(time - time[..., :1])
+    relaxed = relaxation.convolved(depth, memory) / remaining
+    work = adhesion.separation / remaining**2
     unit = replace(sphere, radius=sphere.radius + np.zeros_like(depth))
     least, lowest = unit.pull_off(work)
     a = unit.radius_at(relaxed, work, least)
-    return left * unit.force_at(relaxed, a), relaxed > lowest
+    return remaining * unit.force_at(relaxed, a), relaxed > lowest
 
 
 _CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
@@ -436,18 +438,20 @@ class IndentationModel(CurveModel):
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
-        recordings = [entry for entry in conditions.recordings if isinstance(entry, IndentationConditions)]
+        recordings = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
         nuisances = _nuisances(recordings, conditions.skin)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
-        self._ids = [entry.id for entry in recordings]
-        known = [entry.stage_stiffness_n_per_mm for entry in recordings]
-        self._give = np.array([0.0 if stage is None else 1e-3 / stage for stage in known])[:, None]  # m/N
-        self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])[:, None]
+        self._ids = [recording.id for recording in recordings]
+        stiffnesses = [recording.stage_stiffness_n_per_mm for recording in recordings]
+        self._stage_compliance = np.array([0.0 if stage is None else 1e-3 / stage for stage in stiffnesses])[
+            :, None
+        ]  # m/N
+        self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
         deepest = self.displacement.max(axis=1) - 1e-3 * middles
-        self._whole = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
+        self._deep = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
 
-    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
+    def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         thickness = self._skin.thickness_mm
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
         curve = Curve(
@@ -457,17 +461,17 @@ class IndentationModel(CurveModel):
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
         )
         for mechanism in self._mechanisms:
-            mechanism.on_curve(curve, own[mechanism.name])
+            mechanism.on_curve(curve, values[mechanism.name])
         return curve
 
     def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
         travel = self.displacement - contact
         samples = Samples(self._ids, travel, self.time)
         for law in curve.laws:
-            travel = law.moved(samples, travel)
+            travel = law.pressed_travel(samples, travel)
         force, held, inside = self._force_at(curve, travel, held)
         for law in curve.laws:
-            force = law.read(samples, force)
+            force = law.measured_force(samples, force)
         return force, held, inside
 
     def _force_at(self, curve: Curve, travel: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
@@ -491,10 +495,10 @@ class IndentationModel(CurveModel):
         """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage that is known to
         give although its deflection has been subtracted, else as the sphere's own stage has it."""
         least, travel = sphere.pull_off(work)
-        if np.any(self._give):
-            on_stage = replace(sphere, give=sphere.give + self._give)
+        if np.any(self._stage_compliance):
+            on_stage = replace(sphere, compliance=sphere.compliance + self._stage_compliance)
             radius, _ = on_stage.pull_off(work)
-            travel = np.where(self._give > 0, sphere.travel(np.maximum(radius, least), work), travel)
+            travel = np.where(self._stage_compliance > 0, sphere.travel(np.maximum(radius, least), work), travel)
         return travel
 
     def _relaxing(
@@ -507,9 +511,9 @@ class IndentationModel(CurveModel):
     ) -> tuple[Floats, Mask, Mask]:
         """The same through the history, which begins where a recording touches, between two samples."""
         path = _with_touch(travel, self.time)
-        force, own = force_on(path)
-        own = own & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
-        held = own if held is None else held
+        force, contact_mask = force_on(path)
+        contact_mask = contact_mask & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
+        held = contact_mask if held is None else held
         force = np.where(held, force, 0.0)
         if sphere.layers is None:  # a half space, which has no tables to leave
             return force, held, np.ones_like(held)
@@ -522,14 +526,14 @@ class IndentationModel(CurveModel):
         layers = None
         if curve.layered:
             assert curve.thickness is not None
-            each = poisson_ratio.ravel().tolist()
-            alike = each[:1] if len(set(each)) == 1 else each
-            layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in alike])
+            poisson_ratios = poisson_ratio.ravel().tolist()
+            distinct = poisson_ratios[:1] if len(set(poisson_ratios)) == 1 else poisson_ratios
+            layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in distinct])
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
-        give = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
+        compliance = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
         reduced = numbers(curve.modulus) / (1 - poisson_ratio**2)
         assert curve.strain_share is not None
-        return Sphere(reduced, self._radius, layers, stiffening, give, self._whole, numbers(curve.strain_share))
+        return Sphere(reduced, self._radius, layers, stiffening, compliance, self._deep, numbers(curve.strain_share))
 
 
 def _adhesion(curve: Curve) -> Adhesion | None:
@@ -551,32 +555,32 @@ def _with_touch(travel: Floats, time: Floats) -> Path:
     share = before / (before - after)
     time[point, curve, then - 1] += share * (time[point, curve, then] - time[point, curve, then - 1])
     travel[point, curve, then - 1] = 0.0
-    begins = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
-    return Path(travel, time, begins)
+    first_contact = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
+    return Path(travel, time, first_contact)
 
 
 def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescription) -> list[Parameter]:
     """The nuisances' parameters; raises InvalidInput where no measured curve loads, or one does not move."""
     estimates, contact_points, refused = [], [], None
-    for entry in recordings:
-        span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
-        begins = 0.0
-        if isinstance(entry, IndentationRecording):
-            seen = course(entry.displacement_mm, entry.force_n, entry.time_s)
-            force = entry.force_n - seen.drift * times_of(entry)
-            columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, force)]
+    for recording in recordings:
+        span = float(np.ptp(to_si("displacement_mm", recording.displacement_mm)))
+        contact = 0.0
+        if isinstance(recording, IndentationRecording):
+            features = course(recording.displacement_mm, recording.force_n, recording.time_s)
+            force = recording.force_n - features.drift * times_of(recording)
+            columns = [np.asarray(column, dtype=float).tobytes() for column in (recording.displacement_mm, force)]
             try:
-                modulus, begins = _hertz(*columns, entry.indenter_radius_mm, skin.poisson_ratio)
-                estimates.append(modulus if modulus > 0 else _secant_modulus(entry, skin.poisson_ratio))
+                modulus, contact = _hertz(*columns, recording.indenter_radius_mm, skin.poisson_ratio)
+                estimates.append(modulus if modulus > 0 else _secant_modulus(recording, skin.poisson_ratio))
             except InvalidInput as refusal:
-                refused = refusal.at(f"recordings[{entry.id}].{refusal.field}")
+                refused = refusal.at(f"recordings[{recording.id}].{refusal.field}")
                 # A curve that does not load begins where it shows least force.
-                begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(force).argmin())]))
-            if seen.snap_in is not None:
-                begins = float(to_si("displacement_mm", touch(entry.displacement_mm, seen.snap_in)))
+                contact = float(to_si("displacement_mm", recording.displacement_mm[int(np.abs(force).argmin())]))
+            if features.snap_in is not None:
+                contact = float(to_si("displacement_mm", touch(recording.displacement_mm, features.snap_in)))
             if refused is not None and span == 0:
                 raise refused
-        contact_points.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_BOUND * span))
+        contact_points.append(contact_point(recording.id, contact, _CONTACT_SD * span, _CONTACT_BOUND * span))
     if refused is not None and not estimates:
         raise refused
     thickness = [] if skin.thickness_mm is None else [thickness_parameter(skin)]
@@ -585,10 +589,10 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
     return [modulus_parameter(skin, estimates), STRAIN_SHARE, *thickness, *contact_points]
 
 
-def _secant_modulus(entry: IndentationRecording, poisson_ratio: float) -> float:
+def _secant_modulus(recording: IndentationRecording, poisson_ratio: float) -> float:
     """Of a curve that does not load: Hertz's modulus [Pa] of the range of force over the range of travel."""
-    force, travel = (float(np.ptp(to_si(name, getattr(entry, name)))) for name in ("force_n", "displacement_mm"))
-    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
+    force, travel = (float(np.ptp(to_si(name, getattr(recording, name)))) for name in ("force_n", "displacement_mm"))
+    radius = float(to_si("indenter_radius_mm", recording.indenter_radius_mm))
     return max(0.75 * (1 - poisson_ratio**2) * force / (np.sqrt(radius) * max(travel, 1e-300) ** 1.5), 1e-300)
 
 

@@ -38,7 +38,9 @@ class Relaxation:
     def of_points(self, count: int) -> tuple[Floats, Floats]:
         """g and τ of so many points, (points, pairs)."""
         pairs = self.fraction.shape[-1]
-        fraction, time = (np.broadcast_to(one.reshape(-1, pairs), (count, pairs)) for one in (self.fraction, self.time))
+        fraction, time = (
+            np.broadcast_to(values.reshape(-1, pairs), (count, pairs)) for values in (self.fraction, self.time)
+        )
         return contiguous(fraction), contiguous(time)
 
 

@@ -232,7 +232,7 @@ class OffsetSigma:
         at offsets e/h (…, rows), and the first one's derivative by e/h: (quantities + 1, *points, rows)."""
         from underskin.mechanisms.models.sigma_kernels import linear_sigma
 
-        whole = np.empty((len(transforms) + 1, *points, len(contact)))
+        result = np.empty((len(transforms) + 1, *points, len(contact)))
         linear_sigma(
             self._bessel,
             self.hertz.ends[3],
@@ -240,18 +240,18 @@ class OffsetSigma:
             contact,
             contiguous(transforms.reshape(len(transforms), -1, *transforms.shape[-2:])),
             contiguous(offset.reshape(-1, offset.shape[-1])),
-            whole.reshape(len(whole), -1, len(contact)),
+            result.reshape(len(result), -1, len(contact)),
         )
-        return whole
+        return result
 
 
 def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
     """The same, kept for the next model of the same skin; with room for offsets up to the next half of h."""
-    return _kept(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
+    return _cached_sigma(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
 
 
 @lru_cache(maxsize=8)
-def _kept(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
+def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
@@ -379,12 +379,12 @@ def _transforms(
         if contacts.slip in of_layer:
             terms.append(((shape.value, by_slip * disc), (shape.by_slip, passed)))
             further.append(contacts.slip)
-    whole = np.empty((len(terms), *np.broadcast_shapes(shape.value.shape, passed.shape)))
-    for quantity, (first, *others) in zip(whole, terms, strict=True):
+    result = np.empty((len(terms), *np.broadcast_shapes(shape.value.shape, passed.shape)))
+    for quantity, (first, *others) in zip(result, terms, strict=True):
         np.multiply(*first, out=quantity)
-        for one, other in others:
-            quantity += one * other
-    return whole, further
+        for pressure, transmitted in others:
+            quantity += pressure * transmitted
+    return result, further
 
 
 @dataclass(frozen=True)

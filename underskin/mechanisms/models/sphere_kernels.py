@@ -26,10 +26,10 @@ _STEPS = 60
 _TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is about its square
 _NO_CONTACT = 1e-15  # m, which stands for no radius
 _EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
-_BENT = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
+_LARGEST_CORRECTION = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
 LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) where the correction ends, which then stays
 
-Own = tuple[float, float, float, float, float, float, float, float, float]  # a body's numbers
+Constants = tuple[float, float, float, float, float, float, float, float, float]  # the nine numbers of a body
 Four = tuple[float, float, float, float]
 
 _ROWS = "float64[:, :, ::1]"
@@ -46,11 +46,11 @@ def _stiffened(strain: float, coefficient: float, form: float, exponent: float) 
     stretch = 1.0 - strain
     stress = 1.0 / stretch**2 - stretch
     third = max(stretch * stretch + 2.0 / stretch - 3.0, 1e-18) / 3.0
-    growth = 3.0 * coefficient * third ** (0.5 * exponent)
-    slope = growth * exponent * stress / (3.0 * third)
-    logarithm = growth
+    excess = 3.0 * coefficient * third ** (0.5 * exponent)
+    slope = excess * exponent * stress / (3.0 * third)
+    logarithm = excess
     if abs(form) >= _EXPONENTIAL:
-        total = max(1.0 + form * growth, 1e-9)
+        total = max(1.0 + form * excess, 1e-9)
         logarithm = math.log(total) / form
         slope /= total
     if logarithm > _LARGEST_RATIO:
@@ -59,13 +59,13 @@ def _stiffened(strain: float, coefficient: float, form: float, exponent: float) 
 
 
 @compiled()
-def _of(body: Floats, point: int, curve: int, sample: int) -> Own:
-    own = body[point, curve, min(sample, body.shape[2] - 1)]
-    return own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7], own[8]
+def _constants(body: Floats, point: int, curve: int, sample: int) -> Constants:
+    values = body[point, curve, min(sample, body.shape[2] - 1)]
+    return values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7], values[8]
 
 
 @compiled()
-def _whole_sphere(a: float, radius: float) -> tuple[float, float, float]:
+def _deep_sphere(a: float, radius: float) -> tuple[float, float, float]:
     """F/E', δ and dδ/da of a sphere that is no paraboloid (Sneddon 1965): δ = a artanh(a/R), dF = 2E'a dδ.
 
     Where a is nearly R the depth goes on in a straight line: no contact is wider.
@@ -84,7 +84,7 @@ def _whole_sphere(a: float, radius: float) -> tuple[float, float, float]:
 
 @compiled()
 def _strain_ratio(
-    load: float, by_load: float, whole: float, cubics: Floats, u: float, per_h: float
+    load: float, by_load: float, deep: float, cubics: Floats, u: float, per_h: float
 ) -> tuple[float, float]:
     """δ of the solved contact over the linear one's at the same force, less 1, and its derivative by a.
 
@@ -94,7 +94,7 @@ def _strain_ratio(
     by_x = by_load * x / 3.0 if x < LARGEST_CBRT_LOAD else 0.0
     c3, c2, c1, c0 = cubics[0], cubics[1], cubics[2], cubics[3]
     p0 = ((c3[4] * u + c2[4]) * u + c1[4]) * u + c0[4]
-    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - whole * WHOLE_OF_LOAD
+    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - deep * WHOLE_OF_LOAD
     p2 = ((c3[6] * u + c2[6]) * u + c1[6]) * u + c0[6]
     by_p0 = (3.0 * c3[4] * u + 2.0 * c2[4]) * u + c1[4]
     by_p1 = (3.0 * c3[5] * u + 2.0 * c2[5]) * u + c1[5]
@@ -105,29 +105,33 @@ def _strain_ratio(
 
 
 @compiled()
-def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
+def _contact(a: float, constants: Constants, cubics: Floats) -> tuple[Four, Four]:
     """F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; and their logarithms' derivatives
     by a."""
-    modulus, radius, _, thickness, coefficient, form, exponent, whole, share = own
-    cell, u, per_h, growth, inverse = 0, 0.0, 0.0, 0.0, 1.0 / a
+    modulus, radius, _, thickness, coefficient, form, exponent, deep, share = constants
+    cell, u, per_h, log_modulus_slope, inverse = 0, 0.0, 0.0, 0.0, 1.0 / a
     if coefficient >= 0:
         strain = _STRAIN * a / radius
         ratio, slope = _stiffened(min(strain, _LARGEST_STRAIN), coefficient, form, exponent)
         modulus *= ratio
-        growth = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
+        log_modulus_slope = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
     depth, stiffness = a * a / radius, 2.0 * modulus * a
     force, stretch = 2.0 / 3.0 * stiffness * depth, math.sqrt(2.0 * math.pi * a / modulus)
-    by_force, by_depth, by_stiffness = 3.0 * inverse + growth, 2.0 * inverse, inverse + growth
-    by_stretch = 0.5 * (inverse - growth)
-    if whole > 0:
-        force, depth, slope = _whole_sphere(a, radius)
-        force, by_force, by_depth = modulus * force, stiffness * slope / (modulus * force) + growth, slope / depth
+    by_force, by_depth, by_stiffness = 3.0 * inverse + log_modulus_slope, 2.0 * inverse, inverse + log_modulus_slope
+    by_stretch = 0.5 * (inverse - log_modulus_slope)
+    if deep > 0:
+        force, depth, slope = _deep_sphere(a, radius)
+        force, by_force, by_depth = (
+            modulus * force,
+            stiffness * slope / (modulus * force) + log_modulus_slope,
+            slope / depth,
+        )
     if thickness > 0:
         cells = cubics.shape[0]
-        place = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
-        cell = min(int(place), cells - 1)
-        u = (place - cell) * LARGEST_A_OVER_H / cells
-        per_h = 1.0 / thickness if place < cells else 0.0
+        position = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
+        cell = min(int(position), cells - 1)
+        u = (position - cell) * LARGEST_A_OVER_H / cells
+        per_h = 1.0 / thickness if position < cells else 0.0
         c3, c2, c1, c0 = cubics[cell, 0], cubics[cell, 1], cubics[cell, 2], cubics[cell, 3]
         of_force = ((c3[0] * u + c2[0]) * u + c1[0]) * u + c0[0]
         of_depth = ((c3[1] * u + c2[1]) * u + c1[1]) * u + c0[1]
@@ -145,7 +149,7 @@ def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
         )
     if share != 0:
         ratio, by_a = _strain_ratio(
-            LOAD_OF_REDUCED * force / (modulus * radius**2), by_force - growth, whole, cubics[cell], u, per_h
+            LOAD_OF_REDUCED * force / (modulus * radius**2), by_force - log_modulus_slope, deep, cubics[cell], u, per_h
         )
         total = 1.0 + share * ratio
         depth, by_depth = depth * total, by_depth + share * by_a / total
@@ -153,18 +157,18 @@ def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
 
 
 @compiled()
-def _travel(a: float, root_work: float, own: Own, cubics: Floats) -> tuple[float, float]:
+def _travel(a: float, root_work: float, constants: Constants, cubics: Floats) -> tuple[float, float]:
     """δ + F/k in equilibrium, where δ and F fall by ℓ and K ℓ, and its derivative by a."""
-    (force, depth, stiffness, unit), (by_force, by_depth, by_stiffness, by_stretch) = _contact(a, own, cubics)
+    (force, depth, stiffness, unit), (by_force, by_depth, by_stiffness, by_stretch) = _contact(a, constants, cubics)
     stretch = unit * root_work
     lost = stiffness * stretch
-    travel = depth - stretch + own[2] * (force - lost)
+    travel = depth - stretch + constants[2] * (force - lost)
     of_force = force * by_force - lost * (by_stiffness + by_stretch)
-    return travel, depth * by_depth - stretch * by_stretch + own[2] * of_force
+    return travel, depth * by_depth - stretch * by_stretch + constants[2] * of_force
 
 
 @compiled()
-def _solved(aim: float, start: float, lowest: float, root_work: float, own: Own, cubics: Floats) -> Four:
+def _solved(aim: float, start: float, lowest: float, root_work: float, constants: Constants, cubics: Floats) -> Four:
     """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: where, its travel and slope.
 
     Newton's steps, and halvings where one leaves the bracket known so far.
@@ -173,7 +177,7 @@ def _solved(aim: float, start: float, lowest: float, root_work: float, own: Own,
     touching = at_touching = slope = 0.0
     for _ in range(_STEPS):
         touching = radius
-        at_touching, slope = _travel(radius, root_work, own, cubics)
+        at_touching, slope = _travel(radius, root_work, constants, cubics)
         if at_touching > aim:
             above = radius
         else:
@@ -197,7 +201,7 @@ def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> No
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
             for sample in range(samples):
-                here, _ = _contact(a[point, curve, sample], _of(body, point, curve, sample), layer)
+                here, _ = _contact(a[point, curve, sample], _constants(body, point, curve, sample), layer)
                 for number in range(4):
                     contact[number, point, curve, sample] = here[number]
 
@@ -214,11 +218,11 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
-            own, root_work = _of(body, point, curve, 0), math.sqrt(work[point, curve, 0])
-            touching, at_touching, slope, bend = 0.0, 0.0, 0.0, 0.0
+            constants, root_work = _constants(body, point, curve, 0), math.sqrt(work[point, curve, 0])
+            touching, at_touching, slope, curvature = 0.0, 0.0, 0.0, 0.0
             for sample in range(samples):
                 if not alike:
-                    own = _of(body, point, curve, sample)
+                    constants = _constants(body, point, curve, sample)
                     root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
                 lowest = least[point, curve, min(sample, least.shape[2] - 1)]
                 aim, radius = travel[point, curve, sample], a[point, curve, sample]
@@ -227,23 +231,28 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
                     continue
                 if alike and slope > 0:
                     tangent = (aim - at_touching) / slope
-                    bent = 0.5 * bend * tangent / slope
-                    radius = min(radius, touching + tangent * (1.0 - min(max(bent, -_BENT), _BENT)))
+                    correction = 0.5 * curvature * tangent / slope
+                    radius = min(
+                        radius,
+                        touching + tangent * (1.0 - min(max(correction, -_LARGEST_CORRECTION), _LARGEST_CORRECTION)),
+                    )
                 before, former = touching, slope
-                radius, touching, at_touching, slope = _solved(aim, max(radius, lowest), lowest, root_work, own, layer)
-                bend = (slope - former) / (touching - before) if former > 0 and touching != before else 0.0
+                radius, touching, at_touching, slope = _solved(
+                    aim, max(radius, lowest), lowest, root_work, constants, layer
+                )
+                curvature = (slope - former) / (touching - before) if former > 0 and touching != before else 0.0
                 a[point, curve, sample] = radius
 
 
 @compiled()
-def _least_travel(low: float, high: float, root_work: float, own: Own, cubics: Floats) -> float:
+def _least_travel(low: float, high: float, root_work: float, constants: Constants, cubics: Floats) -> float:
     """The radius between two at which the travel's slope is 0; the bound that is nearer where it keeps its sign.
 
     Regula falsi (Illinois) of slope √a over a^(3/2), which is straight for JKR's contact with a half space.
     """
     below, above = low**1.5, high**1.5
-    at_below = _travel(low, root_work, own, cubics)[1] * math.sqrt(low)
-    at_above = _travel(high, root_work, own, cubics)[1] * math.sqrt(high)
+    at_below = _travel(low, root_work, constants, cubics)[1] * math.sqrt(low)
+    at_above = _travel(high, root_work, constants, cubics)[1] * math.sqrt(high)
     if at_below >= 0:
         return low
     if at_above <= 0:
@@ -254,11 +263,11 @@ def _least_travel(low: float, high: float, root_work: float, own: Own, cubics: F
         radius, before = power ** (2 / 3), radius
         if abs(radius - before) <= _TOLERANCE * radius:
             break
-        found = _travel(radius, root_work, own, cubics)[1] * math.sqrt(radius)
-        if found > 0:
-            above, at_above, at_below = power, found, 0.5 * at_below
+        scaled_slope = _travel(radius, root_work, constants, cubics)[1] * math.sqrt(radius)
+        if scaled_slope > 0:
+            above, at_above, at_below = power, scaled_slope, 0.5 * at_below
         else:
-            below, at_below, at_above = power, found, 0.5 * at_above
+            below, at_below, at_above = power, scaled_slope, 0.5 * at_above
     return radius
 
 
@@ -270,15 +279,15 @@ def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, tr
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
             for sample in range(samples):
-                own = _of(body, point, curve, sample)
+                constants = _constants(body, point, curve, sample)
                 root_work = math.sqrt(work[point, curve, sample])
-                unit = (2.0 * math.pi * root_work**2 * own[1] ** 2 / own[0]) ** (1 / 3)
-                low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
+                unit = (2.0 * math.pi * root_work**2 * constants[1] ** 2 / constants[0]) ** (1 / 3)
+                low, high, thickness = 0.02 * unit, 4.0 * unit, constants[3]
                 if thickness > 0:
                     low, high = min(low, 0.1 * LARGEST_A_OVER_H * thickness), min(high, LARGEST_A_OVER_H * thickness)
-                high = _least_travel(low, high, root_work, own, layer) if low < high else high
+                high = _least_travel(low, high, root_work, constants, layer) if low < high else high
                 radius[point, curve, sample] = high
-                travel[point, curve, sample] = _travel(high, root_work, own, layer)[0]
+                travel[point, curve, sample] = _travel(high, root_work, constants, layer)[0]
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, boolean[:, :, ::1], {_ROWS})")
@@ -323,13 +332,13 @@ def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) ->
     points, curves, samples = history.shape
     for point in range(points):
         for curve in range(curves):
-            u, t, own = history[point, curve], time[point, curve], memory[point, curve]
+            u, t, memories = history[point, curve], time[point, curve], memory[point, curve]
             for pair in range(times.shape[1]):
-                own[0, pair] = u[0]
+                memories[0, pair] = u[0]
                 for sample in range(1, samples):
                     x = max(t[sample] - t[sample - 1], 0.0) / times[point, pair]
                     step = _lagging(x) * (u[sample] - u[sample - 1])
-                    own[sample, pair] = math.exp(-x) * own[sample - 1, pair] + step
+                    memories[sample, pair] = math.exp(-x) * memories[sample - 1, pair] + step
 
 
 @compiled()
@@ -390,8 +399,8 @@ def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Fl
         if settled:
             break
         _between(low, high, share, rings, pairs, memory)
-        place = depth[low] + share * (depth[high] - depth[low])
-        carried, remaining = _carried(place, time[low] + share * (time[high] - time[low]), memory, pairs, now)
+        position = depth[low] + share * (depth[high] - depth[low])
+        carried, remaining = _carried(position, time[low] + share * (time[high] - time[low]), memory, pairs, now)
         stretch = parting[low] + share * (parting[high] - parting[low])
         value = carried + stretch - (slack[low] + share * (slack[high] - slack[low])) * remaining
         if value >= 0:
@@ -414,12 +423,12 @@ def creep_edge_rows(
     force: Floats,
     force_memory: Floats,
     record: Indices,
-    begins: Indices,
+    first_contact: Indices,
     fractions: Floats,
     times: Floats,
     edge: Floats,
     carried: Floats,
-    kept: Floats,
+    memory_force: Floats,
     stuck: Mask,
 ) -> None:
     """Of samples after the last deeper one (`record`) fill whether any ring holds, and of the outermost that does the
@@ -434,7 +443,7 @@ def creep_edge_rows(
         for curve in range(curves):
             here = point, curve
             rings = depth[here], time[here], depth_memory[here], slack[here], parting[here]
-            first = begins[here]
+            first = first_contact[here]
             for sample in range(first, samples):
                 high = record[point, curve, sample]
                 now = depth[point, curve, sample], time[point, curve, sample], depth_memory[point, curve, sample]
@@ -444,15 +453,15 @@ def creep_edge_rows(
                 high = min(low + 1, high)
                 share = _share(low, high, rings, pairs, now, memory) if high > low else 0.0
                 _between(low, high, share, rings, pairs, memory)
-                place = rings[0][low] + share * (rings[0][high] - rings[0][low])
+                position = rings[0][low] + share * (rings[0][high] - rings[0][low])
                 reached = rings[1][low] + share * (rings[1][high] - rings[1][low])
                 stuck[point, curve, sample] = True
-                edge[point, curve, sample] = place
-                carried[point, curve, sample] = _carried(place, reached, memory, pairs, now)[0]
+                edge[point, curve, sample] = position
+                carried[point, curve, sample] = _carried(position, reached, memory, pairs, now)[0]
                 of_force = force[here], time[here], force_memory[here], slack[here], parting[here]
                 _between(low, high, share, of_force, pairs, memory)
                 total = 0.0
                 for pair in range(len(memory)):
                     age = max(now[1] - reached, 0.0)
                     total += pairs[0][pair] * math.exp(-age / pairs[1][pair]) * memory[pair]
-                kept[point, curve, sample] = total
+                memory_force[point, curve, sample] = total

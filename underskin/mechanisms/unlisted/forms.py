@@ -58,10 +58,10 @@ def shapes(axis: Axis) -> list[Shape]:
     if axis.words:
         return _of_words(axis)
     count = len(axis.levels)
-    each: list[Shape] = [*_linear(axis), *_step(axis)]
+    result: list[Shape] = [*_linear(axis), *_step(axis)]
     if axis.positive and count >= _LEAST_LEVELS["power"]:
-        each.append(_power(axis))
-    for form, make in (
+        result.append(_power(axis))
+    for form, builder in (
         ("exponential", _exponential),
         ("saturating", _saturating),
         ("threshold", _threshold),
@@ -70,8 +70,8 @@ def shapes(axis: Axis) -> list[Shape]:
         ("free", _free),
     ):
         if count >= _LEAST_LEVELS[form]:
-            each += make(axis)
-    return each
+            result += builder(axis)
+    return result
 
 
 def reference(axis: Axis, variant: str) -> float:
@@ -101,7 +101,7 @@ def _power(axis: Axis) -> Shape:
 
 def _exponential(axis: Axis) -> list[Shape]:
     """(e^(u/ξ) − 1)/(e^(1/ξ) − 1), u from 0 to 1 over the range; and the same from the other end."""
-    length = _bend("law_growth_length", axis, 0.08, 0.8, 0.3, _LATE)
+    length = _length("law_growth_length", axis, 0.08, 0.8, 0.3, _LATE)
 
     def growing(x: Floats, values: Values) -> list[Feature]:
         rate = axis.span / values["law_growth_length"]
@@ -112,7 +112,7 @@ def _exponential(axis: Axis) -> list[Shape]:
 
 def _saturating(axis: Axis) -> list[Shape]:
     """(1 − e^(−u/τ))/(1 − e^(−1/τ)), u from 0 to 1 over the range."""
-    length = _bend("law_approach", axis, 0.02, 1.2, 0.25, _LATE)
+    length = _length("law_approach", axis, 0.02, 1.2, 0.25, _LATE)
 
     def approaching(x: Floats, values: Values) -> list[Feature]:
         rate = axis.span / values["law_approach"]
@@ -143,8 +143,8 @@ def _threshold(axis: Axis) -> list[Shape]:
         behind = (values["law_onset"] - x) / (values["law_onset"] - axis.low)
         return [where(behind.value > 0, behind, 0.0)]
 
-    each = (("above", above), ("below", below))
-    return [Shape("threshold", law, variant=name, share=0.5, bending=(onset,), grid=grid) for name, law in each]
+    laws = (("above", above), ("below", below))
+    return [Shape("threshold", law, variant=name, share=0.5, bending=(onset,), grid=grid) for name, law in laws]
 
 
 def _step(axis: Axis) -> list[Shape]:
@@ -171,7 +171,7 @@ def _periodic(axis: Axis) -> list[Shape]:
         turns = np.arange(0.75, max(most, 0.75) + 1e-9, max(0.5, (most - 0.75) / _MOST_PERIODS))  # resolved: 0.5
         periods, half_width = (axis.span / turns).tolist(), 0.0
 
-    def of(place: int, period: float) -> Shape:
+    def of(index: int, period: float) -> Shape:
         turn = axis.span / period
         ends = (period * (1 - half_width), period * (1 + half_width))
         if not half_width:
@@ -188,19 +188,19 @@ def _periodic(axis: Axis) -> list[Shape]:
             "periodic",
             turning,
             count=2,
-            variant=str(place),
+            variant=str(index),
             share=1 / len(periods),
             bending=(length,),
             grid=((float(np.log(period)),),),
         )
 
-    return [of(place, period) for place, period in enumerate(periods)]
+    return [of(index, period) for index, period in enumerate(periods)]
 
 
 def _peak(axis: Axis) -> list[Shape]:
     """1/(1 + ((x − x1)/w)²)."""
     centre = Parameter("law_centre", axis.unit, axis.low, axis.high, Uniform(), "linear", limit=None, reason=_SHARP)
-    width = _bend("law_width", axis, 0.03, 0.35, 0.12, "from a few levels to a third of the measured range")
+    width = _length("law_width", axis, 0.03, 0.35, 0.12, "from a few levels to a third of the measured range")
     grid = tuple(
         (axis.low + share * axis.span, float(np.log(wide * axis.span)))
         for wide in (0.08, 0.2)
@@ -247,13 +247,13 @@ def _of_words(axis: Axis) -> list[Shape]:
         )
 
     words = range(len(axis.words))
-    each = [of(word) for word in (words if len(axis.words) > 2 else words[1:])]
+    laws = [of(word) for word in (words if len(axis.words) > 2 else words[1:])]
     if len(axis.words) > 2:
-        each.append(Shape("free", lambda x, _: [(x == word).astype(float) for word in words], count=len(axis.words)))
-    return each
+        laws.append(Shape("free", lambda x, _: [(x == word).astype(float) for word in words], count=len(axis.words)))
+    return laws
 
 
-def _bend(name: str, axis: Axis, low: float, high: float, middle: float, reason: str) -> Parameter:
+def _length(name: str, axis: Axis, low: float, high: float, middle: float, reason: str) -> Parameter:
     """A length along an axis, these shares of its range."""
     ends = low * axis.span, high * axis.span
     prior = Normal(float(np.log(middle * axis.span)), 0.9)

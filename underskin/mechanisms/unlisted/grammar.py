@@ -72,7 +72,7 @@ class FrequencyLaw(UnlistedLaw):
         self.description = LawDescription("frequency_response", "frequency_hz", law.form)
         self.variant = law.variant
         self.share = law.share
-        self.amplitudes = tuple(entry.name for entry in law.amplitudes)
+        self.amplitudes = tuple(parameter.name for parameter in law.amplitudes)
         self.parameters_bound = (*law.amplitudes, *law.bending)
         self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
         self.factor = law.factor
@@ -86,15 +86,15 @@ class FrequencyLaw(UnlistedLaw):
         """∂ ln factor by each amplitude at 0, at the grid of what bends it (points, frequencies, amplitudes)."""
         points, count = len(self.grid), len(self.amplitudes)
         values: dict[str, Differentiated] = {}
-        for number, entry in enumerate(self.parameters_bound):
+        for number, parameter in enumerate(self.parameters_bound):
             slopes = np.zeros((count, points, 1))
             value = np.zeros((points, 1))
             if number < count:
                 slopes[number] = 1.0
             else:
                 at = self.grid[:, number - count, None]
-                value = np.exp(at) if entry.scale == "log" else at
-            values[entry.name] = Differentiated(value, slopes)
+                value = np.exp(at) if parameter.scale == "log" else at
+            values[parameter.name] = Differentiated(value, slopes)
         answer = self.factor(frequency, values)
         return np.moveaxis(answer.slopes / answer.value, 0, -1)
 
@@ -105,8 +105,8 @@ def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
     if high < 1.5 * low or len(frequency) < 6:
         return []
     middle = float(np.sqrt(low * high))
-    each = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
-    return [FrequencyLaw(law, middle) for law in each]
+    laws = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
+    return [FrequencyLaw(law, middle) for law in laws]
 
 
 def _amplitude(sd: float, name: str = "law_change") -> Parameter:
@@ -287,27 +287,30 @@ class Grammar:
         conditions: Conditions,
         frequency: Floats,
         table: SigmaTable,
-        beside: Sequence[Mechanism],
-        named: Collection[str],
+        further_mechanisms: Sequence[Mechanism],
+        listed: Collection[str],
     ) -> "Grammar":
-        """Of FRFs at these distinct lines [Hz]; `beside` mechanisms for which σ has room. What one of those `named`
-        does exactly is no law."""
+        """The laws for FRFs at these distinct lines [Hz].
+
+        `further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well. `listed`: names of
+        mechanisms; a law that one of them describes exactly is left out.
+        """
         laws: list[UnlistedLaw] = []
         shares: list[float] = []
         axes = axes_of(conditions) if len(conditions.recordings) >= _LEAST_RECORDINGS else []
         columns = [axis for axis in axes if axis.name not in BUILT_IN]
-        tables = LevelTables(conditions, table, beside)
+        tables = LevelTables(conditions, table, further_mechanisms)
         lines = np.unique(frequency)
         for axis in axes:
             share = 1.0 if axis.name in BUILT_IN else _COLUMNS / len(columns)
-            for law in [*_over_recordings(axis, lines, tables, named), *_constants(axis, axes, tables, named)]:
+            for law in [*_over_recordings(axis, lines, tables, listed), *_constants(axis, axes, tables, listed)]:
                 laws.append(law)
                 shares.append(share * _share(law))
         total = sum(1.0 for axis in axes if axis.name in BUILT_IN) + (_COLUMNS if columns else 0.0)
         log_shares = np.log(np.array(shares) / max(total, 1.0)) if shares else np.zeros(0)
         over_frequency = frequency_laws(lines) if len(lines) >= _LEAST_LINES else []
-        own = [_FREQUENCY * _share(law) for law in over_frequency]
-        return cls([*laws, *over_frequency], np.append(log_shares, np.log(own)))
+        frequency_shares = [_FREQUENCY * _share(law) for law in over_frequency]
+        return cls([*laws, *over_frequency], np.append(log_shares, np.log(frequency_shares)))
 
 
 def combination(law: UnlistedLaw) -> tuple[str, str, str]:
@@ -319,36 +322,36 @@ def _share(law: UnlistedLaw) -> float:
     return _ACTS_ON[law.description.acts_on] * _FORMS[law.description.form] * law.share
 
 
-def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, named: Collection[str]) -> list[UnlistedLaw]:
-    each: list[UnlistedLaw] = []
+def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, listed: Collection[str]) -> list[UnlistedLaw]:
+    laws: list[UnlistedLaw] = []
     for shape in shapes(axis):
-        each += [
+        laws += [
             RecordingLaw(acts_on, axis, shape, tables)
             for acts_on in _OF_LEVELS
-            if _makes_sense(acts_on, axis, shape, named)
+            if _makes_sense(acts_on, axis, shape, listed)
         ]
         if len(lines) >= 2 and shape.form != "free":
-            each += [LagLaw(kind, axis, shape, lines) for kind in LAG_KINDS]
+            laws += [LagLaw(kind, axis, shape, lines) for kind in LAG_KINDS]
     if axis.name == "preload_n":
         lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost", share=_CONSTANT)
-        each.append(RecordingLaw("force", axis, lost, tables))
-    return each
+        laws.append(RecordingLaw("force", axis, lost, tables))
+    return laws
 
 
-def _constants(axis: Axis, axes: Sequence[Axis], tables: LevelTables, named: Collection[str]) -> list[UnlistedLaw]:
+def _constants(axis: Axis, axes: Sequence[Axis], tables: LevelTables, listed: Collection[str]) -> list[UnlistedLaw]:
     """Changes that are the same in all recordings, on the axis that shows them best."""
-    available = {entry.name for entry in axes}
+    available = {other.name for other in axes}
     return [
         RecordingLaw(acts_on, axis, constant(_CONSTANT), tables)
         for acts_on, (mechanism, best) in _CONSTANTS.items()
-        if mechanism not in named and axis.name == next((name for name in best if name in available), None)
+        if mechanism not in listed and axis.name == next((name for name in best if name in available), None)
     ]
 
 
-def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, named: Collection[str]) -> bool:
+def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[str]) -> bool:
     """Whether the combination is one that a rig can have and no other combination is."""
     if axis.name == "sensor":
-        return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in named)
+        return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in listed)
     if acts_on == "position":
         return axis.name in _PLACES_FOLLOW or axis.name not in BUILT_IN
     if acts_on == "force":  # a force that is scaled is a modulus that is
@@ -361,41 +364,41 @@ OF_ONE_CAMPAIGN = ("order",)  # axes that say nothing of other recordings
 
 
 def bound_to(
-    law: UnlistedLaw, conditions: Conditions, table: SigmaTable, beside: Sequence[Mechanism]
+    law: UnlistedLaw, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]
 ) -> tuple[UnlistedLaw, Mask]:
     """The law on these recordings, and which of them (recordings,) lie in its range.
 
     A recording beyond the range, or that does not say where it lies, is predicted at the range's end.
     """
-    ids = [entry.id for entry in frf_of(conditions)]
+    ids = [recording.id for recording in frf_of(conditions)]
     if not isinstance(law, RecordingLaw | LagLaw):
         return law, np.ones(len(ids), dtype=bool)
     axis, inside = _on(law.axis, conditions, ids)
     if isinstance(law, LagLaw):
         return law.on(axis), inside
-    return law.on(axis, LevelTables(conditions, table, beside)), inside
+    return law.on(axis, LevelTables(conditions, table, further_mechanisms)), inside
 
 
 def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, Mask]:
-    known = {
-        (entry.name, entry.relative): entry
-        for entry in every_axis(conditions, axis.origin)
-        if entry.name not in OF_ONE_CAMPAIGN
+    axes = {
+        (candidate.name, candidate.relative): candidate
+        for candidate in every_axis(conditions, axis.origin)
+        if candidate.name not in OF_ONE_CAMPAIGN
     }
-    found = known.get((axis.name, axis.relative))
-    if found is not None and axis.name == "previous_preload_n":
-        timed = all(entry.recorded_at is not None for entry in frf_of(conditions))
-        found = found if timed else None  # nothing says which came before
-    if found is None:
+    match = axes.get((axis.name, axis.relative))
+    if match is not None and axis.name == "previous_preload_n":
+        timed = all(recording.recorded_at is not None for recording in frf_of(conditions))
+        match = match if timed else None  # nothing says which came before
+    if match is None:
         return replace(axis, values=dict.fromkeys(ids, axis.low), range=(axis.low, axis.high)), np.zeros(
             len(ids), dtype=bool
         )
     if axis.words:
-        words = [found.words[round(value)] for value in found.of(ids)]
+        words = [match.words[round(value)] for value in match.of(ids)]
         inside = np.array([word in axis.words for word in words])
         places = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
         return replace(axis, values=dict(zip(ids, places, strict=True)), range=(axis.low, axis.high)), inside
-    values = found.of(ids)
+    values = match.of(ids)
     slack = _ROUNDING * axis.span
     inside = (values >= axis.low - slack) & (values <= axis.high + slack)
     clipped = np.clip(values, axis.low, axis.high).tolist()

@@ -61,12 +61,12 @@ class Curve:
     def at(self, rows: Indices, x: Floats) -> tuple[Floats, Floats]:
         """Values and slopes of these rows at x (…, rows)."""
         last = self.values.shape[1] - 1
-        place = np.clip((x - self.first) / self.stride, 0.0, last)
+        position = np.clip((x - self.first) / self.stride, 0.0, last)
         inside = (x >= self.first) & (x <= self.first + last * self.stride)
-        left = np.minimum(place.astype(np.intp), last - 1)
-        t = place - left
-        v0, v1 = self.values[rows, left], self.values[rows, left + 1]
-        d0, d1 = self.slopes[rows, left] * self.stride, self.slopes[rows, left + 1] * self.stride
+        cell = np.minimum(position.astype(np.intp), last - 1)
+        t = position - cell
+        v0, v1 = self.values[rows, cell], self.values[rows, cell + 1]
+        d0, d1 = self.slopes[rows, cell] * self.stride, self.slopes[rows, cell + 1] * self.stride
         a, b = 2 * (v0 - v1) + d0 + d1, 3 * (v1 - v0) - 2 * d0 - d1
         slope = np.where(inside, (d0 + t * (2 * b + 3 * a * t)) / self.stride, 0.0)
         return v0 + t * (d0 + t * (b + a * t)), slope
@@ -75,14 +75,14 @@ class Curve:
 class LevelTables:
     """Of one campaign's recordings, by their ids; each table is worked out when it is first asked for."""
 
-    def __init__(self, conditions: Conditions, table: SigmaTable, beside: Sequence[Mechanism]) -> None:
-        """`beside`: mechanisms for which σ has room as well."""
-        entries = [entry.without_measurements(frequency_hz=_ANY_LINE) for entry in frf_of(conditions)]
-        self._conditions = Conditions(conditions.name, conditions.skin, tuple(entries))
-        self._table, self._beside = table, tuple(beside)
-        self._places = {entry.id: number for number, entry in enumerate(entries)}
-        self.force = {entry.id: entry.preload_n for entry in entries}
-        self._known: dict[str, Curve] = {}
+    def __init__(self, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]) -> None:
+        """`further_mechanisms`: those for which σ has room as well."""
+        recordings = [recording.without_measurements(frequency_hz=_ANY_LINE) for recording in frf_of(conditions)]
+        self._conditions = Conditions(conditions.name, conditions.skin, tuple(recordings))
+        self._table, self._further_mechanisms = table, tuple(further_mechanisms)
+        self._places = {recording.id: number for number, recording in enumerate(recordings)}
+        self.force = {recording.id: recording.preload_n for recording in recordings}
+        self._curves: dict[str, Curve] = {}
 
     def rows(self, ids: Sequence[str]) -> Indices:
         """Where in the tables these recordings are."""
@@ -92,9 +92,9 @@ class LevelTables:
         """level(quantity · e^s)/level(quantity) of recordings, from s (…, recordings)."""
         if acts_on == "force":
             acts_on, log = "modulus", -log
-        if acts_on not in self._known:
-            self._known[acts_on] = self._tabulated(acts_on)
-        value, slope = self._known[acts_on].at(rows, log.value)
+        if acts_on not in self._curves:
+            self._curves[acts_on] = self._tabulated(acts_on)
+        value, slope = self._curves[acts_on].at(rows, log.value)
         return chain(value, (slope, log))
 
     def moved(self, rows: Indices, x: Differentiated, y: Differentiated) -> Differentiated:
@@ -113,11 +113,11 @@ class LevelTables:
 
     @cached_property
     def _model(self) -> FrfModel:
-        return FrfModel((), self._conditions, self._table, self._beside)
+        return FrfModel((), self._conditions, self._table, self._further_mechanisms)
 
     @cached_property
     def _start(self) -> Floats:
-        return np.array([entry.start for entry in self._model.parameters])
+        return np.array([parameter.start for parameter in self._model.parameters])
 
     def _tabulated(self, acts_on: str) -> Curve:
         s = np.linspace(*_LOGS[acts_on], _NODES_OF_RADIUS if acts_on == "contact_radius" else _NODES)
@@ -131,11 +131,13 @@ class LevelTables:
         return Curve.of(s, _over(levels, self._base))
 
     def _of_radius(self, s: float) -> Floats:
-        entries = [
-            replace(entry, indenter_radius_mm=entry.indenter_radius_mm * float(np.exp(s)))
-            for entry in frf_of(self._conditions)
+        recordings = [
+            replace(recording, indenter_radius_mm=recording.indenter_radius_mm * float(np.exp(s)))
+            for recording in frf_of(self._conditions)
         ]
-        model = FrfModel((), Conditions("radius", self._conditions.skin, tuple(entries)), self._table, self._beside)
+        model = FrfModel(
+            (), Conditions("radius", self._conditions.skin, tuple(recordings)), self._table, self._further_mechanisms
+        )
         fit = self._start.copy()
         fit[model.places_of_nuisances["youngs_modulus"]] -= 2 * s
         return model.respond(fit, slopes=False).level.value
@@ -153,27 +155,29 @@ class LevelTables:
     @cached_property
     def _over_places(self) -> Curve:
         """Over the distance from the sensor's centre [mm]."""
-        entries = frf_of(self._conditions)
+        recordings = frf_of(self._conditions)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in self._conditions.skin.sensors}
-        keys = [(entry.indenter_radius_mm, entry.preload_n) for entry in entries]
+        keys = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
         distinct = list(dict.fromkeys(keys))
         radii = np.linspace(0.0, float(np.hypot(*self._offset.T).max()) + _FURTHEST_MM, _PLACES)
-        sensor = entries[0].sensor
+        sensor = recordings[0].sensor
         x, y = centres[sensor]
         placed = [
-            replace(entries[keys.index(key)], sensor=sensor, position_mm=(x + radius, y), id=f"{number} {place}")
+            replace(recordings[keys.index(key)], sensor=sensor, position_mm=(x + radius, y), id=f"{number} {index}")
             for number, key in enumerate(distinct)
-            for place, radius in enumerate(radii.tolist())
+            for index, radius in enumerate(radii.tolist())
         ]
-        model = FrfModel((), Conditions("places", self._conditions.skin, tuple(placed)), self._table, self._beside)
+        model = FrfModel(
+            (), Conditions("places", self._conditions.skin, tuple(placed)), self._table, self._further_mechanisms
+        )
         levels = model.respond(self._start, slopes=False).level.value.reshape(len(distinct), -1)
         return Curve.of(radii, _over(levels[[distinct.index(key) for key in keys]].T, self._base))
 
 
 def _over(levels: Floats, base: Floats) -> Floats:
     """levels/base (recordings, nodes), where the base shows anything."""
-    shows = np.abs(base) > _FAINT * np.abs(base).max()
-    return np.where(shows, levels / np.where(shows, base, 1.0), 1.0).T
+    is_significant = np.abs(base) > _FAINT * np.abs(base).max()
+    return np.where(is_significant, levels / np.where(is_significant, base, 1.0), 1.0).T
 
 
 PREFIX = "unnamed_"
@@ -225,7 +229,7 @@ class UnlistedLaw(Mechanism):
     grid: Floats
     amplitudes: tuple[str, ...]
     log_share: float = 0.0  # in the prior of something unnamed
-    found: tuple[Floats, ...] = ()  # fit coordinates where screenings found it
+    screened_fits: tuple[Floats, ...] = ()  # fit coordinates where screenings found it
 
     def parameters(self, conditions: object, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The same for all campaigns: they are bound to one."""
@@ -236,8 +240,8 @@ class UnlistedLaw(Mechanism):
     def guesses(self, conditions: object, kind: Kind) -> Sequence[Sequence[float]]:
         """Where screenings found it."""
         return [
-            [entry.from_fit(at) for entry, at in zip(self.parameters_bound, found.tolist(), strict=True)]
-            for found in self.found
+            [parameter.from_fit(at) for parameter, at in zip(self.parameters_bound, fit.tolist(), strict=True)]
+            for fit in self.screened_fits
         ]
 
 
@@ -267,7 +271,7 @@ class RecordingLaw(UnlistedLaw):
         if shape.form == "free":
             usual = usual / 2
         amplitudes = changes("law_change", self._unit, usual, count)
-        self.amplitudes = tuple(entry.name for entry in amplitudes)
+        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
         self.parameters_bound = (*amplitudes, *shape.bending)
         self.grid = shape.points
 
@@ -288,11 +292,11 @@ class RecordingLaw(UnlistedLaw):
         if self._acts_on == "position":
             half = len(self.amplitudes) // 2
             x, y = (
-                _summed([values[name] * one for name, one in zip(names, features, strict=True)])
+                _summed([values[name] * feature for name, feature in zip(names, features, strict=True)])
                 for names in (self.amplitudes[:half], self.amplitudes[half:])
             )
             return self.tables.moved(rows, x, y)
-        change = _summed([values[name] * one for name, one in zip(self.amplitudes, features, strict=True)])
+        change = _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
         if self.shape.logarithmic:
             log = change
         elif self._acts_on == "force":
@@ -309,7 +313,7 @@ class RecordingLaw(UnlistedLaw):
         rows = self._rows(ids)
         if self._acts_on == "position":
             none = Differentiated(np.zeros((1, 1)), np.zeros((2, 1, 1)))
-            x, y = (Differentiated(none.value, np.eye(2)[place][:, None, None]) for place in (0, 1))
+            x, y = (Differentiated(none.value, np.eye(2)[index][:, None, None]) for index in (0, 1))
             moved = self.tables.moved(rows, x, y)
             return np.asarray((moved.slopes / moved.value)[:, 0].T)
         if self._acts_on == "gain":
@@ -353,7 +357,7 @@ def changes(name: str, unit: str, usual: float, count: int, most: float = _MOST)
     """So many changes, each as large as usual; bounded by `most` times that."""
     names = [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
     prior = Normal(0.0, usual)
-    return tuple(Parameter(one, unit, -most * usual, most * usual, prior, "linear", 0.0, _REASON) for one in names)
+    return tuple(Parameter(label, unit, -most * usual, most * usual, prior, "linear", 0.0, _REASON) for label in names)
 
 
 def _unit_of_change(acts_on: ActsOn) -> str:
@@ -387,7 +391,7 @@ class LagLaw(UnlistedLaw):
         usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(kind, 1.0)
         power = shape.logarithmic
         lags = changes("law_lag", "-", usual, shape.count)
-        self.amplitudes = tuple(entry.name for entry in lags)
+        self.amplitudes = tuple(parameter.name for parameter in lags)
         self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.bending)
         self.grid = _EXPONENTS if power else shape.points
 
@@ -402,7 +406,7 @@ class LagLaw(UnlistedLaw):
         features = self.shape.features(self.axis.of(ids), values)
         if self.shape.logarithmic:
             features = [exp(values["law_exponent"] * features[0])]
-        return _summed([values[name] * one for name, one in zip(self.amplitudes, features, strict=True)])
+        return _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """The factor on each distinct line."""
