@@ -1,6 +1,6 @@
-"""What every mechanism must keep to: texts, traits, parameters with unit, bounds and prior, a law with finite values.
+"""The contract of a mechanism: texts, traits, parameters with unit, bounds and prior, and a law with finite values.
 
-The mechanisms of this package are held to it by a test, those of other packages when they are loaded.
+A test checks the mechanisms of this package against it; those of other packages are checked when they are loaded.
 """
 
 import re
@@ -44,14 +44,14 @@ _NUISANCES = (*(parameter.name for parameter in (D33, YOUNGS_MODULUS, THICKNESS,
 
 
 def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
-    """Whether a mechanism can be composed with the others.
+    """Check that a mechanism keeps the contract and can be composed with the others.
 
     Parameters
     ----------
     mechanism
         The mechanism to check.
     others
-        Those whose names, and whose parameters' names, are taken.
+        Mechanisms whose names, and whose parameters' names, are taken.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
 
 
 def check_numbers(mechanism: Mechanism) -> None:
-    """Whether a law gives finite numbers on a synthetic campaign of each kind that supports it.
+    """Check that a law gives finite numbers on a synthetic campaign of each kind that supports it.
 
     Raises InvalidInput where it does not.
     """
@@ -114,7 +114,7 @@ def _check_traits(mechanism: Mechanism) -> None:
 
 
 def _check_hooks(mechanism: Mechanism) -> None:
-    """Hooks are called at their stage: what reads the stage relies on it."""
+    """A hook is called at its stage only, so the stage must match the overridden hooks."""
     overridden = [name for name in HOOKS if getattr(type(mechanism), name) is not getattr(Mechanism, name)]
     for name in overridden:
         stages = ", ".join(stage.name for stage in HOOKS[name])
@@ -171,7 +171,7 @@ def _check_parameter(mechanism: Mechanism, parameter: Any) -> None:
 
 
 def _check_relative(parameter: Parameter, parameters: Sequence[Parameter]) -> None:
-    """A multiple is one of another parameter, positive, that is a value itself."""
+    """`relative_to` must name another log parameter of the mechanism that is itself relative to none."""
     units = {other.name for other in parameters if other.scale == "log" and other.relative_to is None} - {
         parameter.name
     }
@@ -181,7 +181,7 @@ def _check_relative(parameter: Parameter, parameters: Sequence[Parameter]) -> No
 
 
 def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
-    """The prediction and its derivatives are finite at the priors' centres and at every bound."""
+    """The prediction and its derivatives must be finite at the centres of the priors and at every bound."""
     campaign = reference_campaign(kind)
     if _called(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
         return
@@ -200,7 +200,7 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
 
 
 def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
-    """Several points at once give what each gives alone: a diagnosis evaluates them together."""
+    """Evaluated at several points at once, as in a diagnosis, a law must give the values of single points."""
     with np.errstate(all="ignore"):
         batch = _called(f"{field} at several points", lambda: model.respond(fits))
         singles = joined([_called(field, partial(model.respond, fit[None])) for fit in fits])
@@ -222,7 +222,7 @@ def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | I
 
 
 def _points(parameters: Sequence[Parameter], nuisances: Sequence[Parameter]) -> Iterator[tuple[Floats, str]]:
-    """Fit coordinates and what they are called: the centre, and each parameter at either bound."""
+    """Points of fit coordinates with a label for messages: the centre, then each parameter at either bound."""
     centre = np.array([parameter.start for parameter in (*parameters, *nuisances)])
     yield centre, "the priors' centres"
     for index, parameter in enumerate(parameters):
@@ -237,7 +237,7 @@ def _parameters(mechanism: Mechanism, kind: Kind) -> tuple[Parameter, ...]:
 
 
 def _called(field: str, function: Callable[[], T]) -> T:
-    """What another package's code answers; what it raises becomes the refusal of a field."""
+    """The result of another package's code; an exception becomes InvalidInput for the field."""
     try:
         return function()
     except Exception as error:

@@ -1,8 +1,4 @@
-"""The document that declares a mechanism.
-
-The parameters of a declared mechanism: bounds and priors, refused by field where no fit could use them.
-
-The document of a declared mechanism (`mechanism/1`, YAML): read with its lines, refused by line and reason.
+"""The document of a declared mechanism (`mechanism/1`, YAML), read with its lines; errors name line and reason.
 
     schema: mechanism/1
     name: warm_skin
@@ -14,12 +10,12 @@ The document of a declared mechanism (`mechanism/1`, YAML): read with its lines,
       softening: {unit: 1/°C, low: 0, high: 0.1, prior: {mean: 0.01, sd: 0.01}, limit: 0}
     source: Our own measurements.
 
-`law` is a factor on gain, modulus, thickness or contact_radius, a complex factor on frequency_response, newtons added
-to the force; for position it is a list of two, the millimetres added to x and y. Over displacement_mm (the depth),
-force_n and time_s (since a recording began) it is a law of indentation curves, of each sample: a factor on gain (of
-the cell) or modulus, newtons added to the force that is read, millimetres added to the travel (position). `prior` is
+`law` is a factor on gain, modulus, thickness or contact_radius, a complex factor on frequency_response, newtons
+added to the force; for position it is a list of two, the millimetres added to x and y. Over displacement_mm (the
+depth), force_n and time_s (since a recording began) it is a law of indentation curves, of each sample: a factor on
+gain (of the cell) or modulus, newtons added to the reading, millimetres added to the travel (position). `prior` is
 normal on the value, or on its natural logarithm where `scale` is log (then `mean` is a value and `sd` one of the
-logarithm), or left out: uniform.
+logarithm); without it the prior is uniform. Bounds and priors that no fit could use are rejected by field.
 """
 
 import re
@@ -55,18 +51,18 @@ _MOST = 6
 _LONGEST_UNIT = 12
 _MAGNITUDES = (1e-30, 1e30)  # in SI the charge of an electron is 1.6e-19 C, and a mole has 6e23 particles
 _LEAST_MASS = 0.01  # of a normal prior, within the bounds
-_NARROWEST = 1e-6  # sd of a prior, or distance of the bounds, relative: what is known better is a constant
+_NARROWEST = 1e-6  # sd of a prior, or distance of the bounds, relative: a better known quantity is a constant
 
 
 def require_fields(document: Mapping[Any, Any], allowed: tuple[str, ...], prefix: str) -> None:
-    """Raises InvalidInput at the first field that is not known."""
+    """Raise InvalidInput at the first field that is not allowed."""
     for name in document:
         if name not in allowed:
             raise InvalidInput(f"{prefix}{named(name)}", None, f"is no field; known: {', '.join(allowed)}")
 
 
 def text(document: Mapping[str, Any], name: str, longest: int, field: str) -> str:
-    """A printable text of up to `longest` characters, its white space made single spaces."""
+    """A printable text of up to `longest` characters, its white space reduced to single spaces."""
     value = document.get(name)
     words = " ".join(value.split()) if isinstance(value, str) else ""
     if not words or len(words) > longest:
@@ -78,7 +74,7 @@ def text(document: Mapping[str, Any], name: str, longest: int, field: str) -> st
 
 
 def parameters(value: Any, mechanism: str) -> dict[str, Parameter]:
-    """Those of a document, by name; raises InvalidInput that names the field."""
+    """The parameters of a document by name; raises InvalidInput that names the field."""
     if not isinstance(value, Mapping) or not 0 < len(value) <= _MOST:
         raise InvalidInput("parameters", None, f"must be 1 to {_MOST} parameters by name")
     return {name: _parameter(name, declaration, mechanism) for name, declaration in value.items()}
@@ -120,7 +116,7 @@ def _prior(value: Any, scale: str, field: str) -> Prior:
 
 
 def _require_within(stated: Mapping[str, Any], prior: Normal, parameter: Parameter, field: str) -> None:
-    """Whether a normal prior is one of values between the bounds: its density is normalised there."""
+    """Check that a normal prior has its mass within the bounds: its density is normalised there."""
     if not parameter.low <= stated["mean"] <= parameter.high:
         raise InvalidInput(
             f"{field}.prior.mean", stated["mean"], f"must lie within {parameter.low:g} to {parameter.high:g}"
@@ -163,7 +159,7 @@ _QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, where that is looked fo
 def parse(data: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredMechanism:
     """The mechanism of a document; raises FileError that names the file, the line and the reason.
 
-    `in_sandbox`: YAML is parsed in a process of its own, under the limits of reading a file.
+    `in_sandbox`: parse YAML in a process of its own, under the limits for reading a file.
     """
     if len(data) > LARGEST_BYTES:
         raise FileError(file, "", f"a mechanism may have up to {LARGEST_BYTES} bytes")
@@ -182,7 +178,7 @@ def parse(data: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredMechan
 
 
 def _read(data: bytes, *, in_sandbox: bool) -> tuple[Any, Mapping[str, int]]:
-    """What a file holds, as YAML or as JSON, which states no lines."""
+    """The content of a file and the lines of its fields: YAML, or JSON, which has no lines."""
     if data.lstrip()[:1] == b"{":
         try:
             return json_file.document(data, ""), {}
@@ -196,7 +192,7 @@ def _read(data: bytes, *, in_sandbox: bool) -> tuple[Any, Mapping[str, int]]:
 
 
 def _line(lines: Mapping[str, int], field: str) -> int | None:
-    """The line on which a field of the document stands, or else the nearest one above it."""
+    """The line of a field in the document, or of the nearest field above it."""
     if not lines:
         return None
     path = re.split(r"[,\s]", field)[0]
@@ -259,7 +255,7 @@ def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
 
 
 def _defined(law: Expression, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
-    """Whether a law of curves is a real number wherever a curve goes, from 0 on, with usual parameters."""
+    """Check that a law of curves is real and finite over its range, from 0 on, with typical parameters."""
     values = _evaluated(
         law, axes, {name: parameter.from_fit(parameter.quantile(0.5)) for name, parameter in parameters.items()}
     )
@@ -274,7 +270,7 @@ def _defined(law: Expression, axes: tuple[str, ...], parameters: Mapping[str, Pa
 def _neutral(
     laws: tuple[Expression, ...], acts_on: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]
 ) -> None:
-    """Whether a law changes nothing where each parameter that has a limit is at it."""
+    """Check that a law changes nothing where each parameter that has a limit is at it."""
     if all(parameter.limit is None for parameter in parameters.values()):
         return
     values = {
@@ -295,7 +291,7 @@ def _neutral(
 def _noticed(
     laws: tuple[Expression, ...], acts_on: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]
 ) -> None:
-    """Whether each parameter changes a law somewhere within its bounds: one that does not has any value at all."""
+    """Check that each parameter changes a law somewhere within its bounds; one that does not is unidentifiable."""
     least = _NOTICED_ADDED if acts_on in _ADDED else _NOTICED_FACTOR
     for name in parameters:
         changes = (_change(law, name, axes, parameters) for law in laws if name in law.names)
@@ -305,8 +301,10 @@ def _noticed(
 
 
 def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> float:
-    """The largest change of a law, relative where that is large, by one parameter with the others at some quantile: at
-    places far and near, and between the values of parameters, which may be edges."""
+    """The largest change of a law by one parameter, relative where it is large, with the others at some quantile.
+
+    Axes take values near and far, and between the values of parameters, which may be edges.
+    """
     samples = {
         other: [parameter.from_fit(parameter.quantile(probability)) for probability in _QUANTILES]
         for other, parameter in parameters.items()
@@ -329,7 +327,7 @@ def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mappi
 def _evaluated(
     law: Expression, axes: tuple[str, ...], values: Mapping[str, float], positions: Sequence[float] | Floats = _PLACES
 ) -> Array:
-    """At a few places of all axes together (places,), or each at its own of these (axes, places)."""
+    """The law where all axes have these values (values,), or each axis its own (axes, values)."""
     numbers = {name: np.float64(value) for name, value in values.items()}  # which may be divided by 0
     columns = np.broadcast_to(positions, (len(axes), np.shape(positions)[-1]))
     with np.errstate(all="ignore"):

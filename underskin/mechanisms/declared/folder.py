@@ -1,4 +1,4 @@
-"""The lab's folder of declared mechanisms, which a setting names: what can be used of it, and why the rest cannot."""
+"""The lab's folder of declared mechanisms, named by a setting: the usable ones, and the errors of the others."""
 
 import os
 from collections.abc import Iterator
@@ -16,15 +16,14 @@ FOLDER = "UNDERSKIN_MECHANISMS"  # the setting
 
 @dataclass(frozen=True)
 class LabFolder:
-    """The mechanisms that can be used, each with its file and the beginning of that one's SHA-256, and the errors of
-    the files that cannot."""
+    """Usable mechanisms, each with its file and the beginning of its SHA-256, and the errors of unusable files."""
 
     mechanisms: tuple[tuple[DeclaredMechanism, str], ...]
     refused: tuple[FileError, ...]
 
 
 def in_folder() -> LabFolder:
-    """The folder of the setting by file name; an empty one where that is not set."""
+    """The contents of the folder, by file name; empty where the setting is not set."""
     usable: list[tuple[DeclaredMechanism, str]] = []
     refused = []
     for file in _files():
@@ -37,7 +36,7 @@ def in_folder() -> LabFolder:
 
 
 def checked(content: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredMechanism:
-    """The mechanism of a document, as `parse` has it, whose law gives finite numbers; raises FileError."""
+    """The mechanism of a document (see `parse`), whose law gives finite numbers; raises FileError."""
     mechanism = parse(content, file, in_sandbox=in_sandbox)
     try:
         check_numbers(mechanism)
@@ -47,7 +46,7 @@ def checked(content: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredM
 
 
 def digest() -> str:
-    """SHA-256 of the folder's files, with their names; empty where there are none."""
+    """SHA-256 of the folder's files and their names; empty where there are none."""
     total, count = sha256(), 0
     for file in _files():
         try:
@@ -60,14 +59,14 @@ def digest() -> str:
 
 
 def _files() -> Iterator[Path]:
-    """Those of the folder, where there is one, in the order of their names."""
+    """The YAML files of the folder, by name."""
     path = os.environ.get(FOLDER)
     if path:
         yield from sorted(Path(path).glob("*.yaml"))
 
 
 def _content(file: Path) -> bytes:
-    """At most a byte more than a document may have; raises FileError where it cannot be read."""
+    """At most one byte more than a document may have; raises FileError where the file cannot be read."""
     if _shown(file) != str(file):
         raise FileError(_shown(file), "", "its name must be UTF-8")
     if not file.is_file():  # a pipe would be waited for

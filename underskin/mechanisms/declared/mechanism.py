@@ -1,12 +1,11 @@
 """Mechanisms that a file declares.
 
-Expressions of a declared law: read by a whitelist over the syntax tree, evaluated with derivatives.
+Expressions are read by a whitelist over the syntax tree and evaluated with derivatives. Allowed are numbers, names, + −
+* / **, `pi`, `i` (√−1), and the functions of FUNCTIONS with one or two arguments. No attribute, index, comparison,
+string, keyword or other call is accepted, and no code is compiled or executed.
 
-Numbers, names, + − * / **, and the functions of FUNCTIONS with one or two arguments; `pi` and `i` (√−1) are known. No
-attribute, index, comparison, string, keyword or call of anything else is read, and no code is compiled or executed.
-
-A declared law as a mechanism: it acts where it says, by its expressions over the axes that it names. A declared law of
-indentation curves: by its expression over depth, force or time of each sample.
+A declared mechanism acts on FRFs by expressions over its axes, or on indentation curves by an expression over depth,
+force or time of each sample.
 """
 
 import ast
@@ -39,19 +38,19 @@ CONSTANTS: Mapping[str, np.float64 | np.complex128] = {"pi": np.float64(np.pi), 
 
 @dataclass(frozen=True)
 class Expression:
-    """One that was read. Attributes: `text`; `names` of parameters and axes in it."""
+    """A parsed expression. Attributes: `text`; `names` of parameters and axes in it."""
 
     text: str
     names: frozenset[str]
     _tree: ast.expr
 
     def __call__(self, values: Mapping[str, Value]) -> Value:
-        """Its value where names have these values."""
+        """The value for these values of the names."""
         return _value(self._tree, values)
 
 
 def read(text: str, field: str, allowed: Collection[str]) -> Expression:
-    """Read an expression in these names; raises InvalidInput that names the field, the place and what is allowed."""
+    """Parse an expression in the allowed names; raises InvalidInput that names field, position and what is allowed."""
     if not isinstance(text, str) or not text.strip() or len(text) > LONGEST:
         raise InvalidInput(field, text, f"must be an expression of 1 to {LONGEST} characters")
     try:
@@ -70,7 +69,7 @@ def read(text: str, field: str, allowed: Collection[str]) -> Expression:
 
 
 def _check(node: ast.AST, field: str, allowed_names: Collection[str], called: Collection[int]) -> None:
-    """Raises InvalidInput for everything that is not on the list."""
+    """Raise InvalidInput for every node that is not on the whitelist."""
     if isinstance(node, ast.expr_context | ast.operator | ast.unaryop):
         allowed = isinstance(node, ast.Load | ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow | ast.USub | ast.UAdd)
         if not allowed:
@@ -167,7 +166,7 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # how many argume
 
 
 def together(expressions: Sequence[Expression]) -> frozenset[str]:
-    """The names in several."""
+    """The names in all expressions."""
     return frozenset().union(*(expression.names for expression in expressions))
 
 
@@ -176,14 +175,14 @@ FREQUENCY = "frequency_hz"
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """The numbers of each axis by the recording's id, and how levels follow what is pressed."""
+    """The values of each axis by recording id, and the level of each recording as a function of what is pressed."""
 
     axes: dict[str, dict[str, float]]
     tables: LevelTables
 
     @classmethod
     def to(cls, conditions: Conditions, table: SigmaTable) -> "Bound":
-        """To the recordings of a campaign."""
+        """Bound to the recordings of a campaign."""
         axes = {axis.name: dict(axis.values) for axis in every_axis(conditions) if not (axis.relative or axis.words)}
         return cls(axes, LevelTables(conditions, table, ()))
 
@@ -194,10 +193,10 @@ def _bound(conditions: Conditions) -> Bound:
 
 
 class DeclaredMechanism(Mechanism):
-    """What a file declares."""
+    """A mechanism that a file declares."""
 
     order = 300
-    needs_axes: ClassVar[str]  # what is said of the axes that it reads
+    needs_axes: ClassVar[str]  # requirement on its axes, in words
 
     def __init__(
         self,
@@ -209,7 +208,7 @@ class DeclaredMechanism(Mechanism):
         parameters: tuple[Parameter, ...],
         source: str,
     ) -> None:
-        """Of what the file says."""
+        """Take the contents of the file."""
         self.name = name
         self.plain = description
         self.law = f"{acts_on}: {', '.join(expression.text for expression in laws)}"
@@ -221,25 +220,26 @@ class DeclaredMechanism(Mechanism):
 
     @property
     def axes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Those that it reads."""
+        """The axes that the law reads."""
         return self.axes_read
 
 
 class DeclaredOfFrf(DeclaredMechanism):
-    """One of FRFs. A diagnosis binds it to its campaign, so that a part of that has the order of the whole."""
+    """A declared mechanism of FRFs. A diagnosis binds it to its campaign, so that subsets keep the order of the
+    whole."""
 
     kinds = ("frf",)
     needs_axes = "of every recording, not all the same"
     bound: Bound | None = None
 
     def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredOfFrf":
-        """The same, bound to the recordings of a campaign."""
+        """A copy bound to the recordings of a campaign."""
         other = copy(self)
         other.bound = Bound.to(conditions, table)
         return other
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """Axes that recordings lack, or on which they do not differ."""
+        """Axes that recordings lack, or that do not vary."""
         axes = self.bound.axes if self.bound is not None else _bound(conditions).axes
         ids = [recording.id for recording in conditions.recordings]
         for name in self.axes_read:
@@ -256,7 +256,7 @@ class DeclaredOfFrf(DeclaredMechanism):
         return FREQUENCY in self.axes_read
 
     def _evaluated(self, values: Values, axes: dict[str, Floats], rows: int) -> list[Differentiated]:
-        """Each expression on so many rows."""
+        """The value of each expression on this number of rows."""
         first = next(iter(values.values()))
         names: dict[str, Value] = {**values, **axes}
         answers = []
@@ -273,7 +273,7 @@ class DeclaredOfFrf(DeclaredMechanism):
 
 
 class DeclaredOfRecordings(DeclaredOfFrf):
-    """One that changes the level of each recording."""
+    """A declared mechanism that changes the level of each recording."""
 
     stage = Stage.RECORDING
 
@@ -293,13 +293,13 @@ class DeclaredOfRecordings(DeclaredOfFrf):
 
 
 class DeclaredOfLines(DeclaredOfFrf):
-    """One that changes each line."""
+    """A declared mechanism that changes each line."""
 
     stage = Stage.LINES
 
     @property
     def tells_recordings_apart(self) -> bool:  # type: ignore[override]
-        """Where it follows an axis of the recordings."""
+        """Whether the law reads an axis of the recordings."""
         return any(name != FREQUENCY for name in self.axes_read)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
@@ -316,9 +316,12 @@ _LARGEST_FACTOR = (
 
 
 class DeclaredOfCurves(DeclaredMechanism):
-    """One of indentations: a factor on the force of the contact, as the modulus has it where nothing sticks and no
-    stage gives (`modulus`), or on the cell's gain (`gain`), newtons added to what is read (`force`), millimetres added
-    to the travel (`position`)."""
+    """A declared mechanism of indentations.
+
+    `modulus`: a factor on the contact force, equivalent to the modulus without adhesion and stage compliance;
+    `gain`: a factor on the cell's gain; `force`: newtons added to the reading; `position`: millimetres added to the
+    travel.
+    """
 
     kinds = ("indentation",)
     stage = Stage.CURVE
@@ -326,7 +329,7 @@ class DeclaredOfCurves(DeclaredMechanism):
     start_times: Mapping[str, float] | None = None  # when each recording begins [s], by its id
 
     def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredOfCurves":
-        """The same, bound to the recordings of a campaign."""
+        """A copy bound to the recordings of a campaign."""
         other = copy(self)
         curves = curves_of(conditions)
         other.start_times = {
@@ -335,17 +338,17 @@ class DeclaredOfCurves(DeclaredMechanism):
         return other
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """Times that recordings lack."""
+        """Recordings without times, where the law reads them."""
         curves = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
         untimed = "time_s" in self.axes_read and any(recording.time_s is None for recording in curves)
         return "not every recording has time_s" if untimed else None
 
     def on_curve(self, curve: Curve, values: Values) -> None:
-        """Change its samples."""
+        """Add the law at these parameter values to the curve's laws."""
         curve.laws.append(_Bound(self, {name: numbers(value) for name, value in values.items()}))
 
     def change(self, samples: Samples, force: Floats, values: Mapping[str, Floats]) -> Floats:
-        """The expression at samples (points, curves, samples) where the contact bears `force` [N]."""
+        """The expression at samples (points, curves, samples) where the contact force is `force` [N]."""
         axes: dict[str, Value] = {
             "displacement_mm": 1e3 * np.maximum(samples.travel, 0.0),
             "force_n": np.maximum(force, 0.0),
@@ -379,7 +382,7 @@ class _Bound:
         return travel + 1e-3 * self.law.change(samples, np.zeros_like(travel), self.values)
 
     def measured_force(self, samples: Samples, force: Floats) -> Floats:
-        """The force [N] that is read where the contact bears `force`."""
+        """The measured force [N] where the contact force is `force`."""
         if self.law.acts_on == "position":
             return force
         change = self.law.change(samples, force, self.values)

@@ -1,4 +1,4 @@
-"""A law that a diagnosis found, as the document of a declared mechanism."""
+"""A law that a diagnosis found, written as the document of a declared mechanism."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -19,7 +19,7 @@ _PLACES = ("onset", "centre")  # parameters that are places along the axis
 
 
 def document(report: Mapping[str, Any], name: str, description: str | None = None) -> str:
-    """The YAML of the law that a report holds; raises InvalidInput where it holds none that an expression can say."""
+    """The YAML of the law in a report; raises InvalidInput where no expression can describe it."""
     law = report.get("unnamed")
     if law is None:
         raise InvalidInput("report", report.get("verdict"), "must hold a law that nobody listed (unnamed)")
@@ -67,7 +67,7 @@ def _linear_in(value: float) -> dict[str, Any]:
 
 
 def _within(ends: Sequence[float]) -> dict[str, Any]:
-    """A place along the axis, inside the range that was measured: at its end a threshold's slope has no bound."""
+    """A position along the axis, inside the measured range: at its end a threshold's slope is unbounded."""
     low, high = ends
     margin = _MARGIN * (high - low)
     return {"low": float(f"{low + margin:.6g}"), "high": float(f"{high - margin:.6g}")}
@@ -79,7 +79,7 @@ _BENDING = {  # what lies on a logarithmic scale
 
 
 def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float]) -> tuple[list[str], set[str]]:
-    """The law's expressions, and which of its parameters lie on a logarithmic scale."""
+    """The law's expressions, and which of its parameters have a logarithmic scale."""
     parts = name.removeprefix(PREFIX).split("__")
     bending = {key for key in values if key in _BENDING}
     if law["axis"] == "frequency_hz":

@@ -9,7 +9,7 @@ from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Unifo
 from underskin.recordings.campaign import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
-_LEAST = 0.05  # what is left of a response before its fall slows down
+_LEAST = 0.05  # of a response, below which its fall slows down
 _LOSS = "poled polymers lose some to tens of percent, a decade or in the end"
 _ONSET = "run-in takes tens to ten thousands of cycles; 1000 within a factor of 7"
 _SATURATION = "from a loss that goes on by the decade to one that ends: nothing is known beforehand"

@@ -15,7 +15,7 @@ from underskin.weak_cache import cached_while_alive
 _CORNER = "filters against noise and aliasing, leads and probes: 300 Hz within a factor of 4.5, as the bands of skins"
 _ORDER = "1 is a single pole, 2 Butterworth's pair; between them lie two real poles, and Bessel's pair at 1.5"
 _LOWEST_HZ = 1e-2
-_BEYOND = 5.0  # times the highest line: from there the response falls by 2 % at most, and is a delay alone
+_BEYOND = 5.0  # times the highest line: from there the response falls by 2 % at most, and equals a delay
 _DAMPING = math.sqrt(2.0) - 1.0  # of Butterworth's pair, 1 + √2 ix − x²
 
 

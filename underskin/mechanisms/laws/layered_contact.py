@@ -52,8 +52,8 @@ class LayeredContact(Mechanism):
             ),
         )
 
-    def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
-        """A declared thickness takes the place of one that curves told."""
+    def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
+        """A declared thickness replaces one estimated from curves."""
         declared = conditions.skin.thickness_mm is not None
         return {name: value for name, value in values.items() if not (declared and name == _THICKNESS)}
 

@@ -16,11 +16,11 @@ from underskin.recordings.frf.spectra import Frf
 from underskin.units import Floats, Indices
 from underskin.weak_cache import cached_while_alive
 
-_WIDTH_HZ = 1.5  # where it is asked which mains stand out
+_WIDTH_HZ = 1.5  # of a line, in the test for the mains frequency
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
 _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
-_NEIGHBOURS = 9  # lines, the next in frequency, that say what is usual
+_NEIGHBOURS = 9  # lines, nearest in frequency, that give the usual scatter
 _LEAST_STRAY = 1e-6  # relative; of recordings without noise
 _CHARGE = "unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC"
 _WIDTH = "the analyser's window and the mains' drift make lines a few Hz wide"

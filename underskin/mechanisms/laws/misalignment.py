@@ -35,9 +35,9 @@ class Misalignment(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The offset's two components, or its length where its direction cannot be determined."""
-        return self.parameters_beside((), conditions, kind)
+        return self.parameters_with((), conditions, kind)
 
-    def parameters_beside(
+    def parameters_with(
         self, others: Collection[Mechanism], conditions: Conditions, kind: Kind
     ) -> tuple[Parameter, ...]:
         """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
@@ -50,8 +50,8 @@ class Misalignment(Mechanism):
             for name, value in shown.items()
         )
 
-    def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
-        """Centred presses need the offset's length alone; a length without its direction serves no others."""
+    def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
+        """Centred presses need only the offset's length; without a direction no other press can be predicted."""
         if "offset" not in values:
             return {**values, "offset": float(np.hypot(values["offset_x"], values["offset_y"]))}
         off_centre = offsets(conditions).any(axis=1)

@@ -124,7 +124,7 @@ class StrainStiffening(Mechanism):
         """The stiffening coefficient, or for curves the law's constants."""
         return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
 
-    def common(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
+    def shared_parameters(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
         """s of 1 + s ε where the law of an indentation has strained ε = 0.1: how much stiffer than at no strain, over
         that. A cylinder strains so much more that its law says nothing of so little."""
         if kind == "frf":

@@ -1,4 +1,4 @@
-"""A model of recordings: the base model, and a set of mechanisms composed with it in a fixed order."""
+"""A model of recordings: the base model composed with a set of mechanisms in a fixed order."""
 
 from collections.abc import Mapping, Sequence
 
@@ -28,7 +28,7 @@ def compose(
     kind: Kind | None = None,
     catalogue: Mapping[str, Mechanism] = CATALOGUE,
 ) -> Model:
-    """The model of some mechanisms for all recordings of one kind, where these can support the mechanisms.
+    """The model of some mechanisms for all recordings of one kind, provided that these can support the mechanisms.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ def compose(
     table
         The σ table.
     kind
-        Must be given where the conditions hold several kinds.
-    known
-        The mechanisms that names are of.
+        Required where the conditions hold several kinds.
+    catalogue
+        The mechanisms by name.
 
     Raises
     ------
     Unsupported
-        Where the recordings cannot support a mechanism: they would say nothing about its parameters.
+        Where the recordings cannot support a mechanism: they contain no information about its parameters.
     InvalidInput
         For an unknown name, or a kind of which there is no recording.
     """
@@ -59,11 +59,11 @@ def compose(
 
 
 def forward_model(mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable, kind: Kind) -> Model:
-    """The model of mechanisms in order of composition, whether or not the recordings would tell their parameters.
+    """The model of mechanisms in order of composition, whether or not the recordings identify their parameters.
 
-    All models of a skin are worked out from one and the same σ around its sensors.
+    All models of a skin use the same σ around its sensors.
 
-    Raises InvalidInput for a kind of which there is no recording, and where a declared value is lacking.
+    Raises InvalidInput for a kind of which there is no recording, and where a declared value is missing.
     """
     _require_kind(conditions, kind)
     if kind == "frf":

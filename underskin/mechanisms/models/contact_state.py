@@ -1,13 +1,10 @@
-"""The contact of an FRF recording as mechanisms change it.
+"""The contacts of FRF recordings as mechanisms change them, and the stage that turns loads into contacts. SI.
 
-The contacts of a campaign on their way through a model: what is pressed, by what, and how. SI throughout.
-
-The stage that turns loads into contacts: radius, and the pressure's shape as a mixture of a sphere's and a punch's.
-
-Four cases (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301; Lebedev & Ufliand, J. Appl. Math. Mech. 22
-(1958) 442): half space or layer, with or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'),
-F1 = F + 3πwR + √(6πwRF + (3πwR)²), and the pressure is Hertz' under F1 less a flat punch's under F1 − F; on the
-layer both parts are those of contact_curves.
+Radius, and the shape of the pressure as a mixture of a sphere's and a punch's, in four cases (Johnson, Kendall &
+Roberts, Proc. R. Soc. A 324 (1971) 301; Lebedev & Ufliand, J. Appl. Math. Mech. 22 (1958) 442): half space or layer,
+with or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'), F1 = F + 3πwR + √(6πwRF + (3πwR)²), and
+the pressure is Hertz' under F1 less a flat punch's under F1 − F; on the layer both parts are those of
+contact_curves.
 """
 
 from __future__ import annotations
@@ -28,11 +25,11 @@ from underskin.units import Floats, Indices
 
 @dataclass
 class Contacts:
-    """One row a contact, (…, contacts); a Differentiated of a single row stands for all of them."""
+    """One row per contact, (…, contacts); a Differentiated of a single row is broadcast to all."""
 
     force: Floats  # F [N]
     indenter_radius: Floats  # R [m]
-    dwell: Floats  # time since the preload was put on [s]; 0 where no mechanism asks
+    dwell: Floats  # time since the preload was put on [s]; 0 where no mechanism reads it
     modulus: Differentiated  # E [Pa] in force in each contact: that of the static contact
     thickness: Differentiated  # h [m], of one row
     poisson_ratio: Differentiated  # ν, of one row
@@ -40,7 +37,7 @@ class Contacts:
     work_of_adhesion: Differentiated | None = None  # w [J/m²], of one row; None without adhesion
     relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
-    stiffness: Differentiated | None = None  # dF/dδ [N/m] at the radius in force, where a mechanism asks
+    stiffness: Differentiated | None = None  # dF/dδ [N/m] at the present radius, where a mechanism reads it
 
     def at_points(self, some: Indices | None) -> Contacts:
         """At some of several points (points, contacts), at all for None."""
@@ -50,7 +47,7 @@ class Contacts:
 
     @classmethod
     def stacked(cls, parts: Sequence[Contacts], points: Sequence[int]) -> Contacts:
-        """Contacts of the same structure at several sets of points, of so many each."""
+        """Contacts of the same structure at several sets of points, stacked; `points` is the size of each set."""
         if len(parts) == 1:
             return parts[0]
         fields = [part._differentiated() for part in parts]
@@ -102,7 +99,7 @@ def layer_curves(grid: CurveGrid, layer: Layer) -> ContactCurves:
 
 
 def press(contacts: Contacts, curves: ContactCurves | None) -> PressedContacts:
-    """The contacts under their forces; `curves`, of the layer at hand, where the contact is the layer's."""
+    """The contacts under their forces; `curves` of the layer for contact with the layer itself."""
     if curves is not None:
         return _on_layer(contacts, curves)
     if contacts.work_of_adhesion is None:
@@ -139,7 +136,7 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
 
 
 def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurves) -> Differentiated:
-    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
+    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the present contact radius, with the edge fixed and E' unrelaxed."""
     alpha = pressed.a_over_h
     shape = alpha.value.shape
     at_radius = curves.stiffness_at(np.minimum(alpha.value, LARGEST_A_OVER_H).ravel())

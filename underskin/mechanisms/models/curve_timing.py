@@ -1,4 +1,4 @@
-"""Whether the times of curves say more than their displacements: else no law of time can be told from a shape."""
+"""Whether the times of curves add information to their displacements; else no law of time can be identified."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ _LIKE_SPEEDS = 1.5
 
 
 def time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
-    """True where all curves go one way at one and the same constant speed; recordings without time_s do not count."""
+    """True where all curves move in one direction at the same constant speed; recordings without time_s are ignored."""
     speeds = []
     for recording in recordings:
         if recording.time_s is None:

@@ -1,16 +1,12 @@
-"""Models of curves, and of compressed blocks.
+"""Models of force curves: what all share, and the compression (or tension) of cylinders.
 
-What models of curves share: samples as rectangular arrays, forces at many points, derivatives by differences.
+Arrays are (points, curves, samples): points of the fit coordinates; shorter curves are padded with their last value.
+Derivatives are central differences, exact to about 1e-8: the shifted points are computed together, with the contact of
+the central one. Contact points are shifted all at once, since each moves one curve only.
 
-Arrays are (points, curves, samples): points of the fit coordinates; curves shorter than the longest stay where they
-end. Derivatives are central differences, exact to about 1e-8: all points aside are worked out together with the one in
-the middle, whose samples decide which are in contact. Contact points move one curve each, all of them at once.
-
-The force of compression (or tension) curves, sample by sample, under a set of mechanisms.
-
-Base model: one modulus E of an incompressible neo-Hookean solid between smooth platens, F = (E A/3)(λ⁻² − λ) with
-λ = 1 − (d − d0)/H, compression positive. Stages: declared value → nominal stress of the
-material → friction at the platens → relaxation.
+Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
+platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. Stages: declared value → nominal stress
+of the material → friction at the platens → relaxation.
 """
 
 from abc import ABC, abstractmethod
@@ -86,17 +82,18 @@ class CurveModel(ABC):
 
     @abstractmethod
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
-        """What governs the curves, its numbers (points, 1), as the mechanisms make it."""
+        """The quantities that govern the curves, numbers (points, 1), as changed by the mechanisms."""
 
     @abstractmethod
     def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
-        """F (points, curves, samples) [N], which samples are in contact, and which of these the tables reach.
+        """F (points, curves, samples) [N], which samples are in contact, and which are inside the tables.
 
-        `contact` (points, curves, 1) [m]; the contacts are as `held`, where that is given.
+        `contact` (points, curves, 1) [m]; `held`: the contact to be used, where given.
         """
 
     def forces(self, fit: Floats, held: Mask | None = None) -> Floats:
-        """F (points, rows) [N] at points (points, parameters); `held` (rows,) are in contact, where that is known."""
+        """F (points, rows) [N] at points (points, parameters); `held` (rows,): which samples are in contact, where
+        known."""
         at_once = max(_AT_ONCE // self.displacement.size, 1)
         arranged = self._arranged_mask(held)
         parts = []
@@ -113,7 +110,7 @@ class CurveModel(ABC):
         return np.stack(values), np.stack(slopes)
 
     def _arranged_mask(self, held: Mask | None) -> Mask | None:
-        """Of rows (rows,) as curves (curves, samples)."""
+        """Rows (rows,) as curves (curves, samples)."""
         if held is None:
             return None
         arranged = np.zeros(self.displacement.shape, dtype=bool)
@@ -131,14 +128,16 @@ class CurveModel(ABC):
         return self._force(self._curve(values, nuisances), contact, held)
 
     def _differentiated(self, fit: Floats, in_contact: Mask | None = None) -> tuple[Floats, Floats, Mask]:
-        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside; `known` (curves,
-        samples) are in contact, where that is given."""
+        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside.
+
+        `in_contact` (curves, samples): which samples are in contact, where known.
+        """
         middle, held, inside = self._forces(fit[None], None if in_contact is None else in_contact[None])
         points = np.tile(fit, (2 * len(self._moved), 1))
         for number, indices in enumerate(self._moved):
             points[2 * number, indices] += self._step[indices]
             points[2 * number + 1, indices] -= self._step[indices]
-        # On one side alone where the other is out of bounds
+        # One-sided where the other side is out of bounds
         points = np.clip(points, np.minimum(self._low, fit), np.maximum(self._high, fit))
         shifted, _, _ = self._forces(points, np.broadcast_to(held, (len(points), *held.shape[1:])))
         rows = self.recording, self._sample
@@ -153,20 +152,20 @@ class CurveModel(ABC):
         return middle[0][rows], slopes, inside[0][rows]
 
     def _arranged(self, columns: Sequence[Floats]) -> Floats:
-        """Columns of the curves as one array (curves, samples), each staying at its last value."""
+        """Columns of the curves as one array (curves, samples), padded with their last values."""
         longest = max(map(len, columns))
         return np.stack([np.pad(column, (0, longest - len(column)), mode="edge") for column in columns])
 
 
 def times_of(recording: CurveConditions) -> Floats:
-    """time_s of the samples; their numbers where a recording has none, and no mechanism asks."""
+    """time_s of the samples; their indices where a recording has none."""
     if recording.time_s is None:
         return np.arange(float(len(recording.displacement_mm)))
     return recording.time_s
 
 
 def declared_modulus(youngs_modulus_mpa: float | None) -> float:
-    """What the parameter youngs_modulus multiplies [Pa]: the declared modulus, or 1 MPa."""
+    """The unit of the parameter youngs_modulus [Pa]: the declared modulus, or 1 MPa."""
     return float(to_si("youngs_modulus_mpa", 1.0 if youngs_modulus_mpa is None else youngs_modulus_mpa))
 
 
@@ -177,12 +176,12 @@ _LEAST_STRETCH = 0.02  # of λ: curves that are pressed to 0.15 are left out
 class CompressionModel(CurveModel):
     """The force of compressions under a set of mechanisms.
 
-    Of measured curves, contact points and an undeclared modulus have priors around the base model's own fits. Of
+    For measured curves, contact points and an undeclared modulus have priors around the base model's own fits. For
     conditions alone, contact is around displacement 0 and the modulus must be declared.
     """
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
-        """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
+        """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
         recordings = [recording for recording in conditions.recordings if isinstance(recording, CompressionConditions)]
         nuisances = _nuisances(recordings, conditions.skin)
         super().__init__(mechanisms, conditions, "compression", recordings, nuisances)
@@ -210,8 +209,8 @@ class CompressionModel(CurveModel):
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
         """Nominal stress over E, compression positive.
 
-        Neo-Hookean, (λ⁻² − λ)/3; what stiffens has that times 1 + 2 c2 J + 3 c3 J², J = 3 (I/3)^(m/2), I = I1 − 3:
-        Yeoh's law at m = 2.
+        Neo-Hookean, (λ⁻² − λ)/3; with stiffening times 1 + 2 c2 J + 3 c3 J², J = 3 (I/3)^(m/2), I = I1 − 3: Yeoh's
+        law at m = 2.
         """
         stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
         stress = (1.0 / (stretch * stretch) - stretch) / 3.0
@@ -226,7 +225,7 @@ class CompressionModel(CurveModel):
 
 
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:
-    """The nuisances' parameters; raises InvalidInput where a measured curve does not load."""
+    """The nuisance parameters; raises InvalidInput where a measured curve does not load."""
     estimates, points = [], []
     for recording in recordings:
         height = float(to_si("sample_height_mm", recording.sample_height_mm))

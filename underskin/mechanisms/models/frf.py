@@ -1,22 +1,16 @@
-"""FRFs of one set of mechanisms, or of several sets at once.
+"""The FRF of recordings under a set of mechanisms, for one set or several at once.
 
-Values of parameters at points of several models, whose parameters have different places in their fit coordinates.
-
-Points of one or several FRF models of the same conditions, evaluated at once.
-
-Models differ in their mechanisms, and share most of what costs time: contacts, places, the table. Points whose models
-press the same contacts are worked out as one array, as far as what presses them has the same structure (sphere on the
-half space or on the layer, with or without adhesion, a glue line). The hook of a mechanism is called once for all
-points whose models have it. The derivatives of a point are those by its own model's parameters, in their order.
-
-The FRF of recordings under a set of mechanisms.
-
-Base model: Hertz' radius on a half space, the contact edge still, σ of the bonded finite-strain layer averaged over the
+Base model: Hertz' radius on a half space, a fixed contact edge, σ of the bonded finite-strain layer averaged over the
 sensor's disc at its offset; FRF = d33 · (3/2) ρ² σ (Seminara 2018, equations 7 to 16). The stages, in this order:
 
 declared values → material → contact radius and pressure → position → σ → increment with the load → d33 of each
 sensor under its own stress → neighbours' charge → ageing → dynamics of tip, sensor and electronics, line by line.
-Pick-up stands beside, as a covariance.
+Pick-up is a covariance.
+
+Models of the same conditions share contacts, positions and the table, which take most of the time. Points whose
+models press the same contacts are computed as one array, as far as their contacts have the same structure (sphere on
+half space or layer, with or without adhesion, a glue line). The hook of a mechanism is called once for all points
+whose models have it. The derivatives of a point are those by its own model's parameters, in their order.
 """
 
 from __future__ import annotations
@@ -56,12 +50,12 @@ from underskin.units import Array, Floats, Indices, Mask, to_si
 class ParameterBatch:
     """Points of fit coordinates as values in their units, with derivatives by each point's own coordinates.
 
-    Attributes: `owner`, which model each point is of; `variables`, by how many the derivatives are; `position`, two
-    further variables of value 0, or none.
+    Attributes: `owner`, the model of each point; `variables`, the number of derivatives; `position`, two further
+    variables of value 0, or none.
     """
 
     def __init__(self, fit: Floats, log: Mask, owner: Indices, *, slopes: bool, further: int) -> None:
-        """`log` says which coordinates (points, parameters) are logarithms; without `slopes`, derivatives are by the
+        """`log`: which coordinates (points, parameters) are logarithms; without `slopes`, derivatives are by the
         `further` variables alone."""
         self.owner = owner
         self._value = np.where(log, np.exp(np.where(log, fit, 0.0)), fit)
@@ -76,7 +70,7 @@ class ParameterBatch:
             self.position.append(Differentiated(np.zeros((1, 1)), seed))
 
     def of(self, points: Indices, places: Indices) -> Differentiated:
-        """The parameters that are at these places of each model, at some of the points: (points, 1)."""
+        """The parameters at these indices of each model, for some of the points: (points, 1)."""
         columns = places[self.owner[points]]
         slopes = np.zeros((self.variables, len(points), 1))
         if self._slopes:
@@ -85,10 +79,10 @@ class ParameterBatch:
 
 
 class MechanismInModels:
-    """A mechanism with certain parameters, in those of several models that have it. Attribute: `has` (models,)."""
+    """A mechanism with its parameters' indices in several models. Attribute: `has` (models,), which models hold it."""
 
     def __init__(self, mechanism: Mechanism, parameters: Mapping[str, Parameter], models: int) -> None:
-        """In none of so many models yet."""
+        """Start with no model."""
         self.mechanism = mechanism
         self.has = np.zeros(models, dtype=bool)
         self._places = {name: np.zeros(models, dtype=np.intp) for name in parameters}
@@ -98,13 +92,13 @@ class MechanismInModels:
         self._hooks = _overridden(type(mechanism))
 
     def add(self, model: int, places: Mapping[str, int]) -> None:
-        """Note that a model has it, its parameters at these places."""
+        """Record that a model has it, with its parameters at these indices."""
         self.has[model] = True
         for name, index in places.items():
             self._places[name][model] = index
 
     def has_hook(self, *hooks: str) -> bool:
-        """Whether it has one of these hooks."""
+        """Whether it overrides one of these hooks."""
         return not self._hooks.isdisjoint(hooks)
 
     def values(self, points: Indices, seeds: ParameterBatch) -> Values:
@@ -136,7 +130,7 @@ class FrfModels:
     """Several models of the same conditions and skin."""
 
     def __init__(self, models: Sequence[FrfModel]) -> None:
-        """Note which of them have which mechanism, and which press the same contacts."""
+        """Find which models have which mechanism, and which press the same contacts."""
         self._models = tuple(models)
         self._count = max(len(model.parameters) for model in models)
         self._log = np.zeros((len(models), self._count), dtype=bool)
@@ -160,10 +154,11 @@ class FrfModels:
         self._with_hook: dict[str, list[MechanismInModels]] = {}
 
     def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
-        """The responses at points (points, parameters) of these models, in rising order of `owner`; each part holds
-        some of them. Fit coordinates beyond those of a point's own model do not count.
+        """The responses at points (points, parameters) of these models, in rising order of `owner`, in parts of some
+        points.
 
-        Derivatives by the parameters and by the contact's place on request; without `lines`, no line factors.
+        Fit coordinates beyond those of a point's own model are ignored. `slopes`: derivatives by the parameters;
+        `place`: by the contact's position; without `lines`, no line factors.
         """
         seeds = ParameterBatch(fit, self._log[owner], owner, slopes=slopes, further=_POSITION if place else 0)
         edges = np.searchsorted(owner, np.arange(len(self._models) + 1))
@@ -179,8 +174,7 @@ class FrfModels:
         return parts
 
     def _pressed(self, rows: dict[int, Indices], seeds: ParameterBatch) -> list[tuple[Indices, Contacts]]:
-        """The contacts of these models' points as declared and as their mechanisms change them, those of one structure
-        together."""
+        """The contacts of these models' points, declared values changed by the mechanisms, grouped by structure."""
         sets: dict[tuple[MechanismInModels, ...], list[int]] = {}
         for number in rows:
             key = tuple(
@@ -208,7 +202,7 @@ class FrfModels:
         ]
 
     def _contacts(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Contacts:
-        """The contacts at all force nodes, one node after another, as declared."""
+        """The declared contacts at all force nodes, one node after another."""
         nodes, design = len(model.force), model.design
         of = {name: seeds.of(points, places) for name, places in self._nuisances.items() if name != "d33"}
         return Contacts(
@@ -223,8 +217,8 @@ class FrfModels:
     def _acting(
         self, hook: str, points: Indices, seeds: ParameterBatch
     ) -> Iterator[tuple[Mechanism, Indices | None, Values]]:
-        """The mechanisms with this hook: each with those among the points whose models have it, None where all have,
-        and their values."""
+        """The mechanisms with this hook, each with the indices of the points whose models have it (None: all) and
+        their values."""
         if hook not in self._with_hook:
             self._with_hook[hook] = [candidate for candidate in self._mechanisms if candidate.has_hook(hook)]
         owner = seeds.owner[points]
@@ -238,8 +232,8 @@ class FrfModels:
     def _level_and_inside(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> tuple[Differentiated, Mask]:
-        """The FRF before the dynamics [C/N] and which recordings are inside the table, at points whose contacts have
-        one structure; `model` is one of theirs."""
+        """The FRF before the dynamics [C/N], and which recordings are inside the table, at points of one contact
+        structure; `model` is one of their models."""
         sigma, inside = self._sigma_at_points(model, points, contacts, seeds)
         level = self._level(model, points, contacts, sigma, seeds).spread(len(model.design.point))
         return level, np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, model.design.point]
@@ -247,9 +241,9 @@ class FrfModels:
     def _sigma_at_points(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> tuple[list[Differentiated], Mask]:
-        """σ of each place at each force node, and which places are inside the table at all of them.
+        """σ at each position for each force node, and which positions are inside the table at all of them.
 
-        Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
+        Inside includes that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
         """
         design, table = model.design, model.sigma
         if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
@@ -267,7 +261,7 @@ class FrfModels:
         return [sigma[places * node : places * (node + 1)] for node in range(nodes)] if nodes > 1 else [sigma], inside
 
     def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
-        """σ of contacts that the table is not of, or whose stiffness is asked for."""
+        """σ of contacts other than the table's, or whose stiffness is needed."""
         table = model.sigma
         layer = None
         if contacts.layered or model.needs_stiffness:
@@ -278,7 +272,7 @@ class FrfModels:
         return SigmaOfContacts(table, contacts, model.sensor_radius, pressed, layer if contacts.layered else None)
 
     def _offset(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Differentiated:
-        """The distance of each place's contact from its sensor's centre [m], where positions vary, with them."""
+        """The distance of each contact from its sensor's centre [m], with derivatives by position where it varies."""
         design = model.design
         moved = [(some, mechanism.offset(values)) for mechanism, some, values in self._acting("offset", points, seeds)]
         if not (seeds.position or moved):
@@ -330,7 +324,7 @@ class FrfModels:
     def _line_factor(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> Differentiated | None:
-        """The complex factor of each distinct line; None where no mechanism has one."""
+        """The complex factor of each distinct line; None without any such mechanism."""
         product: Differentiated | None = None
         count, lines = len(points), len(model.design.line_frequency)
         for mechanism, some, values in self._acting("on_lines", points, seeds):
@@ -348,7 +342,7 @@ class FrfModels:
 
 
 def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: ParameterBatch) -> Response:
-    """With the derivatives by the contact's place apart from the others."""
+    """The response, with the derivatives by the contact's position separate from the others."""
     count, position_slopes = seeds.variables - len(seeds.position), None
     if seeds.position:
         position_slopes = level.slopes[count:]
@@ -358,13 +352,13 @@ def _response(level: Differentiated, inside: Mask, lines: Differentiated | None,
 
 
 def _composition_order(candidate: MechanismInModels) -> tuple[int, int, str]:
-    """Of composition."""
+    """The sort key of the order of composition."""
     mechanism = candidate.mechanism
-    return mechanism.stage.place, mechanism.order, mechanism.name
+    return mechanism.stage.position, mechanism.order, mechanism.name
 
 
 def _split_by_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
-    """The points' contacts, such that all of a part are on the same linear layer."""
+    """The points' contacts in parts, each on one linear layer."""
     layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
     if all(bool((value == value.flat[0]).all()) for value in layers):
         return [(slice(None), contacts)]
@@ -389,7 +383,10 @@ class FrfModel:
         table: SigmaTable,
         further_mechanisms: Sequence[Mechanism] = (),
     ) -> None:
-        """Work out everything that no parameter changes; σ with room for the mechanisms `further_mechanisms` as well."""
+        """Compute all that no parameter changes.
+
+        `further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well.
+        """
         self._composition = Composition(mechanisms, conditions, "frf", frf_nuisances(conditions.skin))
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
@@ -460,7 +457,8 @@ class FrfModel:
         )
 
     def relative_place_slopes(self, fit: Floats) -> Floats:
-        """∇m/m of each recording over its contact's place [1/m] (2, recordings) at one point; 0 of what is faint."""
+        """∇m/m of each recording by its contact's position [1/m] (2, recordings) at one point; 0 where the response
+        is faint."""
         response = self.respond(fit, slopes=False, place=True)
         assert response.place_slopes is not None
         value = response.level.value
@@ -474,28 +472,28 @@ class FrfModel:
             yield response.part(point).on_rows(self.design)[0]
 
     def numbers(self, variables: int) -> int:
-        """How many numbers the largest arrays of a response with derivatives by so many variables take, roughly: bounds
-        the points that are worked out at once."""
+        """The approximate size of a response's largest arrays with derivatives by `variables`: limits the points
+        computed at once."""
         contacts, lines = len(self.force.ravel()), len(self.design.line_frequency)
         return _QUANTITIES * contacts * self.sigma.wavenumbers + 2 * (1 + variables) * lines
 
     @property
     def structure(self) -> Hashable:
-        """The same for models that press the same contacts and need the same of them."""
+        """A key that is equal for models that press the same contacts and need the same quantities of them."""
         increments = tuple(mechanism.name for mechanism, _, _ in self.increments)
         return self.design, self.sigma, self.needs_stiffness, increments
 
     @property
     def places_of_nuisances(self) -> Mapping[str, int]:
-        """Where in the fit coordinates d33 and the factors on the declared modulus and thickness are."""
+        """Indices in the fit coordinates of d33 and of the factors on the declared modulus and thickness."""
         return self._composition.nuisances
 
     def places_of(self, mechanism: Mechanism) -> Mapping[str, int]:
-        """Where in the fit coordinates a mechanism's parameters are, by their names."""
+        """Indices in the fit coordinates of a mechanism's parameters, by their names."""
         return self._composition.places[mechanism.name]
 
     def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:
-        """The response at points (…, parameters); its derivatives by the parameters and by the contact's place on
+        """The response at points (…, parameters); its derivatives by the parameters and by the contact's position on
         request."""
         several = np.atleast_2d(fit)
         owner = np.zeros(len(several), dtype=np.intp)
@@ -504,7 +502,7 @@ class FrfModel:
         return response if fit.ndim > 1 else response.part(0)
 
     def _declared_inside(self, table: SigmaTable) -> Mask:
-        """Which points lie inside the table as declared."""
+        """Which points are inside the table for the declared values."""
         none = np.zeros((0, 1))
         modulus, thickness, poisson_ratio = (
             Differentiated(np.array([v]), none) for v in (self.modulus, self.thickness, self.poisson_ratio)
@@ -522,7 +520,8 @@ class FrfModel:
 def _force_nodes(
     mechanisms: Sequence[Mechanism], design: FrfDesign
 ) -> tuple[Floats, list[tuple[Mechanism, list[int], Array]]]:
-    """Forces (nodes, contacts), the preload first, and for each mechanism that asks its nodes and their weights."""
+    """Forces (nodes, contacts), the preload first, and for each mechanism with `force_nodes` its nodes and their
+    weights."""
     forces = [design.force]
     increments = []
     for mechanism in mechanisms:
@@ -534,7 +533,7 @@ def _force_nodes(
 
 
 def _by_name(values_by_mechanism: dict[str, Values]) -> dict[str, Floats]:
-    """The mechanisms' parameters (1,), whosever they are."""
+    """The parameters (1,) of all mechanisms by name."""
     return {name: value.value for values in values_by_mechanism.values() for name, value in values.items()}
 
 

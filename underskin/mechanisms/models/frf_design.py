@@ -1,13 +1,9 @@
-"""The lines of FRFs and where they were recorded, and what is predicted on them.
+"""The design of FRF recordings and the response on it: all that no parameter changes, computed once.
 
-Charge that comes from elsewhere than the skin: random on each row, so it moves the covariance and not the mean.
-
-What the conditions of FRF recordings amount to for a model, worked out once: everything that no parameter changes.
-
-Recordings share contacts (sphere, preload and what else a mechanism asks for), contacts at one place beside a sensor
-are points, and a contact at one frequency is a line. Only these distinct ones are computed.
-
-What a model of FRFs answers before it is spread over rows: a level for each recording, a factor for each line.
+Recordings share contacts (sphere, preload and further fields that a mechanism reads); a contact at one offset from a
+sensor is a point, and a contact at one frequency is a line. Only distinct ones are computed. A response is a level
+for each recording and a factor for each line. Pick-up is charge from other sources: random on each row, it changes
+the covariance and not the mean.
 """
 
 import weakref
@@ -26,10 +22,10 @@ from underskin.weak_cache import cached_while_alive
 
 @dataclass(frozen=True, eq=False)
 class Pickup:
-    """`deviation`: of real and of imaginary part on these rows [C/N], from the parameters by name in their units.
+    """`deviation`: sd of real and of imaginary part on these rows [C/N], from the parameters by name in their units.
 
-    Parameters (…, 1) give (…, rows); where rows are `alike` (rows,), they give (…, distinct), of which each row has the
-    one named there.
+    Parameters (…, 1) give (…, rows); with `alike` (rows,) they give (…, distinct), and `alike` is the index of each
+    row's value.
     """
 
     rows: Indices
@@ -37,12 +33,12 @@ class Pickup:
     alike: Indices | None = None
 
     def on_rows(self, distinct: Floats) -> Floats:
-        """Deviations as `deviation` gives them (…, distinct), on the rows (…, rows)."""
+        """Deviations (…, distinct) expanded to the rows (…, rows)."""
         return distinct if self.alike is None else distinct[..., self.alike]
 
 
 def together(pickups: Sequence[Pickup]) -> Pickup | None:
-    """Independent charges as one: their variances add on the rows that several reach; None where there is none."""
+    """Independent charges combined: variances add on common rows; None for no charge."""
     if len(pickups) < 2:
         return pickups[0] if pickups else None
     rows = np.unique(np.concatenate([pickup.rows for pickup in pickups]))
@@ -65,7 +61,7 @@ class FrfDesign:
     """Arrays over recordings, contacts, points, neighbours, lines and rows; SI."""
 
     def __init__(self, conditions: Conditions, fields: Collection[str], neighbours: bool) -> None:
-        """`fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n", "id" (every recording)."""
+        """`fields`: what else distinguishes contacts: "dwell_s", "dynamic_force_n", "id" (every recording)."""
         recordings = frf_of(conditions)
         count = len(recordings)
         self._conditions = weakref.ref(conditions)  # which keep the design in a cache
@@ -82,7 +78,7 @@ class FrfDesign:
                 for sensor_index, recording in zip(self.sensor, recordings, strict=True)
             ]
         )
-        # Of each contact; the dynamic force and the dwell are 0 where no mechanism asks
+        # Of each contact; dynamic force and dwell are 0 where no mechanism reads them
         keys = np.array([_contact_key(recording, fields) for recording in recordings])
         if "id" in fields:
             keys = np.column_stack([keys, np.arange(count)])
@@ -127,7 +123,7 @@ class FrfDesign:
 
     @property
     def conditions(self) -> Conditions:
-        """Those that it was worked out from, which a model of them holds."""
+        """The conditions that it was computed from, which a model of them holds."""
         conditions = self._conditions()
         assert conditions is not None
         return conditions
@@ -137,7 +133,7 @@ _cached_design = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of
 
 
 def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
-    """The design, kept for the next model of the same conditions."""
+    """The design, cached for further models of the same conditions."""
     return _cached_design(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n", "id"}, neighbours)
 
 
@@ -149,7 +145,8 @@ def frequencies(recording: FrfConditions) -> Floats:
 
 
 def _distinct(columns: Sequence[Floats]) -> tuple[Floats, Indices]:
-    """The distinct frequencies of recordings, most of which share their lines, and which of them each row has."""
+    """The distinct frequencies of recordings, most of which share their lines, and the index of each row's
+    frequency."""
     keys = [column.tobytes() for column in columns]
     shared = dict(zip(keys, columns, strict=True))
     distinct = np.unique(np.concatenate(list(shared.values())))
@@ -158,7 +155,7 @@ def _distinct(columns: Sequence[Floats]) -> tuple[Floats, Indices]:
 
 
 def _neighbours(places: Floats) -> Mask:
-    """Which sensors (sensors, sensors) are within 1.2 pitches of which."""
+    """Which sensors (sensors, sensors) are within 1.2 pitches of each other."""
     distance = cdist(places, places)
     np.fill_diagonal(distance, np.inf)
     near: Mask = distance <= NEIGHBOUR_PITCHES * distance.min()
@@ -180,7 +177,7 @@ def largest_offset(design: FrfDesign, further: float) -> float:
 class Response:
     """FRFs at one or several points of the fit coordinates, in two factors: leading axes are those of the points.
 
-    `place_slopes` are by the contact's x and y, None where they were not asked for.
+    `place_slopes` are by the contact's x and y, None where not requested.
     """
 
     level: Differentiated  # (…, recordings) [C/N], real: before the dynamics
@@ -191,7 +188,7 @@ class Response:
     def on_rows(self, design: FrfDesign) -> tuple[Array, Array]:
         """Level times line factor on every row of a single point (rows,), and its derivatives (variables, rows).
 
-        These are by the parameters, then by the place where those were asked for.
+        These are by the parameters, then by the position where requested.
         """
         position_slopes = np.zeros((0, *self.level.value.shape)) if self.place_slopes is None else self.place_slopes
         level = self.level.value[design.recording]
@@ -200,13 +197,13 @@ class Response:
             return level.astype(complex), slopes.astype(complex)
         factor = self.lines.value[design.line]
         slopes = slopes * factor
-        for row, of_lines in zip(slopes, self.lines.slopes, strict=False):  # which are by the parameters alone
+        for row, of_lines in zip(slopes, self.lines.slopes, strict=False):  # derivatives by the parameters only
             if of_lines.any():
                 row += level * of_lines[design.line]
         return level * factor, slopes
 
     def part(self, index: int | slice | Indices) -> "Response":
-        """At some of several points."""
+        """The response at some of several points."""
 
         def of(x: Differentiated) -> Differentiated:
             return Differentiated(x.value[index], x.slopes[:, index])
@@ -218,7 +215,7 @@ class Response:
 
 
 def joined(responses: Sequence[Response]) -> Response:
-    """Responses of one model at several sets of points, as one."""
+    """Responses of one model at several sets of points, concatenated."""
 
     def of(parts: Sequence[Differentiated]) -> Differentiated:
         return Differentiated(

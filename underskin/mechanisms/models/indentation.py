@@ -1,55 +1,44 @@
-"""Indentations by a sphere.
+"""The force of indentation curves by a sphere, sample by sample, under a set of mechanisms. SI.
 
-A rigid sphere on the elastic half space or layer, with adhesion, stiffening and a stage that gives. SI.
+Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
+declared, E free; for deep indentation Sneddon's law of the sphere; and `strain_share` of the effect of finite strain on
+the depth. Stages: declared value → material → contact radius, depth and force together with the stage's compliance,
+through the history where the body relaxes. Zero, drift and gain of the load cell are in the covariance
+(diagnosis/noise).
 
-All follows from the contact radius a. Without adhesion, on the half space: δ = a²/R, F = 4E'a³/(3R), and at a fixed
-edge the stiffness is K = 2E'a; on the layer these are multiplied by functions of a/h (contact_curves). An edge whose
-energy release rate is w is stretched by ℓ: δ and F fall by ℓ and K ℓ, on the half space ℓ = √(2πaw/E') (Johnson,
-Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E' times its nominal stress
-over a neo-Hookean solid's at the representative strain 0.2 a/R (after Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129
-(2007) 904, whose ratio to Hooke's law would count the neo-Hookean solid's own 9 % at a/R 0.4, where a sphere's contact
-gets softer by 5 %). What the stage commands is δ + F/k.
+Elastic contact, all as functions of the contact radius a. Without adhesion, on the half space: δ = a²/R,
+F = 4E'a³/(3R), and at a fixed edge the stiffness is K = 2E'a; on the layer these are multiplied by functions of a/h
+(contact_curves). An edge of energy release rate w is stretched by ℓ: δ and F fall by ℓ and K ℓ, on the half space
+ℓ = √(2πaw/E') (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E' times its
+nominal stress over a neo-Hookean solid's at the representative strain 0.2 a/R (after Lin, Dimitriadis & Horkay,
+J. Biomech. Eng. 129 (2007) 904; their ratio to Hooke's law would include the neo-Hookean solid's own 9 % at a/R 0.4,
+where the contact of a sphere gets softer by 5 %). The stage is commanded to δ + F/k.
 
-Pressed deep, the sphere is no paraboloid: δ = a artanh(a/R), dF = 2E'a dδ (Sneddon, Int. J. Eng. Sci. 3 (1965) 47).
-Finite strain makes the contact softer: at the same force, δ of the solved frictionless contact of the round sphere with
-a neo-Hookean layer is up to 3.4 % above the linear one's (contact table), of which `strain_share` is taken; a is then
-the radius of the linear contact.
+Deep indentation: δ = a artanh(a/R), dF = 2E'a dδ (Sneddon, Int. J. Eng. Sci. 3 (1965) 47). Finite strain softens the
+contact: at the same force, δ of the solved frictionless contact with a neo-Hookean layer is up to 3.4 % above the
+linear one's (contact table), of which `strain_share` is taken; a is then the radius of the linear contact.
 
-Under a given travel the contact is stable where the travel grows with a. It ends at the least travel: at JKR's least
-depth for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one. The functions of a are compiled
-(sphere_kernels).
+At a given travel the contact is stable where the travel grows with a. It ends at the least travel: at JKR's least depth
+for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one.
 
-Arrays are (points, curves, samples), with 1 where nothing differs: points of the fit coordinates, samples of a curve.
-
-The force of a sphere on a body that relaxes, while its contact grows, stays and recedes (Ting's theory). SI.
-
-E(t) = E(0) e(t), e(t) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs. While the contact grows it is as large as on an
-elastic body at this depth δ, u being that body's force. A ring of the contact that was reached at the time s and has
-stuck since carries H(s,t) = ∫ e(t−s') dδ(s') over s < s' < t, and the contact recedes to the ring that is about to let
-go:
+Relaxing body (Ting, J. Appl. Mech. 33 (1966) 845): E(t) = E(0) e(t), e(t) = 1 − Σ g (1 − e^(−t/τ)) over the Prony
+pairs; u is the elastic body's force at the depth δ. While the contact grows it is as large as on the elastic body. A
+ring of the contact that was reached at the time s and has stuck since carries H(s,t) = ∫ e(t−s') dδ(s') over
+s < s' < t, and the contact recedes to the ring that is about to let go:
 
     H(t1,t) = ℓ e(t−t1) − ℓ_s,   F(t) = ∫₀^{t1} e(t−s) du(s) + K H(t1,t)
 
-(Ting, J. Appl. Mech. 33 (1966) 845: without adhesion the stretches ℓ, ℓ_s are 0, and so is H(t1,t)). K is the stiffness
-of the contact as large as at t1, ℓ its adhesive stretch when it was reached and ℓ_s that at which it lets go; an edge
-that moves sees the instantaneous modulus (Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). What stiffens has E times
-its ratio of stiffening at the present contact: u, K and F above are those at rest, and F is multiplied by it. Where all
-rings but those of the first touch have let go, these are an elastic contact of modulus E(0) e at the depth
-[(1−g) δ + Σ g Y]/e with the work of separation over e²; it ends at that contact's pull-off. Y is the fading memory of δ
-(relaxation). δ and u run straight between samples.
+Without adhesion the stretches ℓ, ℓ_s and H(t1,t) are 0. K is the stiffness of the contact at its size at t1, ℓ its
+adhesive stretch when it was reached and ℓ_s that at which it lets go; a moving edge has the instantaneous modulus
+(Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). With stiffening, u, K and F above are those at rest, and F is
+multiplied by the stiffening ratio at the present contact. Where only the rings of the first touch still hold, the
+contact is elastic with modulus E(0) e at the depth [(1−g) δ + Σ g Y]/e and the work of separation over e²; it ends at
+that contact's pull-off. Y is the fading memory of δ (relaxation). δ and u are linear between samples. Exact for half
+space and layer through one growth and one shrinkage of the contact, with holds in between; in small returns on the way
+(noise) rings are assumed to stick, larger ones are rejected by contact_creep.
 
-Exact for half space and layer through one growing and one shrinking of the contact, with holds in between. Of small
-returns on the way (noise) the rings are taken to have stuck throughout; larger ones are refused by contact_creep.
-
-Arrays are (points, curves, samples), as in sphere_contact.
-
-The force of indentation curves, sample by sample, under a set of mechanisms.
-
-Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
-declared, E free; under a sphere that is pressed deep, Sneddon's law of the whole sphere in its place; and a share of
-what finite strain adds to the depth. Stages: declared value → material → contact radius, depth and force together with
-the stage's give, through the body's history where it relaxes. What the load cell adds, a zero, a drift and a gain,
-stands in the covariance (diagnosis/noise).
+Arrays are (points, curves, samples), with 1 where nothing differs: points of the fit coordinates, samples of a
+curve. The functions of a are compiled (sphere_kernels).
 """
 
 from collections.abc import Callable, Sequence
@@ -89,7 +78,7 @@ from underskin.recordings.modulus import estimate
 from underskin.surrogate.contact_table import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
 
-_SMALLEST = 1e-12  # m of depth, below which a radius is not told from 0
+_SMALLEST = 1e-12  # m of depth, below which a radius counts as 0
 _NODES = 401  # of the layer's functions over a/h
 
 
@@ -106,9 +95,10 @@ class Stiffening:
 
 
 class LayerRatios:
-    """A layer's force, depth, stiffness and adhesive stretch over the half space's, of a/h; and a/h of the depth.
+    """Force, depth, stiffness and adhesive stretch of a layer over the half space's, as functions of a/h; and a/h of
+    depth.
 
-    Attributes: `cubics` (cells, powers, 7), these four and finite strain's three coefficients.
+    Attributes: `cubics` (cells, powers, 7), these four and the three coefficients of finite strain.
     """
 
     def __init__(self, poisson_ratio: float) -> None:
@@ -128,13 +118,13 @@ class LayerRatios:
 
 @lru_cache(maxsize=256)
 def layer_ratios(poisson_ratio: float) -> LayerRatios:
-    """Those of one Poisson ratio."""
+    """The ratios for one Poisson ratio."""
     return LayerRatios(poisson_ratio)
 
 
 @cache
 def _half_space() -> Floats:
-    """The cubics (1, 1, powers, 7) of a half space, whose ratios nobody asks for."""
+    """The cubics (1, 1, powers, 7) of a half space, whose four ratios are not used."""
     cubics = np.zeros((1, 1, 4, 7))
     cubics[0, 0, 3, 4:] = load_contact().softening_coefficients(np.zeros(()))
     return cubics
@@ -142,13 +132,13 @@ def _half_space() -> Floats:
 
 @cache
 def _grid() -> CurveGrid:
-    """No stress is asked for: one wave number, of no use."""
+    """A grid of one wave number: stresses are not needed."""
     return CurveGrid(np.ones(1))
 
 
 @dataclass(frozen=True)
 class Layers:
-    """The layers that each point of the fit coordinates has: their thickness [m] (points, 1, 1) and functions."""
+    """The layer at each point of the fit coordinates: thickness [m] (points, 1, 1) and functions of a/h."""
 
     thickness: Floats
     by_point: Sequence[LayerRatios]  # one for each point of the fit coordinates, or one for all
@@ -188,19 +178,19 @@ class Sphere:
         return force, depth, stiffness, stretch
 
     def travel(self, a: Floats, work: Floats) -> Floats:
-        """δ + F/k in equilibrium."""
+        """The travel δ + F/k in equilibrium."""
         force, depth, stiffness, unit = self.at(a)
         stretch = unit * np.sqrt(work)
         return np.asarray(depth - stretch + self.compliance * (force - stiffness * stretch))
 
     def force_at(self, travel: Floats, a: Floats) -> Floats:
-        """F at a travel, where the edge is at a: as its stretch then is."""
+        """F at a travel with the edge at a, stretched accordingly."""
         force, depth, stiffness, _ = self.at(a)
         stretch = (depth + self.compliance * force - travel) / (1 + self.compliance * stiffness)
         return np.asarray(force - stiffness * stretch)
 
     def radius_at(self, travel: Floats, work: Floats | None, least: Floats | float = 0.0) -> Floats:
-        """a of the stable contact at a travel in equilibrium; `least` where there is none: its radius at pull-off."""
+        """The radius of the stable contact at a travel in equilibrium; without one `least`, the radius at pull-off."""
         depth = np.maximum(travel, _SMALLEST)
         root = np.sqrt(self.radius * depth)
         start = root if self.layers is None else self.layers.radius_of(root)
@@ -228,7 +218,7 @@ class Sphere:
 
     @cached_property
     def _body(self) -> Floats:
-        """As the compiled functions take it."""
+        """The columns of `sphere_kernels`' `body`."""
         thickness = 0.0 if self.layers is None else self.layers.thickness
         law = self.stiffening
         stiffening = (-1.0, 0.0, 0.0) if law is None else (law.coefficient, law.form, law.exponent)
@@ -239,7 +229,7 @@ class Sphere:
         return rows.reshape((1,) * (4 - rows.ndim) + rows.shape)
 
     def _wide_body(self, shape: tuple[int, ...]) -> Floats:
-        """For points and curves of a shape."""
+        """The body broadcast to points and curves of a shape."""
         return _wide(self._body, (*shape[:2], *self._body.shape[2:]))
 
     @property
@@ -247,7 +237,7 @@ class Sphere:
         return _half_space() if self.layers is None else self.layers.cubics
 
     def inside(self, a: Floats) -> Mask:
-        """Which contacts the layer's functions reach."""
+        """Which contacts are within the range of the layer's functions."""
         if self.layers is None:
             return np.ones(np.shape(a), dtype=bool)
         return np.asarray(a < (1 - 1e-9) * LARGEST_A_OVER_H * self.layers.thickness)
@@ -258,7 +248,7 @@ class Sphere:
 
 
 def _wide(values: Floats | float, shape: tuple[int, ...], last: tuple[int, ...] = ()) -> Floats:
-    """Broadcast to a shape, but along the last axis to what is `last`; contiguous."""
+    """Broadcast to a shape, with `last` in place of its last axis; contiguous."""
     target = (*shape[:-1], *last) if last else shape
     if isinstance(values, np.ndarray) and values.shape == target:
         return contiguous(values)
@@ -266,7 +256,8 @@ def _wide(values: Floats | float, shape: tuple[int, ...], last: tuple[int, ...] 
 
 
 def in_contact(travel: Floats, pull_off: Floats) -> Mask:
-    """Which samples are: from the first that reaches the surface, at 0, to the first below pull-off, and so on."""
+    """Which samples are in contact: from the first at or beyond the surface, travel 0, to the first below pull-off,
+    and so on."""
     meets = travel >= 0
     changes = meets | (travel < pull_off)
     changes[..., 0] = True
@@ -275,10 +266,10 @@ def in_contact(travel: Floats, pull_off: Floats) -> Mask:
 
 
 def edges(sphere: Sphere, travel: Floats, held: Mask, work: Floats, separation: Floats | None) -> Floats:
-    """The edge's radius at each sample (points, curves, samples).
+    """The contact radius at each sample (points, curves, samples).
 
-    The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of `separation`,
-    and rests in between.
+    The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of
+    `separation`, and rests in between.
     """
     parting = work if separation is None else separation
     least, _ = sphere.pull_off(parting)
@@ -317,14 +308,14 @@ class Path:
 
     @property
     def touched(self) -> Mask:
-        """From the touch on."""
+        """Whether a sample is at or after the touch."""
         return np.asarray(np.arange(self.travel.shape[-1]) >= self.first_contact[..., None])
 
 
 def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path) -> tuple[Floats, Mask]:
     """F (points, curves, samples) [N] where a path's travel is the depth δ, and where there is contact.
 
-    The sphere's own stage is not looked at.
+    The compliance of the sphere's stage is ignored.
     """
     if np.any(sphere.compliance):
         sphere = replace(sphere, compliance=0.0)
@@ -367,7 +358,7 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
 def relaxing_on_stage(
     sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
 ) -> tuple[Floats, Mask]:
-    """The same where the travel is δ + F/k of a stage that gives: depths by secant steps at all samples together."""
+    """As `relaxing`, with travel δ + F/k of a compliant stage: secant steps for the depths of all samples together."""
     compliance, travel, touched = sphere.compliance, path.travel, path.touched
     work = None if adhesion is None else adhesion.work
     least, _ = sphere.pull_off(work)
@@ -395,7 +386,7 @@ def relaxing_on_stage(
 
 
 def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """F and K of the elastic contact that grows, at its modulus at rest; ℓ and ℓ_s; and how much stiffer it is."""
+    """F and K of the growing elastic contact, at its modulus at rest; ℓ and ℓ_s; and the stiffening ratio."""
     force, _, stiffness, unit = sphere.at(a)
     stiffer = np.ones_like(a)
     if sphere.stiffening is not None:
@@ -416,7 +407,7 @@ def _first_touch(
     memory: Floats,
     time: Floats,
 ) -> tuple[Floats, Mask]:
-    """F of what is left of the first touch, at the first of the times, and whether it holds."""
+    """F of the remaining first touch, from the first of the times on, and whether it holds."""
     remaining = relaxation.remaining(time - time[..., :1])
     relaxed = relaxation.convolved(depth, memory) / remaining
     work = adhesion.separation / remaining**2
@@ -432,12 +423,12 @@ _CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the cont
 class IndentationModel(CurveModel):
     """The force of indentations under a set of mechanisms.
 
-    Of measured curves, contact points and an undeclared modulus have priors around the base model's own fits. Of
-    conditions alone they are those expected of the declared modulus, with contact at displacement 0.
+    For measured curves, contact points and an undeclared modulus have priors around the base model's own fits. For
+    conditions alone the priors are those of the declared modulus, with contact at displacement 0.
     """
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
-        """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
+        """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
         recordings = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
         nuisances = _nuisances(recordings, conditions.skin)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
@@ -492,8 +483,8 @@ class IndentationModel(CurveModel):
         return force, held, sphere.inside(a) | ~held
 
     def _last_travel(self, sphere: Sphere, work: Floats) -> Floats:
-        """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage that is known to
-        give although its deflection has been subtracted, else as the sphere's own stage has it."""
+        """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage known to be
+        compliant (although its deflection has been subtracted), else under the sphere's own stage."""
         least, travel = sphere.pull_off(work)
         if np.any(self._stage_compliance):
             on_stage = replace(sphere, compliance=sphere.compliance + self._stage_compliance)
@@ -509,7 +500,7 @@ class IndentationModel(CurveModel):
         travel: Floats,
         held: Mask | None,
     ) -> tuple[Floats, Mask, Mask]:
-        """The same through the history, which begins where a recording touches, between two samples."""
+        """As `_force_at` through the history, which begins at the touch of a recording, between two samples."""
         path = _with_touch(travel, self.time)
         force, contact_mask = force_on(path)
         contact_mask = contact_mask & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
@@ -544,7 +535,7 @@ def _adhesion(curve: Curve) -> Adhesion | None:
 
 
 def _with_touch(travel: Floats, time: Floats) -> Path:
-    """The path, with the touch, travel 0, in the place of the last sample before it."""
+    """The path with its last sample before contact moved to the touch, travel 0."""
     touched = travel >= 0
     first = np.where(touched.any(axis=-1), touched.argmax(axis=-1), travel.shape[-1])
     time = np.broadcast_to(time, travel.shape).copy()
@@ -560,7 +551,7 @@ def _with_touch(travel: Floats, time: Floats) -> Path:
 
 
 def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescription) -> list[Parameter]:
-    """The nuisances' parameters; raises InvalidInput where no measured curve loads, or one does not move."""
+    """The nuisance parameters; raises InvalidInput where no measured curve loads, or one does not move."""
     estimates, contact_points, refused = [], [], None
     for recording in recordings:
         span = float(np.ptp(to_si("displacement_mm", recording.displacement_mm)))
@@ -590,7 +581,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
 
 
 def _secant_modulus(recording: IndentationRecording, poisson_ratio: float) -> float:
-    """Of a curve that does not load: Hertz's modulus [Pa] of the range of force over the range of travel."""
+    """Hertz's modulus [Pa] from the ranges of force and travel, for a curve that does not load."""
     force, travel = (float(np.ptp(to_si(name, getattr(recording, name)))) for name in ("force_n", "displacement_mm"))
     radius = float(to_si("indenter_radius_mm", recording.indenter_radius_mm))
     return max(0.75 * (1 - poisson_ratio**2) * force / (np.sqrt(radius) * max(travel, 1e-300) ** 1.5), 1e-300)

@@ -1,15 +1,9 @@
-"""Compiled: Hertz's radii, and σ of contacts beside the sensors' centres.
+"""Compiled functions for σ of contacts at an offset from the sensors' centres, with derivatives.
 
-Compiled: what the σ table is entered with under spheres without adhesion on an incompressible layer.
-
-Contacts by Hertz' law: a³ = 9 F R/(16 E), L = F/(R² E). Arrays are (points, rows), where either may be 1 and
-then stands for all; derivatives have the variables along their first axis.
-
-Compiled: σ of contacts beside a sensor, from the coefficients of `sigma_curves`, with derivatives.
-
-Arrays are (points, rows), where either may be 1 and then stands for all; derivatives have the variables along their
-first axis. A tensor product s(a, x, ρ, e) = Σ c_ijkl A_i(a) X_j(x) P_k(ln ρ) E_l(e) of cubic splines has four functions
-along each axis that differ from 0 at a place.
+Contacts follow Hertz' law for spheres without adhesion on an incompressible layer: a³ = 9 F R/(16 E), L = F/(R² E).
+A tensor product s(a, x, ρ, e) = Σ c_ijkl A_i(a) X_j(x) P_k(ln ρ) E_l(e) of cubic splines (coefficients of
+`sigma_curves`) has four non-zero functions along each axis at a point. Arrays are (points, rows), where either may
+be 1 and is then broadcast; derivatives have the variables along their first axis.
 """
 
 import numpy as np
@@ -68,7 +62,7 @@ _SMALL = 0.05  # of x, below which Hertz' transform is its series
 
 @compiled()
 def four_functions(at: float, low: float, high: float, knots: Floats, cubics: Floats, functions: Floats) -> int:
-    """The cell that a place lies in; its functions' values and slopes go to `functions` (8,).
+    """Index of the cell that holds `at`; values and slopes of its four functions are written to `functions` (8,).
 
     Beyond the nodes, from `low` to `high`, every function is continued along its tangent.
     """
@@ -194,7 +188,7 @@ def table_sigma(
 
 @compiled()
 def _product(a: Floats, b: Floats) -> float:
-    """Σ one · other, in four sums that a processor works out side by side; there is a multiple of four terms."""
+    """Σ a · b in four sums, which a processor computes in parallel; the number of terms is a multiple of four."""
     s0 = s1 = s2 = s3 = 0.0
     for k in range(0, len(a), 4):
         s0 += a[k] * b[k]
@@ -259,8 +253,9 @@ def linear_sigma(
 def sphere_and_punch(k: Floats, panel: int, alpha: Floats, shapes: Floats) -> None:
     """Transforms of Hertz' and of a flat punch's pressure and their derivatives by a/h, at k (wave numbers).
 
-    With x = k a/h: p̂_sphere = 3 (sin x − x cos x)/x³ and p̂_punch = sin x/x. The wave numbers are panels of so many
-    nodes, all `panel`-th of which are equally far apart, so that sines follow from panel to panel by a rotation.
+    With x = k a/h: p̂_sphere = 3 (sin x − x cos x)/x³ and p̂_punch = sin x/x. The wave numbers are in panels of `panel`
+    nodes; those at the same position of successive panels are equally spaced, so sines follow from panel to panel by a
+    rotation.
 
     Parameters
     ----------
@@ -299,7 +294,7 @@ def disc_averages(
     cubics: Floats,
     total: Floats,
 ) -> None:
-    """Averages of a radial profile's basis functions over discs beside its centre, ∫ f(√(e² + s² + 2 e s cos φ)) dA/A.
+    """Averages of a radial profile's basis functions over offset discs, ∫ f(√(e² + s² + 2 e s cos φ)) dA/A.
 
     Parameters
     ----------

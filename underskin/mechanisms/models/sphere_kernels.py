@@ -1,12 +1,12 @@
-"""Compiled: the contact of a sphere as a function of its radius, and the radius at a travel (indentation.py).
+"""Compiled functions for the contact of a sphere: force and depth by the contact radius, and the radius at a travel.
 
-Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 9) holds the reduced modulus E', the
-sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of stiffening c (−1: none), q and m, 1
-where the sphere is pressed so deep that it is no paraboloid (else 0), and the share of finite strain's correction.
+Arrays are (points, curves, samples); see indentation.py for the equations. A `body` (points, curves, samples or 1, 9)
+holds the reduced modulus E', the sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of
+stiffening c (−1: none), q and m, 1 for deep indentation (else 0), and the share of the finite-strain correction.
 `cubics` (layers, cells, powers, 7) are a layer's four ratios and the three coefficients of that correction over a/h
-from 0 to `LARGEST_A_OVER_H`, highest power first, of each point or one for all; a half space has those of one cell.
+from 0 to `LARGEST_A_OVER_H`, highest power first, of each point or one for all; a half space has one cell.
 
-Also fading memories, and the edge of a contact that recedes on a body that relaxes: memories have the pairs on a last
+Also fading memories, and the edge of a receding contact on a relaxing body: memories have the Prony pairs on a last
 axis; g and τ are (points, pairs).
 """
 
@@ -38,7 +38,7 @@ _BODY = "float64[:, :, :, ::1], float64[:, :, :, ::1]"
 
 @compiled()
 def _stiffened(strain: float, coefficient: float, form: float, exponent: float) -> tuple[float, float]:
-    """Nominal stress at a compressive strain over that of a neo-Hookean solid, and its logarithm's slope.
+    """Nominal stress at a compressive strain over that of a neo-Hookean solid, and the slope of its logarithm.
 
     (1 + q c J)^(1/q), J = 3 (I/3)^(m/2) of the invariant I = I1 − 3.
     """
@@ -66,9 +66,9 @@ def _constants(body: Floats, point: int, curve: int, sample: int) -> Constants:
 
 @compiled()
 def _deep_sphere(a: float, radius: float) -> tuple[float, float, float]:
-    """F/E', δ and dδ/da of a sphere that is no paraboloid (Sneddon 1965): δ = a artanh(a/R), dF = 2E'a dδ.
+    """F/E', δ and dδ/da of a sphere in deep indentation (Sneddon 1965): δ = a artanh(a/R), dF = 2E'a dδ.
 
-    Where a is nearly R the depth goes on in a straight line: no contact is wider.
+    Near a = R the depth is continued linearly: no contact is wider.
     """
     x = min(a / radius, _EQUATOR)
     if x < _PARABOLIC:
@@ -169,9 +169,9 @@ def _travel(a: float, root_work: float, constants: Constants, cubics: Floats) ->
 
 @compiled()
 def _solved(aim: float, start: float, lowest: float, root_work: float, constants: Constants, cubics: Floats) -> Four:
-    """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: where, its travel and slope.
+    """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: its radius, travel and slope.
 
-    Newton's steps, and halvings where one leaves the bracket known so far.
+    Newton steps, and halvings where one leaves the current bracket.
     """
     radius, below, above, bounded = start, lowest, math.inf, False
     touching = at_touching = slope = 0.0
@@ -208,10 +208,10 @@ def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> No
 
 @compiled(f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, {_BODY})")
 def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Floats, cubics: Floats) -> None:
-    """Solve travel(a) = travel by Newton's steps from radii `a` above, in place.
+    """Solve travel(a) = travel by Newton steps from radii `a` above, in place.
 
-    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). The parabola through the last
-    two samples' tangents leads so near the radius of the next that one step is mostly enough.
+    `work` and `least`, the lower bound of the radius, are (points, curves, samples or 1). The parabola through the
+    last two samples' tangents gives a start for the next from which one step is mostly enough.
     """
     points, curves, samples = travel.shape
     alike = work.shape[2] == 1 and body.shape[2] == 1
@@ -246,9 +246,9 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
 
 @compiled()
 def _least_travel(low: float, high: float, root_work: float, constants: Constants, cubics: Floats) -> float:
-    """The radius between two at which the travel's slope is 0; the bound that is nearer where it keeps its sign.
+    """The radius between two at which the slope of the travel is 0; the nearer bound where it does not change sign.
 
-    Regula falsi (Illinois) of slope √a over a^(3/2), which is straight for JKR's contact with a half space.
+    Regula falsi (Illinois) of slope √a over a^(3/2), which is linear for JKR's contact with a half space.
     """
     below, above = low**1.5, high**1.5
     at_below = _travel(low, root_work, constants, cubics)[1] * math.sqrt(low)
@@ -273,7 +273,7 @@ def _least_travel(low: float, high: float, root_work: float, constants: Constant
 
 @compiled(f"void({_ROWS}, {_BODY}, {_ROWS}, {_ROWS})")
 def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, travel: Floats) -> None:
-    """Fill the radius and the travel at which the travel is least in equilibrium."""
+    """Fill the radius and the travel at which the equilibrium travel is least."""
     points, curves, samples = radius.shape
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
@@ -292,8 +292,8 @@ def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, tr
 
 @compiled(f"void({_ROWS}, {_ROWS}, boolean[:, :, ::1], {_ROWS})")
 def edge_rows(advancing: Floats, receding: Floats, held: Mask, a: Floats) -> None:
-    """Fill the radius of an edge that advances to `advancing`, recedes to `receding`, and rests in between; it begins
-    anew after a sample out of contact."""
+    """Fill the radius of an edge that advances to `advancing`, recedes to `receding`, and rests in between; it restarts
+    after a sample out of contact."""
     points, curves, samples = a.shape
     for point in range(points):
         for curve in range(curves):
@@ -322,13 +322,13 @@ _PAIRS = "float64[:, ::1], float64[:, ::1]"
 
 @compiled()
 def _lagging(x: float) -> float:
-    """(1 − e^(−x))/x: what is left of a steady change at its end, x of its duration over τ."""
+    """(1 − e^(−x))/x: the remaining fraction of a steady change at its end, x its duration over τ."""
     return 1 - x / 2 + x**2 / 6 if x < _SERIES else -math.expm1(-x) / x
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, float64[:, ::1], {_MEMORY})")
 def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) -> None:
-    """Fill Y = ∫ e^(−(t−s)/τ) du(s) of histories u, straight between samples; what u is at the first came at once."""
+    """Fill Y = ∫ e^(−(t−s)/τ) du(s) of histories u, linear between samples; u at the first sample is a step."""
     points, curves, samples = history.shape
     for point in range(points):
         for curve in range(curves):
@@ -343,7 +343,7 @@ def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) ->
 
 @compiled()
 def _carried(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) -> tuple[float, float]:
-    """H(s,t) of a ring that was reached at a depth and time, with the memory of depths then, and e(t−s)."""
+    """H(s,t) of a ring reached at a depth and time, with the memory of depths then, and e(t−s)."""
     age = max(now[1] - time, 0.0)
     carried, remaining = now[0] - depth, 1.0
     for pair in range(len(pairs[0])):
@@ -355,7 +355,7 @@ def _carried(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) 
 
 @compiled()
 def _excess(ring: int, rings: Rings, pairs: Pairs, now: Now) -> float:
-    """H(s,t) + ℓ_s − ℓ e(t−s) of a ring, above 0 where it holds."""
+    """H(s,t) + ℓ_s − ℓ e(t−s) of a ring: at least 0 while it holds."""
     depth, time, memory, slack, parting = rings
     carried, remaining = _carried(depth[ring], time[ring], memory[ring], pairs, now)
     return float(carried + parting[ring] - slack[ring] * remaining)
@@ -363,7 +363,7 @@ def _excess(ring: int, rings: Rings, pairs: Pairs, now: Now) -> float:
 
 @compiled()
 def _between(low: int, high: int, share: float, rings: Rings, pairs: Pairs, memory: Floats) -> None:
-    """Fill the memory of depths of a ring that was reached at a share of the way between two samples."""
+    """Fill the memory of depths for a ring reached at a fraction `share` of the way between two samples."""
     for pair in range(len(memory)):
         x = share * max(rings[1][high] - rings[1][low], 0.0) / pairs[1][pair]
         change = share * (rings[0][high] - rings[0][low])
@@ -372,7 +372,7 @@ def _between(low: int, high: int, share: float, rings: Rings, pairs: Pairs, memo
 
 @compiled()
 def _last_sample(low: int, high: int, record: Indices, rings: Rings, pairs: Pairs, now: Now) -> int:
-    """The last of the samples from `low`, which holds, to `high` that does."""
+    """The last of the samples from `low`, whose ring holds, to `high` whose ring holds."""
     if _excess(high, rings, pairs, now) >= 0:
         return high
     while high - low > 1:
@@ -387,7 +387,7 @@ def _last_sample(low: int, high: int, record: Indices, rings: Rings, pairs: Pair
 
 @compiled()
 def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Floats) -> float:
-    """The share of the way between two samples up to which rings hold: regula falsi, the end that stays halved."""
+    """The fraction of the way between two samples up to which rings hold (regula falsi, Illinois)."""
     depth, time, _, slack, parting = rings
     at_near, at_far = _excess(low, rings, pairs, now), _excess(high, rings, pairs, now)
     inner, outer, share = 0.0, 1.0, 0.0
@@ -431,10 +431,10 @@ def creep_edge_rows(
     memory_force: Floats,
     stuck: Mask,
 ) -> None:
-    """Of samples after the last deeper one (`record`) fill whether any ring holds, and of the outermost that does the
-    depth δ it was reached at, H(s,t), and Σ g e^(−(t−s)/τ) Y of the force then.
+    """For samples after the last deeper one (`record`) fill whether any ring holds, and of the outermost ring that does
+    the depth δ at which it was reached, H(s,t), and Σ g e^(−(t−s)/τ) Y of the force then.
 
-    Rings let go one after another from the outermost; the one about to lies between two samples.
+    Rings let go one after another from the outermost; the next one lies between two samples.
     """
     points, curves, samples = depth.shape
     memory = np.empty(fractions.shape[1])

@@ -1,7 +1,7 @@
-"""What a law that nobody listed may follow, from recording to recording: fields, times, places, order, `conditions`.
+"""The axes that an unlisted law may follow from recording to recording: fields, times, positions, order, `conditions`.
 
-An axis holds one number a recording, by the recording's id: laws are bound to it, so that a campaign of which some
-recordings are left out has the same order, the same preload before, and the same range.
+An axis holds one number per recording, by the recording's id: laws are bound to it, so that a subset of a campaign
+has the same order, the same previous preload, and the same range.
 """
 
 from collections import Counter
@@ -39,9 +39,9 @@ BUILT_IN = tuple(UNITS)
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One number a recording. `relative`: to that of the recording itself (the preload before over its own).
+    """One number per recording. `relative`: divided by that of the recording itself (previous preload over its own).
 
-    `words`: what the numbers 0, 1, … stand for, of an axis of words.
+    `words`: the words that the numbers 0, 1, … stand for.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Axis:
 
     @property
     def unit(self) -> str:
-        """Of its values, as in UNITS of mechanisms."""
+        """The unit of its values, one of UNITS of mechanisms."""
         return "-" if self.relative else UNITS.get(self.name, "-")
 
     @cached_property
     def levels(self) -> Floats:
-        """The distinct values, rising."""
+        """The distinct values, ascending."""
         values = np.unique(list(self.values.values()))
         step = _SAME * max(float(np.ptp(values)), 1e-300)
         return np.asarray(values[np.append(True, np.diff(values) > step)])
@@ -80,18 +80,18 @@ class Axis:
 
     @property
     def positive(self) -> bool:
-        """Whether a power of it makes sense: positive, and over a factor of 1.5 at least."""
+        """Whether a power law of it makes sense: positive, over a factor of 1.5 at least."""
         return not self.words and self.low > 0 and self.high > 1.5 * self.low
 
     def of(self, ids: Sequence[str]) -> Floats:
-        """The values of these recordings (recordings,)."""
+        """The values for these recordings (recordings,)."""
         return np.array([self.values[name] for name in ids])
 
 
 def axes_of(conditions: Conditions) -> list[Axis]:
     """The axes on which the FRF recordings differ; a field that one of them lacks is none.
 
-    A column of `conditions` is one as well, where at least two thirds of the recordings have it.
+    A column of `conditions` is an axis where at least two thirds of the recordings have it.
     """
     axes = [axis for axis in every_axis(conditions) if len(axis.levels) > 1]
     days = {int(value // 24) for axis in axes if axis.name == "recorded_at" for value in axis.values.values()}
@@ -99,8 +99,7 @@ def axes_of(conditions: Conditions) -> list[Axis]:
 
 
 def every_axis(conditions: Conditions, origin: datetime | None = None) -> list[Axis]:
-    """The axes that the FRF recordings have, whether or not they differ; times count from the `origin` where one is
-    given, else from the first midnight."""
+    """All axes of the FRF recordings, constant ones too; times count from `origin`, else from the first midnight."""
     recordings = frf_of(conditions)
     columns: dict[str, list[float | None]] = {
         name: [getattr(recording, name) for recording in recordings]
@@ -129,7 +128,7 @@ def every_axis(conditions: Conditions, origin: datetime | None = None) -> list[A
 
 
 def recording_order(recordings: Sequence[FrfConditions]) -> Floats:
-    """Which recording came how late, from 0 (recordings,): by its time, else by its load cycles, else as listed."""
+    """The rank of each recording, from 0 (recordings,): by time, else by load cycles, else as listed."""
     times = _times(recordings)
     seconds = None if times is None else [time.timestamp() for time in times]
     cycles = [float(recording.load_cycles) for recording in recordings if recording.load_cycles is not None]
@@ -140,7 +139,7 @@ def recording_order(recordings: Sequence[FrfConditions]) -> Floats:
 
 
 def _times(recordings: Sequence[FrfConditions]) -> list[datetime] | None:
-    """Local times; None where one is lacking."""
+    """Local times; None where one is missing."""
     if any(recording.recorded_at is None for recording in recordings):
         return None
     zone = time_zone()
@@ -149,7 +148,7 @@ def _times(recordings: Sequence[FrfConditions]) -> list[datetime] | None:
 
 
 def _previous(recordings: Sequence[FrfConditions], rank: Floats) -> list[Axis]:
-    """The preload of the recording before, and over the recording's own; the first has its own as the one before."""
+    """The preload of the previous recording, and over the recording's own; for the first recording its own."""
     order = np.argsort(rank)
     preload = np.array([recording.preload_n for recording in recordings])
     before = preload.copy()
@@ -168,7 +167,8 @@ def _worded(name: str, ids: Sequence[str], words: Sequence[str]) -> Axis:
 
 
 def _further(recordings: Sequence[FrfConditions]) -> list[Axis]:
-    """The columns of `conditions`, numbers or words; where a value is missing, the middle one stands for it."""
+    """The columns of `conditions`, numbers or words; a missing value is replaced by the median or the commonest
+    word."""
     axes = []
     for name in sorted({name for recording in recordings for name in recording.conditions or {}}):
         stated = {recording.id: (recording.conditions or {}).get(name) for recording in recordings}

@@ -1,13 +1,10 @@
-"""Laws of the grammar on curves, and laws written as expressions.
+"""Unlisted laws of indentation curves, and all unlisted laws as written expressions and as functions of their axis.
 
-Laws that nobody listed, of indentation curves: what they change from sample to sample, over depth, force or time.
-
-Where they enter: the force of the contact, F (1 + u), as the modulus has it where nothing sticks and no stage gives;
-the gain of the cell, F (1 + u); the force that the cell reads, F + u; the place of the surface along the travel, d + u.
-What they follow: the depth beyond the contact point, the force of the contact, the time since a recording began. Forms
-are those of laws over recordings (forms.py), with powers and with a step where the sphere turns back.
-
-A law as an expression with numbers and units, and as a course over its axis.
+A law of curves changes each sample over depth, force or time. It acts on: the contact force, F (1 + u), equivalent
+to the modulus without adhesion and stage compliance; the gain of the cell, F (1 + u); the reading of the cell, F +
+u; the position of the surface along the travel, d + u. It follows the depth beyond the contact point, the contact
+force, or the time since a recording began. Forms are those of laws over recordings (forms.py), with powers, and with
+a step where the sphere turns back.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,8 +48,8 @@ _REASON = "how a change grows over the measured range: 0.5 with its root, 2 with
 
 @dataclass(frozen=True)
 class Extent:
-    """How far the curves of a campaign reach: depth [mm], force [N], and time [s] since each recording began; when each
-    recording begins and when it turns back [s], by its id."""
+    """The ranges of a campaign's curves: depth [mm], force [N], and time [s] since each recording began; start and
+    turning time of each recording [s], by its id."""
 
     depth_mm: float
     force_n: float
@@ -62,14 +59,14 @@ class Extent:
 
 
 class CurveLaw(UnlistedLaw):
-    """A law that changes what each sample of a curve shows."""
+    """An unlisted law that changes each sample of a curve."""
 
     kinds: ClassVar[tuple[Kind, ...]] = ("indentation",)
     stage = Stage.CURVE
     order = 200
 
     def __init__(self, acts_on: ActsOn, axis: Axis, shape: Shape, extent: Extent) -> None:
-        """Bind the form to how far the curves of a campaign reach."""
+        """Bind the form to the ranges of the campaign's curves."""
         self.name = PREFIX + "__".join(filter(None, (acts_on, axis.name, shape.form, shape.variant)))
         self.description = LawDescription(acts_on, axis.name, shape.form)
         self.axis, self.shape = axis, shape
@@ -84,12 +81,12 @@ class CurveLaw(UnlistedLaw):
         self.grid = shape.points
 
     def on_curve(self, curve: Curve, values: Values) -> None:
-        """Change its samples."""
+        """Add the law at these parameter values to the curve's laws."""
         sample_values = {name: of_samples(value) for name, value in values.items()}
         curve.laws.append(_Bound(self, sample_values))
 
     def features(self, samples: Samples, force: Floats, values: Values) -> Sequence[Feature]:
-        """Of samples (points, curves, samples) where the contact bears the `force` [N]."""
+        """The features at samples (points, curves, samples) where the contact force is `force` [N]."""
         return self.shape.features(self._along(samples, force), values)
 
     def _along(self, samples: Samples, force: Floats) -> Floats:
@@ -116,7 +113,7 @@ class _Bound:
         return travel + 1e-3 * self._change(samples, np.zeros_like(travel))
 
     def measured_force(self, samples: Samples, force: Floats) -> Floats:
-        """The force [N] that is read where the contact bears `force`."""
+        """The measured force [N] where the contact force is `force`."""
         if self.law.description.acts_on == "position":
             return force
         change = self._change(samples, force)
@@ -132,7 +129,7 @@ class _Bound:
 
 
 def curve_laws(extent: Extent, *, timed: bool) -> list[tuple[CurveLaw, float]]:
-    """The laws of a campaign of indentations, each with its log share of the prior; `timed` where the samples have
+    """The laws for a campaign of indentations, each with its log share of the prior; `timed`: the samples have
     times."""
     ranges = {"displacement_mm": extent.depth_mm, "force_n": extent.force_n, "time_s": extent.time_s}
     axes = {
@@ -156,7 +153,7 @@ def curve_laws(extent: Extent, *, timed: bool) -> list[tuple[CurveLaw, float]]:
 def _shapes(form: Form, axis: Axis, extent: Extent) -> list[Shape]:
     if form == "power":
         return [_power(axis)]
-    if form == "step":  # a step elsewhere is none that a curve could show beside its contact point
+    if form == "step":  # a step elsewhere cannot be distinguished from the contact point
         return [Shape("step", lambda x, _: [(x > 0).astype(float)], variant=TURN)] if extent.turn_times else []
     matching = [shape for shape in shapes(axis) if shape.form == form]
     return matching if form == "periodic" else matching[:1]
@@ -173,7 +170,7 @@ def _power(axis: Axis) -> Shape:
 
 
 def of_samples(value: Differentiated) -> Differentiated:
-    """A number of each point (points, 1), as samples take it: (points, 1, 1)."""
+    """A value at each point (points, 1) with an axis for samples: (points, 1, 1)."""
     return Differentiated(value.value[..., None], np.zeros((0, *value.value.shape, 1)))
 
 
@@ -186,14 +183,14 @@ def number(value: float) -> str:
 
 
 def symbol(axis: Axis | str) -> str:
-    """An axis as formulas have it."""
+    """The symbol of an axis in formulas."""
     name = axis if isinstance(axis, str) else axis.name
     letter = AXES[name][1] if name in AXES else name
     return f"{letter}/F" if isinstance(axis, Axis) and axis.relative else letter
 
 
 def expression(law: UnlistedLaw, values: Numbers) -> str:
-    """What the law is."""
+    """The formula of a law."""
     if isinstance(law, RecordingLaw):
         return _of_recordings(law, values)
     if isinstance(law, LagLaw):
@@ -205,8 +202,8 @@ def expression(law: UnlistedLaw, values: Numbers) -> str:
 
 
 def change_along(law: UnlistedLaw, values: Numbers, x: Floats) -> Array:
-    """The change at values x of the axis: relative, of a force in N, of a place in mm (rows, 1 or 2), of a lag in rad
-    or as an exponent; over frequency the complex factor less 1."""
+    """The change at values x of the axis: relative, of a force in N, of a position in mm (rows, 1 or 2), of a lag in
+    rad or as an exponent; over frequency the complex factor less 1."""
     seeds = {name: Differentiated(np.array([[value]]), np.zeros((0, 1, 1))) for name, value in values.items()}
     if isinstance(law, FrequencyLaw):
         return law.factor(x, seeds).value[0] - 1

@@ -1,7 +1,7 @@
-"""Forms of a law over one axis of the recordings: a few features, each times an amplitude, and what bends them.
+"""Forms of a law over one axis of the recordings: features, each times an amplitude, and shape parameters.
 
-At amplitude 0 every law is the base model. A feature is 1 where the form's whole change over the measured range has
-happened, so that an amplitude is that change. Edges of steps and periods are tried one by one, each as a shape of its
+At amplitude 0 every law is the base model. A feature is 1 where the form's full change over the measured range is
+reached, so that an amplitude is that change. Edges of steps and periods are tried one by one, each as a shape of its
 own, since a fit does not move from one to the next.
 """
 
@@ -35,7 +35,8 @@ _LATE, _SHARP = "how soon it sets in, over the measured range", "anywhere within
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """One form over an axis. `variant` tells shapes of a form apart; `share` of the form's prior is the shape's."""
+    """One form over an axis. `variant` distinguishes shapes of a form; `share` is the shape's share of the form's
+    prior."""
 
     form: Form
     features: Features
@@ -54,7 +55,7 @@ class Shape:
 
 
 def shapes(axis: Axis) -> list[Shape]:
-    """All that an axis with so many levels can show."""
+    """All shapes that an axis with this many levels can show."""
     if axis.words:
         return _of_words(axis)
     count = len(axis.levels)
@@ -75,7 +76,7 @@ def shapes(axis: Axis) -> list[Shape]:
 
 
 def reference(axis: Axis, variant: str) -> float:
-    """Where a linear law does nothing: at the least value, or in the middle."""
+    """The value at which a linear law does nothing: the least value, or the middle."""
     return (axis.low + axis.high) / 2 if variant == "middle" else axis.low
 
 
@@ -90,7 +91,7 @@ def _linear(axis: Axis) -> list[Shape]:
 
 
 def constant(share: float) -> Shape:
-    """The same at all values of the axis."""
+    """A constant change over the axis."""
     return Shape("linear", lambda x, _: [np.ones_like(x)], variant=EVERYWHERE, share=share)
 
 
@@ -148,7 +149,7 @@ def _threshold(axis: Axis) -> list[Shape]:
 
 
 def _step(axis: Axis) -> list[Shape]:
-    """0 up to an edge, 1 beyond; an edge lies between neighbouring levels."""
+    """0 up to an edge, 1 beyond; edges lie between neighbouring levels."""
     levels = axis.levels
     if len(levels) < 3:
         return []
@@ -233,7 +234,7 @@ def _free(axis: Axis) -> list[Shape]:
 
 
 def _of_words(axis: Axis) -> list[Shape]:
-    """One word's recordings are off, or those of each word; nothing of as many words as serial numbers are, of which
+    """A step for each word, and a free value per word; nothing for axes with as many words as serial numbers, whose
     laws would grow with the square of the recordings."""
     if len(axis.words) > _MOST_WORDS:
         return []
@@ -254,7 +255,7 @@ def _of_words(axis: Axis) -> list[Shape]:
 
 
 def _length(name: str, axis: Axis, low: float, high: float, middle: float, reason: str) -> Parameter:
-    """A length along an axis, these shares of its range."""
+    """A length along an axis, with these fractions of its range as bounds and median."""
     ends = low * axis.span, high * axis.span
     prior = Normal(float(np.log(middle * axis.span)), 0.9)
     return Parameter(name, axis.unit, *ends, prior, "log", limit=None, reason=reason)

@@ -1,17 +1,14 @@
-"""The grammar of laws that nobody listed.
+"""The grammar of unlisted laws: all laws that a campaign could show, with the prior share of each.
 
-Laws over frequency, the same in all recordings.
+Laws over frequency are the same in all recordings: minimum phase, where the phase follows from the magnitude by the
+Kramers–Kronig relations (Bode 1945), since the system is causal; or a pure phase: a dispersive delay, a loss angle over
+the measured band.
 
-Minimum phase: the phase follows from the magnitude by Kramers and Kronig's relations (Bode 1945), since what is
-measured is caused by what came before. Or a pure phase: a delay that disperses, a loss angle over the measured band.
+The share of a law is that of the quantity it acts on, times that of its axis, times that of its form; shapes of one
+form (edges of a step, periods) divide its share. All columns of `conditions` together have the share of one axis and a
+half, so that many columns are penalised.
 
-All laws of the grammar that a campaign could show, and the share of each in the prior of something unnamed.
-
-The share is that of where a law enters, times that of what it follows, times that of its form; shapes of one form
-(edges of a step, periods) divide its share. All columns of `conditions` together have the share of one axis and a half,
-so that many of them are paid for.
-
-A law that was found on one campaign, on other recordings of the skin: within its range, and nowhere else.
+A law found on one campaign applies to other recordings of the skin within its range only.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -61,7 +58,7 @@ class _Law:
 
 
 class FrequencyLaw(UnlistedLaw):
-    """One of them, with the band that it was found in."""
+    """A law over frequency, with the band in which it was found."""
 
     stage = Stage.LINES
     order = 210
@@ -83,7 +80,7 @@ class FrequencyLaw(UnlistedLaw):
         return self.factor(design.line_frequency, values)
 
     def tangents(self, frequency: Floats) -> Array:
-        """∂ ln factor by each amplitude at 0, at the grid of what bends it (points, frequencies, amplitudes)."""
+        """∂ ln factor by each amplitude at 0, at the grid of the shape parameters (points, frequencies, amplitudes)."""
         points, count = len(self.grid), len(self.amplitudes)
         values: dict[str, Differentiated] = {}
         for number, parameter in enumerate(self.parameters_bound):
@@ -100,7 +97,7 @@ class FrequencyLaw(UnlistedLaw):
 
 
 def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
-    """All over a band of lines [Hz]."""
+    """All laws over a band of lines [Hz]."""
     low, high = float(frequency.min()), float(frequency.max())
     if high < 1.5 * low or len(frequency) < 6:
         return []
@@ -122,7 +119,7 @@ def _over_band(low: float, high: float, count: int) -> list[float]:
 
 
 def _phases(middle: float) -> list[_Law]:
-    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a delay that disperses; a delay alone is one more."""
+    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a dispersive delay; and a pure delay."""
     exponent = Parameter(
         "law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴", closed=(0.0,)
     )
@@ -167,7 +164,7 @@ def _powers(low: float, high: float, middle: float) -> list[_Law]:
 
 
 def _peaks(low: float, high: float) -> list[_Law]:
-    """A resonance at one frequency in all recordings, beside the response: 1 + A u²/(1 − u² + 2iζu), and its like."""
+    """A resonance at one frequency in all recordings, added to the response: 1 + A u²/(1 − u² + 2iζu), and variants."""
     corner = _corner(0.8 * low, 1.25 * high, "law_centre")
     damping = Parameter("law_damping", "-", 5e-3, 1.0, Normal(-2.8, 1.0), "log", None, "sharp to broad")
     grid = [
@@ -263,7 +260,7 @@ _FORMS: Mapping[Form, float] = {
 }
 _CONSTANT = 4.0  # a constant is looked for along one axis of several
 _COLUMNS = 1.5  # axes that all columns of `conditions` count for
-_FREQUENCY = 0.5  # of the frequency response: laws over frequency alone
+_FREQUENCY = 0.5  # of the frequency response: laws over frequency only
 _PLACES_FOLLOW = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
 _CONSTANTS: Mapping[ActsOn, tuple[str, tuple[str, ...]]] = {  # what does it by name, and the axes that show it best
     "modulus": ("modulus_error", ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")),
@@ -276,7 +273,7 @@ _OF_LEVELS: tuple[ActsOn, ...] = ("gain", "modulus", "thickness", "contact_radiu
 
 @dataclass(frozen=True, eq=False)
 class Grammar:
-    """The laws of one campaign, by combination of where, what and form, and the log prior share of each law."""
+    """The laws of one campaign and the log prior share of each."""
 
     laws: Sequence[UnlistedLaw]
     log_shares: Floats  # (laws,)
@@ -314,7 +311,7 @@ class Grammar:
 
 
 def combination(law: UnlistedLaw) -> tuple[str, str, str]:
-    """Where it enters, what it follows, and its form."""
+    """The quantity it acts on, the axis it follows, and its form."""
     return law.description.acts_on, law.description.axis, law.description.form
 
 
@@ -349,7 +346,7 @@ def _constants(axis: Axis, axes: Sequence[Axis], tables: LevelTables, listed: Co
 
 
 def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[str]) -> bool:
-    """Whether the combination is one that a rig can have and no other combination is."""
+    """Whether a rig can have this combination and no other combination is equivalent."""
     if axis.name == "sensor":
         return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in listed)
     if acts_on == "position":
@@ -360,7 +357,7 @@ def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[s
 
 
 _ROUNDING = 1e-9  # of the range, by which a value may lie beyond it
-OF_ONE_CAMPAIGN = ("order",)  # axes that say nothing of other recordings
+CAMPAIGN_SPECIFIC_AXES = ("order",)  # axes that say nothing of other recordings
 
 
 def bound_to(
@@ -368,7 +365,7 @@ def bound_to(
 ) -> tuple[UnlistedLaw, Mask]:
     """The law on these recordings, and which of them (recordings,) lie in its range.
 
-    A recording beyond the range, or that does not say where it lies, is predicted at the range's end.
+    A recording beyond the range, or without a value on its axis, is predicted at the end of the range.
     """
     ids = [recording.id for recording in frf_of(conditions)]
     if not isinstance(law, RecordingLaw | LagLaw):
@@ -383,7 +380,7 @@ def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, M
     axes = {
         (candidate.name, candidate.relative): candidate
         for candidate in every_axis(conditions, axis.origin)
-        if candidate.name not in OF_ONE_CAMPAIGN
+        if candidate.name not in CAMPAIGN_SPECIFIC_AXES
     }
     match = axes.get((axis.name, axis.relative))
     if match is not None and axis.name == "previous_preload_n":

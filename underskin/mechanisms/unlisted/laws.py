@@ -1,13 +1,12 @@
-"""Laws of the grammar that act on recordings.
+"""Unlisted laws that act on recordings, and the level of each recording as a function of what they change.
 
-How the level of each recording follows its modulus, thickness, contact radius, force, or the place of its contact.
+The level's dependence on modulus, thickness, contact radius, force and contact position is tabulated once under the
+base model, as declared, and interpolated: a law is then a factor on each recording, level(quantity ·
+e^s)/level(quantity). The effect of other mechanisms on that factor is neglected, which is of second order. Under the
+base model a force F e^s is a modulus E e^(−s): both enter through F/E alone. A contact radius a e^s at the same L is
+that of a sphere R e^s on a modulus E e^(−2s).
 
-Worked out once under the base model, as declared, and interpolated: a law that acts there is then a factor on each
-recording, level(quantity · e^s)/level(quantity). What other mechanisms of a set do to that factor is left out, which is
-of second order. Under the base model a force F e^s is a modulus E e^(−s): both enter through F/E alone. A contact
-radius a e^s at the same L is that of a sphere R e^s on a modulus E e^(−2s).
-
-Laws that nobody listed, bound to the recordings of a campaign: mechanisms like any other.
+Laws are bound to the recordings of a campaign; they are mechanisms like any other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -73,10 +72,10 @@ class Curve:
 
 
 class LevelTables:
-    """Of one campaign's recordings, by their ids; each table is worked out when it is first asked for."""
+    """Tables for the recordings of one campaign, by their ids; each is computed on first use."""
 
     def __init__(self, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]) -> None:
-        """`further_mechanisms`: those for which σ has room as well."""
+        """`further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well."""
         recordings = [recording.without_measurements(frequency_hz=_ANY_LINE) for recording in frf_of(conditions)]
         self._conditions = Conditions(conditions.name, conditions.skin, tuple(recordings))
         self._table, self._further_mechanisms = table, tuple(further_mechanisms)
@@ -85,7 +84,7 @@ class LevelTables:
         self._curves: dict[str, Curve] = {}
 
     def rows(self, ids: Sequence[str]) -> Indices:
-        """Where in the tables these recordings are."""
+        """Row indices of these recordings in the tables."""
         return np.array([self._places[name] for name in ids], dtype=np.intp)
 
     def factor(self, acts_on: str, rows: Indices, log: Differentiated) -> Differentiated:
@@ -98,7 +97,7 @@ class LevelTables:
         return chain(value, (slope, log))
 
     def moved(self, rows: Indices, x: Differentiated, y: Differentiated) -> Differentiated:
-        """The same where contacts lie elsewhere by x and y [mm] (…, recordings)."""
+        """The same factor for contacts displaced by x and y [mm] (…, recordings)."""
         x, y = x + self._offset[rows, 0], y + self._offset[rows, 1]
         distance = np.hypot(x.value, y.value)
         away = np.where(distance > 0, distance, 1.0)
@@ -148,13 +147,13 @@ class LevelTables:
 
     @cached_property
     def _offset(self) -> Floats:
-        """Of each contact from its sensor's centre (recordings, 2) [mm]."""
+        """The offset of each contact from its sensor's centre (recordings, 2) [mm]."""
         design = self._model.design
         return 1e3 * np.column_stack([design.point_x, design.point_y])[design.point]
 
     @cached_property
     def _over_places(self) -> Curve:
-        """Over the distance from the sensor's centre [mm]."""
+        """The level over the distance from the sensor's centre [mm]."""
         recordings = frf_of(self._conditions)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in self._conditions.skin.sensors}
         keys = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
@@ -175,7 +174,7 @@ class LevelTables:
 
 
 def _over(levels: Floats, base: Floats) -> Floats:
-    """levels/base (recordings, nodes), where the base shows anything."""
+    """levels/base (recordings, nodes) where the base is not faint, else 1."""
     is_significant = np.abs(base) > _FAINT * np.abs(base).max()
     return np.where(is_significant, levels / np.where(is_significant, base, 1.0), 1.0).T
 
@@ -201,7 +200,7 @@ _EXPONENTS = np.array([[-2.0], [-1.0], [-0.5], [0.0], [0.5], [1.0], [2.0]])
 
 @dataclass(frozen=True, eq=False)
 class LawDescription:
-    """What a report says of a law: where it enters, what it follows, its form."""
+    """A law in a report: the quantity it acts on, the axis it follows, its form."""
 
     acts_on: ActsOn
     axis: str
@@ -214,8 +213,8 @@ class LawDescription:
 
 
 class UnlistedLaw(Mechanism):
-    """What all laws share. Attributes: `description`, `share` of the prior of its combination, `grid` of values of
-    what bends it (points, parameters), and `amplitudes`, the names of its other parameters."""
+    """Base of all unlisted laws. Attributes: `description`, `share` of the prior of its combination, `grid` of
+    values of its shape parameters (points, parameters), and `amplitudes`, the names of its other parameters."""
 
     plain = "Nobody listed it."
     source = "None."
@@ -228,8 +227,8 @@ class UnlistedLaw(Mechanism):
     share: float
     grid: Floats
     amplitudes: tuple[str, ...]
-    log_share: float = 0.0  # in the prior of something unnamed
-    screened_fits: tuple[Floats, ...] = ()  # fit coordinates where screenings found it
+    log_share: float = 0.0  # in the prior of an unlisted law
+    screened_fits: tuple[Floats, ...] = ()  # fit coordinates from screenings
 
     def parameters(self, conditions: object, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The same for all campaigns: they are bound to one."""
@@ -238,7 +237,7 @@ class UnlistedLaw(Mechanism):
     parameters_bound: tuple[Parameter, ...]
 
     def guesses(self, conditions: object, kind: Kind) -> Sequence[Sequence[float]]:
-        """Where screenings found it."""
+        """The fits of screenings that found it."""
         return [
             [parameter.from_fit(at) for parameter, at in zip(self.parameters_bound, fit.tolist(), strict=True)]
             for fit in self.screened_fits
@@ -246,12 +245,12 @@ class UnlistedLaw(Mechanism):
 
 
 def in_plain_words(mechanism: Mechanism) -> str:
-    """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
+    """A mechanism's name; for an unlisted law the quantity it acts on, its axis and its form."""
     return mechanism.description.words if isinstance(mechanism, UnlistedLaw) else mechanism.name
 
 
 class RecordingLaw(UnlistedLaw):
-    """A law that changes the level of each recording: by its gain, what is pressed, how hard, or where."""
+    """An unlisted law that changes the level of each recording: gain, pressed material, force or position."""
 
     stage = Stage.RECORDING
     order = 200
@@ -309,7 +308,7 @@ class RecordingLaw(UnlistedLaw):
         return self.tables.factor(self._acts_on, rows, log)
 
     def sensitivity(self, ids: tuple[str, ...]) -> Floats:
-        """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a place by x and y (…, 2)."""
+        """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a position by x and y (…, 2)."""
         rows = self._rows(ids)
         if self._acts_on == "position":
             none = Differentiated(np.zeros((1, 1)), np.zeros((2, 1, 1)))
@@ -333,7 +332,7 @@ def _rows(tables: LevelTables, ids: tuple[str, ...]) -> Indices:
 
 
 def log_positive(change: Differentiated) -> Differentiated:
-    """ln(1 + change), below a quantity of 0.1 continued by its tangent's exponential."""
+    """ln(1 + change); below a quantity of 0.1 continued along its tangent."""
     return log_of(1.0 + change)
 
 
@@ -354,7 +353,7 @@ def _summed(parts: Sequence[Differentiated]) -> Differentiated:
 
 @lru_cache(maxsize=64)
 def changes(name: str, unit: str, usual: float, count: int, most: float = _MOST) -> tuple[Parameter, ...]:
-    """So many changes, each as large as usual; bounded by `most` times that."""
+    """This many changes, each with the typical size as prior sd; bounded by `most` times that."""
     names = [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
     prior = Normal(0.0, usual)
     return tuple(Parameter(label, unit, -most * usual, most * usual, prior, "linear", 0.0, _REASON) for label in names)
@@ -370,10 +369,10 @@ def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
 
 
 class LagLaw(UnlistedLaw):
-    """A response that lags, or whose lines fall off, by something that follows an axis of the recordings.
+    """A phase lag, or a fall-off over the lines, that follows an axis of the recordings.
 
-    `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. Of the lag φ
-    they make exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
+    `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. For a lag
+    φ the factors are exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
     """
 
     stage = Stage.LINES
