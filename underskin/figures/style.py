@@ -1,5 +1,5 @@
-"""Common style of all figures: the colours of Okabe and Ito, Cividis and Viridis, which colour-blind readers can tell
-apart."""
+"""Common style of all figures: the colours of Okabe and Ito, Cividis and Viridis, distinguishable by colour-blind
+readers."""
 
 from collections.abc import Sequence
 from html import escape
@@ -58,8 +58,8 @@ def styled(figure: go.Figure, title: str, height: int = 420) -> go.Figure:
     return figure.update_layout(template=_TEMPLATE, title=title, height=height)
 
 
-def one_of_many(number: int, width: float) -> dict[str, Any]:
-    """How one of many lines is drawn: with marks along it where the colours are used up."""
+def line_style(number: int, width: float) -> dict[str, Any]:
+    """The style of one of many lines: with markers where the colours are used up."""
     line = {"color": COLOURS[number % len(COLOURS)], "width": width}
     if number < len(COLOURS):
         return {"mode": "lines", "line": line}

@@ -311,9 +311,8 @@ def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mappi
     }
     values = np.array(list(samples.values()))
     positions = np.concatenate([_FAR_PLACES, values.ravel(), (values[:, 1:] + values[:, :-1]).ravel() / 2])
-    arguments = np.array(
-        [np.roll(positions, _AXIS_SHIFT * number) for number in range(len(axes))]
-    )  # a law may be of their ratio
+    # Axes differ, since a law may depend on their ratio
+    arguments = np.array([np.roll(positions, _AXIS_SHIFT * number) for number in range(len(axes))])
     largest = 0.0
     for number in range(len(_QUANTILES)):
         others = {other: quantiles[number] for other, quantiles in samples.items()}

@@ -322,9 +322,8 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     first_contact, started = np.minimum(path.first_contact, path.travel.shape[-1] - 1)[..., None], path.touched
     number = np.arange(path.travel.shape[-1])
     depth = np.where(started, path.travel, 0.0)
-    time = np.maximum(
-        path.time, np.take_along_axis(path.time, first_contact, axis=-1)
-    )  # what is felt at the touch is at once
+    # The load at the touch is a step
+    time = np.maximum(path.time, np.take_along_axis(path.time, first_contact, axis=-1))
     work = None if adhesion is None else adhesion.work
     least, lowest = sphere.pull_off(work)
     held = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
