@@ -83,28 +83,28 @@ class Differentiated:
             np.broadcast_to(self.slopes, (*self.slopes.shape[:-1], rows)),
         )
 
-    def at_points(self, some: Indices | None) -> Differentiated:
+    def at_points(self, subset: Indices | None) -> Differentiated:
         """At some of several points (points, rows), at all for None."""
-        if some is None or len(self.value) == 1:
+        if subset is None or len(self.value) == 1:
             return self
-        return Differentiated(self.value[some], self.slopes[:, some])
+        return Differentiated(self.value[subset], self.slopes[:, subset])
 
-    def times(self, factor: Differentiated | None, some: Indices | None, points: int) -> Differentiated:
+    def times(self, factor: Differentiated | None, subset: Indices | None, points: int) -> Differentiated:
         """Multiplied by a factor at some of the points; None stands for 1, and for all points."""
         if factor is None:
             return self
-        return self * factor if some is None else self._with(some, self.at_points(some) * factor, points)
+        return self * factor if subset is None else self._with(subset, self.at_points(subset) * factor, points)
 
-    def plus(self, term: Differentiated, some: Indices | None, points: int) -> Differentiated:
+    def plus(self, term: Differentiated, subset: Indices | None, points: int) -> Differentiated:
         """With a term added at some of the points; None stands for all."""
-        return self + term if some is None else self._with(some, self.at_points(some) + term, points)
+        return self + term if subset is None else self._with(subset, self.at_points(subset) + term, points)
 
-    def _with(self, some: Indices, changed: Differentiated, points: int) -> Differentiated:
+    def _with(self, subset: Indices, changed: Differentiated, points: int) -> Differentiated:
         shape = points, max(self.value.shape[-1], changed.value.shape[-1])
         dtype = np.result_type(self.value, changed.value)
         value = np.broadcast_to(self.value, shape).astype(dtype)
         slopes = np.broadcast_to(self.slopes, (len(self.slopes), *shape)).astype(dtype)
-        value[some], slopes[:, some] = changed.value, changed.slopes
+        value[subset], slopes[:, subset] = changed.value, changed.slopes
         return Differentiated(value, slopes)
 
 

@@ -108,8 +108,8 @@ def _check_traits(mechanism: Mechanism) -> None:
         ("reads_fields", base.NEEDED_FIELDS, False),
     ):
         values: Any = getattr(mechanism, field, None)
-        good = isinstance(values, tuple) and set(values) <= set(allowed) and (values or not needed)
-        _require(field, values, good, f"must be a tuple of {', '.join(allowed)}")
+        is_valid = isinstance(values, tuple) and set(values) <= set(allowed) and (values or not needed)
+        _require(field, values, is_valid, f"must be a tuple of {', '.join(allowed)}")
     _check_hooks(mechanism)
 
 
@@ -119,8 +119,8 @@ def _check_hooks(mechanism: Mechanism) -> None:
     for name in overridden:
         stages = ", ".join(stage.name for stage in HOOKS[name])
         # A mechanism of FRFs at any stage may act on curves as well
-        good = mechanism.stage in HOOKS[name] or (name == "on_curve" and "frf" in mechanism.kinds)
-        _require("stage", mechanism.stage.name, good, f"must be {stages}, since {name} is overridden")
+        is_valid = mechanism.stage in HOOKS[name] or (name == "on_curve" and "frf" in mechanism.kinds)
+        _require("stage", mechanism.stage.name, is_valid, f"must be {stages}, since {name} is overridden")
     if not overridden and mechanism.moves_predictions:
         raise required("law", f"must be in one of the hooks {', '.join(HOOKS)}; none is overridden")
     curves = bool({"indentation", "compression"} & set(mechanism.kinds))
@@ -133,8 +133,8 @@ def _check_hooks(mechanism: Mechanism) -> None:
 def _check_parameter(mechanism: Mechanism, parameter: Any) -> None:
     _require("parameters", parameter, isinstance(parameter, Parameter), "must be a tuple of Parameter")
 
-    def require(field: str, good: object, allowed: str) -> None:
-        _require(_field(parameter, field), getattr(parameter, field), good, allowed)
+    def require(field: str, is_valid: object, allowed: str) -> None:
+        _require(_field(parameter, field), getattr(parameter, field), is_valid, allowed)
 
     require(
         "name", isinstance(parameter.name, str) and _NAME.fullmatch(parameter.name), "must be lower case letters and _"
@@ -155,10 +155,12 @@ def _check_parameter(mechanism: Mechanism, parameter: Any) -> None:
         "must be Normal(mean, sd), HeavyTailed(mean, sd) or Uniform()",
     )
     if isinstance(parameter.prior, Normal):
-        good = _is_finite(parameter.prior.mean) and _is_finite(parameter.prior.sd) and parameter.prior.sd > 0
+        is_valid = _is_finite(parameter.prior.mean) and _is_finite(parameter.prior.sd) and parameter.prior.sd > 0
         with np.errstate(divide="ignore"):
             require(
-                "prior", good and np.isfinite(parameter.log_prior(parameter.start)), "must have mass within the bounds"
+                "prior",
+                is_valid and np.isfinite(parameter.log_prior(parameter.start)),
+                "must have mass within the bounds",
             )
     heavy = parameter.moves_covariance and isinstance(parameter.prior, HeavyTailed)
     require("prior", not heavy, "must be Normal(mean, sd) or Uniform() where it does not act on the mean")
@@ -175,9 +177,9 @@ def _check_relative(parameter: Parameter, parameters: Sequence[Parameter]) -> No
     units = {other.name for other in parameters if other.scale == "log" and other.relative_to is None} - {
         parameter.name
     }
-    good = parameter.relative_to is None or (parameter.relative_to in units and parameter.scale == "log")
+    is_valid = parameter.relative_to is None or (parameter.relative_to in units and parameter.scale == "log")
     allowed = "must be None, or of a log parameter another log parameter of this mechanism that is relative to none"
-    _require(_field(parameter, "relative_to"), parameter.relative_to, good, allowed)
+    _require(_field(parameter, "relative_to"), parameter.relative_to, is_valid, allowed)
 
 
 def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
@@ -248,8 +250,8 @@ def _field(parameter: Parameter, name: str) -> str:
     return f"parameters[{parameter.name}].{name}"
 
 
-def _require(field: str, value: Any, good: object, allowed: str) -> None:
-    if not good:
+def _require(field: str, value: Any, is_valid: object, allowed: str) -> None:
+    if not is_valid:
         raise InvalidInput(field, value, allowed)
 
 

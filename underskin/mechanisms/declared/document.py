@@ -146,14 +146,14 @@ LARGEST_BYTES = 100_000
 _READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 _FIELDS = ("schema", "name", "description", "acts_on", "axes", "law", "parameters", "source")
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-_PLACES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, where a law is looked at
-_FAR_PLACES = np.concatenate([[0.0], np.geomspace(1e-3, 1e9, 61), -np.geomspace(1e-3, 1e9, 61)])  # up to load cycles
+_AXIS_VALUES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, at which a law is checked
+_FAR_VALUES = np.concatenate([[0.0], np.geomspace(1e-3, 1e9, 61), -np.geomspace(1e-3, 1e9, 61)])  # up to load cycles
 _NEUTRAL = 1e-6
 _ADDED = ("force", "position")  # what a law adds to, where the others are factors
 # Least change of a law that each parameter can make: a thousandth of what any data show; an AFM shows 1e-12 N.
 _NOTICED_FACTOR, _NOTICED_ADDED = 1e-9, 1e-15
-_AXIS_SHIFT = 5  # places from one axis to the next
-_QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, where that is looked for
+_AXIS_SHIFT = 5  # of indices from one axis to the next
+_QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, for that test
 
 
 def parse(data: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredMechanism:
@@ -195,10 +195,10 @@ def _line(lines: Mapping[str, int], field: str) -> int | None:
     """The line of a field in the document, or of the nearest field above it."""
     if not lines:
         return None
-    path = re.split(r"[,\s]", field)[0]
-    while path and path not in lines:
-        path = path.rpartition(".")[0]
-    return lines.get(path, 1)
+    field_path = re.split(r"[,\s]", field)[0]
+    while field_path and field_path not in lines:
+        field_path = field_path.rpartition(".")[0]
+    return lines.get(field_path, 1)
 
 
 def from_dict(document: Any) -> DeclaredMechanism:
@@ -235,8 +235,10 @@ def _laws(value: Any, names: set[str], count: int) -> tuple[Expression, ...]:
 
 
 def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
-    good = isinstance(value, list) and value and all(isinstance(name, str) and _AXIS.fullmatch(name) for name in value)
-    if not good:
+    is_valid = (
+        isinstance(value, list) and value and all(isinstance(name, str) and _AXIS.fullmatch(name) for name in value)
+    )
+    if not is_valid:
         raise InvalidInput(
             "axes", shown(value), "must be a list of fields, of axes such as order, or of columns of conditions"
         )
@@ -263,7 +265,7 @@ def _defined(law: Expression, axes: tuple[str, ...], parameters: Mapping[str, Pa
         raise InvalidInput("law", law.text, "must be real for a law of curves: without i")
     wrong = ~np.isfinite(values[:-1])  # beyond, an exponential may be too large for a number
     if wrong.any():
-        position = _PLACES[int(np.argmax(wrong))]
+        position = _AXIS_VALUES[int(np.argmax(wrong))]
         raise InvalidInput("law", law.text, f"is no number where {axes[0]} is {position:g}: max(0, …) may help")
 
 
@@ -310,7 +312,7 @@ def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mappi
         for other, parameter in parameters.items()
     }
     values = np.array(list(samples.values()))
-    positions = np.concatenate([_FAR_PLACES, values.ravel(), (values[:, 1:] + values[:, :-1]).ravel() / 2])
+    positions = np.concatenate([_FAR_VALUES, values.ravel(), (values[:, 1:] + values[:, :-1]).ravel() / 2])
     # Axes differ, since a law may depend on their ratio
     arguments = np.array([np.roll(positions, _AXIS_SHIFT * number) for number in range(len(axes))])
     largest = 0.0
@@ -324,7 +326,10 @@ def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mappi
 
 
 def _evaluated(
-    law: Expression, axes: tuple[str, ...], values: Mapping[str, float], positions: Sequence[float] | Floats = _PLACES
+    law: Expression,
+    axes: tuple[str, ...],
+    values: Mapping[str, float],
+    positions: Sequence[float] | Floats = _AXIS_VALUES,
 ) -> Array:
     """The law where all axes have these values (values,), or each axis its own (axes, values)."""
     numbers = {name: np.float64(value) for name, value in values.items()}  # which may be divided by 0

@@ -15,7 +15,7 @@ from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES
 _WIDER = 0.5  # of a value, or of its logarithm: the prior's sd in later campaigns
 _MARGIN = 0.05  # of the range, off its ends
 _ADDS = {"force", "position"}
-_PLACES = ("onset", "centre")  # parameters that are places along the axis
+_POSITIONS = ("onset", "centre")  # parameters that are positions along the axis
 
 
 def document(report: Mapping[str, Any], name: str, description: str | None = None) -> str:
@@ -36,7 +36,7 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
     for key, value in values.items():
         if key in bending:
             declared = _logarithmic(value)
-        elif key in _PLACES:
+        elif key in _POSITIONS:
             declared = _within(next(iter(law["range"].values())))
         else:
             declared = {**_linear_in(value), **({"limit": 0} if key in strengths else {})}
@@ -95,7 +95,7 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
     form = parts[parts.index("relative") + 1 if "relative" in parts else 2]
     variant = parts[-1]
     if law["form"] in ("peak", "notch") and "centre" in bending:
-        bending.discard("centre")  # along an axis of recordings a place may be negative
+        bending.discard("centre")  # along an axis of recordings the centre may be negative
     kind = next((part for part in parts if part in ("angle", "delay", "power", "corner")), None)
     if law["acts_on"] == "frequency_response":
         raise InvalidInput("report", kind, "a lag that follows an axis of the recordings: write its file by hand")

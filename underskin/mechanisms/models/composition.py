@@ -116,7 +116,7 @@ class Composition:
     """The mechanisms of a model, in order, and the indices of their parameters and of the nuisances in the fit
     coordinates.
 
-    Attributes: `places`, the index of each mechanism's parameter by both names; `nuisances`, those of the nuisances.
+    Attributes: `indices`, the index of each mechanism's parameter by both names; `nuisances`, those of the nuisances.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class Composition:
         groups = parameters_together(mechanisms, conditions, kind)
         self.parameters = (*(parameter for group in groups.values() for parameter in group), *nuisances)
         starts = np.cumsum([0, *(len(group) for group in groups.values())])
-        self.places = {
+        self.indices = {
             name: {parameter.name: start + index for index, parameter in enumerate(group)}
             for (name, group), start in zip(groups.items(), starts[:-1], strict=True)
         }
@@ -153,16 +153,16 @@ class Composition:
             [np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1
         )
         seed_slopes = np.zeros((count + further, *points, count + further))
-        every = np.arange(count + further)
-        seed_slopes[every, ..., every] = np.moveaxis(
+        diagonal = np.arange(count + further)
+        seed_slopes[diagonal, ..., diagonal] = np.moveaxis(
             np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
         )
         seeds = variables(value, seed_slopes if slopes else seed_slopes[count:])
         by_mechanism = {
-            name: {key: seeds[index] for key, index in places.items()} for name, places in self.places.items()
+            name: {key: seeds[index] for key, index in indices.items()} for name, indices in self.indices.items()
         }
-        for name, places in self.places.items():
-            for key, index in places.items():
+        for name, indices in self.indices.items():
+            for key, index in indices.items():
                 other = self.parameters[index].relative_to
                 if other is not None:
                     by_mechanism[name][key] = by_mechanism[name][key] * by_mechanism[name][other]

@@ -39,11 +39,11 @@ class Contacts:
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the present radius, where a mechanism reads it
 
-    def at_points(self, some: Indices | None) -> Contacts:
+    def at_points(self, subset: Indices | None) -> Contacts:
         """At some of several points (points, contacts), at all for None."""
-        if some is None:
+        if subset is None:
             return self
-        return self._with({name: x.at_points(some) for name, x in self._differentiated().items()})
+        return self._with({name: x.at_points(subset) for name, x in self._differentiated().items()})
 
     @classmethod
     def stacked(cls, parts: Sequence[Contacts], points: Sequence[int]) -> Contacts:
@@ -104,9 +104,9 @@ def press(contacts: Contacts, curves: ContactCurves | None) -> PressedContacts:
         return _on_layer(contacts, curves)
     if contacts.work_of_adhesion is None:
         return PressedContacts(contacts.hertz_radius / contacts.thickness, contacts.cbrt_load, None)
-    pull = (1.5 * np.pi) * contacts.indenter_radius * contacts.work_of_adhesion
-    root = 2.0 * (pull * (contacts.force + pull)) ** 0.5
-    equivalent = contacts.force + 2.0 * pull + root
+    adhesive_force = (1.5 * np.pi) * contacts.indenter_radius * contacts.work_of_adhesion
+    root = 2.0 * (adhesive_force * (contacts.force + adhesive_force)) ** 0.5
+    equivalent = contacts.force + 2.0 * adhesive_force + root
     radius = cbrt(0.75 * contacts.indenter_radius * equivalent / contacts.reduced_modulus)
     return PressedContacts(radius / contacts.thickness, contacts.cbrt_load, equivalent / contacts.force)
 

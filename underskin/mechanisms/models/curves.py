@@ -85,36 +85,36 @@ class CurveModel(ABC):
         """The quantities that govern the curves, numbers (points, 1), as changed by the mechanisms."""
 
     @abstractmethod
-    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         """F (points, curves, samples) [N], which samples are in contact, and which are inside the tables.
 
         `contact` (points, curves, 1) [m]; `held`: the contact to be used, where given.
         """
 
-    def forces(self, fit: Floats, held: Mask | None = None) -> Floats:
+    def forces(self, fit: Floats, contact_mask: Mask | None = None) -> Floats:
         """F (points, rows) [N] at points (points, parameters); `held` (rows,): which samples are in contact, where
         known."""
         at_once = max(_AT_ONCE // self.displacement.size, 1)
-        arranged = self._arranged_mask(held)
+        arranged = self._arranged_mask(contact_mask)
         parts = []
         for first in range(0, len(fit), at_once):
             part = fit[first : first + at_once]
-            held_part = None if arranged is None else np.broadcast_to(arranged, (len(part), *arranged.shape))
-            parts.append(self._forces(part, held_part)[0])
+            part_mask = None if arranged is None else np.broadcast_to(arranged, (len(part), *arranged.shape))
+            parts.append(self._forces(part, part_mask)[0])
         return np.concatenate(parts)[:, self.recording, self._sample]
 
-    def forces_and_slopes(self, fit: Floats, held: Mask | None = None) -> tuple[Floats, Floats]:
+    def forces_and_slopes(self, fit: Floats, contact_mask: Mask | None = None) -> tuple[Floats, Floats]:
         """F (points, rows) [N], and its derivatives by the fit coordinates (points, parameters, rows)."""
-        arranged = self._arranged_mask(held)
+        arranged = self._arranged_mask(contact_mask)
         values, slopes, _ = zip(*(self._differentiated(point, arranged) for point in fit), strict=True)
         return np.stack(values), np.stack(slopes)
 
-    def _arranged_mask(self, held: Mask | None) -> Mask | None:
+    def _arranged_mask(self, contact_mask: Mask | None) -> Mask | None:
         """Rows (rows,) as curves (curves, samples)."""
-        if held is None:
+        if contact_mask is None:
             return None
         arranged = np.zeros(self.displacement.shape, dtype=bool)
-        arranged[self.recording, self._sample] = held
+        arranged[self.recording, self._sample] = contact_mask
         return arranged
 
     def predict(self, fit: Floats) -> Prediction:
@@ -122,24 +122,24 @@ class CurveModel(ABC):
         value, slopes, inside = self._differentiated(np.asarray(fit, dtype=float))
         return Prediction(value, slopes, None, None, None, inside)
 
-    def _forces(self, fit: Floats, held: Mask | None = None) -> tuple[Floats, Mask, Mask]:
+    def _forces(self, fit: Floats, contact_mask: Mask | None = None) -> tuple[Floats, Mask, Mask]:
         values, nuisances, _ = self._composition.values(fit, slopes=False)
         contact = 1e-3 * fit[:, self.contact_points, None]
-        return self._force(self._curve(values, nuisances), contact, held)
+        return self._force(self._curve(values, nuisances), contact, contact_mask)
 
     def _differentiated(self, fit: Floats, in_contact: Mask | None = None) -> tuple[Floats, Floats, Mask]:
         """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside.
 
         `in_contact` (curves, samples): which samples are in contact, where known.
         """
-        middle, held, inside = self._forces(fit[None], None if in_contact is None else in_contact[None])
+        middle, contact_mask, inside = self._forces(fit[None], None if in_contact is None else in_contact[None])
         points = np.tile(fit, (2 * len(self._moved), 1))
         for number, indices in enumerate(self._moved):
             points[2 * number, indices] += self._step[indices]
             points[2 * number + 1, indices] -= self._step[indices]
         # One-sided where the other side is out of bounds
         points = np.clip(points, np.minimum(self._low, fit), np.maximum(self._high, fit))
-        shifted, _, _ = self._forces(points, np.broadcast_to(held, (len(points), *held.shape[1:])))
+        shifted, _, _ = self._forces(points, np.broadcast_to(contact_mask, (len(points), *contact_mask.shape[1:])))
         rows = self.recording, self._sample
         slopes = np.zeros((len(self.parameters), len(self.recording)))
         for number, indices in enumerate(self._moved):
@@ -197,7 +197,7 @@ class CompressionModel(CurveModel):
             mechanism.on_curve(curve, values[mechanism.name])
         return curve
 
-    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         strain = (self.displacement - contact) / self._height
         force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
         relaxation = curve.prony_pairs

@@ -69,9 +69,9 @@ class ParameterBatch:
             seed[index] = 1.0
             self.position.append(Differentiated(np.zeros((1, 1)), seed))
 
-    def of(self, points: Indices, places: Indices) -> Differentiated:
+    def of(self, points: Indices, indices: Indices) -> Differentiated:
         """The parameters at these indices of each model, for some of the points: (points, 1)."""
-        columns = places[self.owner[points]]
+        columns = indices[self.owner[points]]
         slopes = np.zeros((self.variables, len(points), 1))
         if self._slopes:
             slopes[columns, np.arange(len(points)), 0] = self._slope[points, columns]
@@ -85,17 +85,17 @@ class MechanismInModels:
         """Start with no model."""
         self.mechanism = mechanism
         self.has = np.zeros(models, dtype=bool)
-        self._places = {name: np.zeros(models, dtype=np.intp) for name in parameters}
+        self._indices = {name: np.zeros(models, dtype=np.intp) for name in parameters}
         self._relative = [
             (name, parameter.relative_to) for name, parameter in parameters.items() if parameter.relative_to
         ]
         self._hooks = _overridden(type(mechanism))
 
-    def add(self, model: int, places: Mapping[str, int]) -> None:
+    def add(self, model: int, indices: Mapping[str, int]) -> None:
         """Record that a model has it, with its parameters at these indices."""
         self.has[model] = True
-        for name, index in places.items():
-            self._places[name][model] = index
+        for name, index in indices.items():
+            self._indices[name][model] = index
 
     def has_hook(self, *hooks: str) -> bool:
         """Whether it overrides one of these hooks."""
@@ -103,7 +103,7 @@ class MechanismInModels:
 
     def values(self, points: Indices, seeds: ParameterBatch) -> Values:
         """Its parameters in their units at points whose models have it."""
-        values = {name: seeds.of(points, places) for name, places in self._places.items()}
+        values = {name: seeds.of(points, indices) for name, indices in self._indices.items()}
         for name, other in self._relative:
             values[name] = values[name] * values[other]
         return values
@@ -134,21 +134,21 @@ class FrfModels:
         self._models = tuple(models)
         self._count = max(len(model.parameters) for model in models)
         self._log = np.zeros((len(models), self._count), dtype=bool)
-        self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].places_of_nuisances}
+        self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].nuisance_indices}
         mechanisms: dict[Hashable, MechanismInModels] = {}
         self._alike: dict[Hashable, list[int]] = {}
         for number, model in enumerate(models):
             self._log[number, : len(model.parameters)] = [parameter.scale == "log" for parameter in model.parameters]
-            for name, index in model.places_of_nuisances.items():
+            for name, index in model.nuisance_indices.items():
                 self._nuisances[name][number] = index
             for mechanism in model.mechanisms:
-                places = model.places_of(mechanism)
-                key = mechanism.name, tuple(places)
+                indices = model.parameter_indices(mechanism)
+                key = mechanism.name, tuple(indices)
                 if key not in mechanisms:
                     mechanisms[key] = MechanismInModels(
-                        mechanism, {name: model.parameters[at] for name, at in places.items()}, len(models)
+                        mechanism, {name: model.parameters[column] for name, column in indices.items()}, len(models)
                     )
-                mechanisms[key].add(number, places)
+                mechanisms[key].add(number, indices)
             self._alike.setdefault(model.structure, []).append(number)
         self._mechanisms = sorted(mechanisms.values(), key=_composition_order)
         self._with_hook: dict[str, list[MechanismInModels]] = {}
@@ -181,7 +181,7 @@ class FrfModels:
                 candidate for candidate in self._mechanisms if candidate.has[number] and candidate.has_hook(*_MATERIAL)
             )
             sets.setdefault(key, []).append(number)
-        alike: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
+        groups: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
         for acting, numbers in sets.items():
             points = np.concatenate([rows[number] for number in numbers])
             contacts = self._contacts(self._models[numbers[0]], points, seeds)
@@ -191,26 +191,26 @@ class FrfModels:
             for mechanism, values in acting_values:
                 mechanism.on_material(contacts, values)
             needs_layer = contacts.layered or self._models[numbers[0]].needs_stiffness
-            for some, part in _split_by_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
+            for subset, part in _split_by_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
                 layer = layer_of(part) if needs_layer else as_in_the_table(part)
                 structure = part.layered, *(x is None for x in (part.slip, part.work_of_adhesion, part.relaxed)), layer
-                alike.setdefault(structure, []).append((points[some], part))
+                groups.setdefault(structure, []).append((points[subset], part))
         return [
             (np.concatenate([points for points, _ in group]), Contacts.stacked([part for _, part in group], lengths))
-            for group in alike.values()
+            for group in groups.values()
             for lengths in ([len(points) for points, _ in group],)
         ]
 
     def _contacts(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Contacts:
         """The declared contacts at all force nodes, one node after another."""
         nodes, design = len(model.force), model.design
-        of = {name: seeds.of(points, places) for name, places in self._nuisances.items() if name != "d33"}
+        factors = {name: seeds.of(points, indices) for name, indices in self._nuisances.items() if name != "d33"}
         return Contacts(
             force=model.force.ravel(),
             indenter_radius=np.tile(design.indenter_radius, nodes),
             dwell=np.tile(design.dwell, nodes),
-            modulus=model.modulus * of["youngs_modulus"],
-            thickness=model.thickness * of["thickness"],
+            modulus=model.modulus * factors["youngs_modulus"],
+            thickness=model.thickness * factors["thickness"],
             poisson_ratio=constant(model.poisson_ratio, seeds.variables, (len(points),)),
         )
 
@@ -223,11 +223,11 @@ class FrfModels:
             self._with_hook[hook] = [candidate for candidate in self._mechanisms if candidate.has_hook(hook)]
         owner = seeds.owner[points]
         for candidate in self._with_hook[hook]:
-            some = np.flatnonzero(candidate.has[owner])
-            if len(some) == len(points):
+            subset = np.flatnonzero(candidate.has[owner])
+            if len(subset) == len(points):
                 yield candidate.mechanism, None, candidate.values(points, seeds)
-            elif len(some):
-                yield candidate.mechanism, some, candidate.values(points[some], seeds)
+            elif len(subset):
+                yield candidate.mechanism, subset, candidate.values(points[subset], seeds)
 
     def _level_and_inside(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
@@ -250,15 +250,17 @@ class FrfModels:
             of_contacts = self._of_pressed(model, contacts)
         else:
             of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
-        nodes, places = len(model.force), len(design.point_contact)
+        nodes, positions = len(model.force), len(design.point_contact)
         contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
         offset = self._offset(model, points, seeds) / contacts.thickness
-        every = np.tile(np.arange(places), nodes)
-        sigma = of_contacts.at(contact, offset.spread(places)[every] if nodes > 1 else offset)
+        repeated = np.tile(np.arange(positions), nodes)
+        sigma = of_contacts.at(contact, offset.spread(positions)[repeated] if nodes > 1 else offset)
         near = (offset.value <= table.end) & (offset.value + of_contacts.rho.value <= PROFILE_END)
         reached = of_contacts.inside[..., contact]
-        inside = near & reached.reshape(*reached.shape[:-1], nodes, places).all(axis=-2)
-        return [sigma[places * node : places * (node + 1)] for node in range(nodes)] if nodes > 1 else [sigma], inside
+        inside = near & reached.reshape(*reached.shape[:-1], nodes, positions).all(axis=-2)
+        return [sigma[positions * node : positions * (node + 1)] for node in range(nodes)] if nodes > 1 else [
+            sigma
+        ], inside
 
     def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
         """σ of contacts other than the table's, or whose stiffness is needed."""
@@ -274,7 +276,9 @@ class FrfModels:
     def _offset(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Differentiated:
         """The distance of each contact from its sensor's centre [m], with derivatives by position where it varies."""
         design = model.design
-        moved = [(some, mechanism.offset(values)) for mechanism, some, values in self._acting("offset", points, seeds)]
+        moved = [
+            (subset, mechanism.offset(values)) for mechanism, subset, values in self._acting("offset", points, seeds)
+        ]
         if not (seeds.position or moved):
             distance = np.tile(np.hypot(design.point_x, design.point_y), (len(points), 1))
             return Differentiated(distance, np.zeros((seeds.variables, *distance.shape)))
@@ -283,10 +287,10 @@ class FrfModels:
             coordinate + shift
             for coordinate, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
         )
-        for some, shift in moved:
+        for subset, shift in moved:
             if shift is not None:
                 x, y = (
-                    coordinate.plus(displacement, some, len(points))
+                    coordinate.plus(displacement, subset, len(points))
                     for coordinate, displacement in zip((x, y), shift, strict=True)
                 )
         distance = np.hypot(x.value, y.value)
@@ -307,18 +311,18 @@ class FrfModels:
             oscillating = oscillating + mechanism.mobility(mobility_values[mechanism.name]) * (rate - oscillating)
         rho = model.sensor_radius / contacts.thickness
         charge = oscillating * (1.5e-12 * seeds.of(points, self._nuisances["d33"]) * rho * rho)
-        for mechanism, some, values in self._acting("on_d33", points, seeds):
+        for mechanism, subset, values in self._acting("on_d33", points, seeds):
             mean_stress = sigma[0] * (1.5 / np.pi * design.force[design.point_contact]) / (contacts.thickness**2.0)
-            charge = charge.times(mechanism.on_d33(mean_stress.at_points(some), values), some, count)
+            charge = charge.times(mechanism.on_d33(mean_stress.at_points(subset), values), subset, count)
         level = charge[design.point]
-        for mechanism, some, values in self._acting("neighbour_fraction", points, seeds):
+        for mechanism, subset, values in self._acting("neighbour_fraction", points, seeds):
             fraction = mechanism.neighbour_fraction(values)
             if fraction is not None:
-                neighbours = charge.at_points(some)[design.neighbour_point]
+                neighbours = charge.at_points(subset)[design.neighbour_point]
                 theirs = fraction * sum_rows(neighbours, design.neighbour_recording, len(design.point))
-                level = level.plus(theirs, some, count)
-        for mechanism, some, values in self._acting("on_recordings", points, seeds):
-            level = level.times(mechanism.on_recordings(design, values), some, count)
+                level = level.plus(theirs, subset, count)
+        for mechanism, subset, values in self._acting("on_recordings", points, seeds):
+            level = level.times(mechanism.on_recordings(design, values), subset, count)
         return level
 
     def _line_factor(
@@ -327,9 +331,9 @@ class FrfModels:
         """The complex factor of each distinct line; None without any such mechanism."""
         product: Differentiated | None = None
         count, lines = len(points), len(model.design.line_frequency)
-        for mechanism, some, values in self._acting("on_lines", points, seeds):
-            factor = mechanism.on_lines(model.design, contacts.at_points(some), values)
-            if product is None and some is None:
+        for mechanism, subset, values in self._acting("on_lines", points, seeds):
+            factor = mechanism.on_lines(model.design, contacts.at_points(subset), values)
+            if product is None and subset is None:
                 product = factor
             elif factor is not None:
                 base = (
@@ -337,7 +341,7 @@ class FrfModels:
                     if product is None
                     else product
                 )
-                product = base.times(factor, some, count)
+                product = base.times(factor, subset, count)
         return product
 
 
@@ -484,13 +488,13 @@ class FrfModel:
         return self.design, self.sigma, self.needs_stiffness, increments
 
     @property
-    def places_of_nuisances(self) -> Mapping[str, int]:
+    def nuisance_indices(self) -> Mapping[str, int]:
         """Indices in the fit coordinates of d33 and of the factors on the declared modulus and thickness."""
         return self._composition.nuisances
 
-    def places_of(self, mechanism: Mechanism) -> Mapping[str, int]:
+    def parameter_indices(self, mechanism: Mechanism) -> Mapping[str, int]:
         """Indices in the fit coordinates of a mechanism's parameters, by their names."""
-        return self._composition.places[mechanism.name]
+        return self._composition.indices[mechanism.name]
 
     def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:
         """The response at points (…, parameters); its derivatives by the parameters and by the contact's position on

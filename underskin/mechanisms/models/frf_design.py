@@ -46,8 +46,8 @@ def together(pickups: Sequence[Pickup]) -> Pickup | None:
     def deviation(values: Mapping[str, Floats]) -> Floats:
         parts = [(np.searchsorted(rows, pickup.rows), pickup.on_rows(pickup.deviation(values))) for pickup in pickups]
         variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in parts)), len(rows)))
-        for places, sd in parts:
-            variance[..., places] += sd**2
+        for columns, sd in parts:
+            variance[..., columns] += sd**2
         return np.sqrt(variance)
 
     return Pickup(rows, deviation)
@@ -67,14 +67,16 @@ class FrfDesign:
         self._conditions = weakref.ref(conditions)  # which keep the design in a cache
         self.ids = tuple(recording.id for recording in recordings)
         number = {sensor.id: index for index, sensor in enumerate(conditions.skin.sensors)}
-        places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
+        sensor_positions = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
         # Of each recording
         self.sensor: Indices = np.array([number[recording.sensor] for recording in recordings])
         cycles = [np.nan if recording.load_cycles is None else recording.load_cycles for recording in recordings]
         self.load_cycles: Floats = np.array(cycles)
         position = np.array(
             [
-                places[sensor_index] if recording.position_mm is None else to_si("thickness_mm", recording.position_mm)
+                sensor_positions[sensor_index]
+                if recording.position_mm is None
+                else to_si("thickness_mm", recording.position_mm)
                 for sensor_index, recording in zip(self.sensor, recordings, strict=True)
             ]
         )
@@ -87,11 +89,17 @@ class FrfDesign:
         self.force, self.indenter_radius, self.dynamic_force, self.dwell = contacts.T[:4]
         # Of each point: its contact, and that contact's place seen from the sensor's centre; of each recording its
         # point beside its own sensor; of each pair of a recording and a neighbour of its sensor both
-        pairs = _neighbours(places) if neighbours else np.zeros((len(places), len(places)), dtype=bool)
+        pairs = (
+            _neighbours(sensor_positions)
+            if neighbours
+            else np.zeros((len(sensor_positions), len(sensor_positions)), dtype=bool)
+        )
         self.neighbour_recording, other = np.nonzero(pairs[self.sensor])
-        every = np.concatenate([np.arange(count), self.neighbour_recording])
-        offset = position[every] - places[np.concatenate([self.sensor, other])]
-        points, point = np.unique(np.column_stack([contact[every], np.round(offset, 12)]), axis=0, return_inverse=True)
+        pair_recording = np.concatenate([np.arange(count), self.neighbour_recording])
+        offset = position[pair_recording] - sensor_positions[np.concatenate([self.sensor, other])]
+        points, point = np.unique(
+            np.column_stack([contact[pair_recording], np.round(offset, 12)]), axis=0, return_inverse=True
+        )
         self.point_contact: Indices = points[:, 0].astype(np.intp)
         self.point_x, self.point_y = points[:, 1], points[:, 2]
         self.point, self.neighbour_point = point[:count], point[count:]
@@ -150,13 +158,13 @@ def _distinct(columns: Sequence[Floats]) -> tuple[Floats, Indices]:
     keys = [column.tobytes() for column in columns]
     shared = dict(zip(keys, columns, strict=True))
     distinct = np.unique(np.concatenate(list(shared.values())))
-    places = {key: np.searchsorted(distinct, column) for key, column in shared.items()}
-    return distinct, np.concatenate([places[key] for key in keys])
+    indices = {key: np.searchsorted(distinct, column) for key, column in shared.items()}
+    return distinct, np.concatenate([indices[key] for key in keys])
 
 
-def _neighbours(places: Floats) -> Mask:
+def _neighbours(sensor_positions: Floats) -> Mask:
     """Which sensors (sensors, sensors) are within 1.2 pitches of each other."""
-    distance = cdist(places, places)
+    distance = cdist(sensor_positions, sensor_positions)
     np.fill_diagonal(distance, np.inf)
     near: Mask = distance <= NEIGHBOUR_PITCHES * distance.min()
     return near

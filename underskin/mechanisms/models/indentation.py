@@ -265,7 +265,7 @@ def in_contact(travel: Floats, pull_off: Floats) -> Mask:
     return np.asarray(np.take_along_axis(meets, last, axis=-1))
 
 
-def edges(sphere: Sphere, travel: Floats, held: Mask, work: Floats, separation: Floats | None) -> Floats:
+def edges(sphere: Sphere, travel: Floats, contact_mask: Mask, work: Floats, separation: Floats | None) -> Floats:
     """The contact radius at each sample (points, curves, samples).
 
     The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of
@@ -278,7 +278,7 @@ def edges(sphere: Sphere, travel: Floats, held: Mask, work: Floats, separation: 
     first_least, _ = sphere.pull_off(work)
     advancing, receding = sphere.radius_at(travel, work, first_least), sphere.radius_at(travel, parting, least)
     a = np.empty_like(receding)
-    edge_rows(advancing, receding, contiguous(np.broadcast_to(held, a.shape)), a)
+    edge_rows(advancing, receding, contiguous(np.broadcast_to(contact_mask, a.shape)), a)
     return a
 
 
@@ -326,32 +326,32 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     time = np.maximum(path.time, np.take_along_axis(path.time, first_contact, axis=-1))
     work = None if adhesion is None else adhesion.work
     least, lowest = sphere.pull_off(work)
-    held = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
+    contact_mask = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
     a = sphere.radius_at(depth, work, np.maximum(least, 1e-12))
     force, stiffness, slack, parting, stiffer = _elastic(sphere, a, adhesion)
-    force = np.where(held, force, 0.0)
+    force = np.where(contact_mask, force, 0.0)
     depth_memory, force_memory = memories(depth, time, relaxation), memories(force, time, relaxation)
     growing = relaxation.convolved(force, force_memory)
     record = np.maximum.accumulate(np.where(depth >= np.maximum.accumulate(depth, axis=-1), number, 0), axis=-1)
     record = np.maximum(record, first_contact)
     back = started & (record < number)
     if not back.any():
-        return np.where(held, stiffer * growing, 0.0), held
+        return np.where(contact_mask, stiffer * growing, 0.0), contact_mask
     edge, carried, memory_force = (np.zeros(depth.shape) for _ in range(3))
     stuck = np.zeros(depth.shape, dtype=bool)
     reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, first_contact[..., 0])
     creep_edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, memory_force, stuck)
-    answer, some = stiffer * growing, np.s_[..., np.flatnonzero(back.any(axis=(0, 1)))]
-    a = sphere.radius_at(contiguous(edge[some]), work, np.maximum(least, 1e-12))
+    answer, columns = stiffer * growing, np.s_[..., np.flatnonzero(back.any(axis=(0, 1)))]
+    a = sphere.radius_at(contiguous(edge[columns]), work, np.maximum(least, 1e-12))
     ring, stiffness, _, _, stiffer_ring = _elastic(sphere, a, adhesion)
-    receding = stiffer_ring * (relaxation.unrelaxed * ring + memory_force[some] + stiffness * carried[some])
-    answer[some] = np.where(back[some], receding, answer[some])
-    held = np.where(back, stuck, held)
-    touch = back & ~held
+    receding = stiffer_ring * (relaxation.unrelaxed * ring + memory_force[columns] + stiffness * carried[columns])
+    answer[columns] = np.where(back[columns], receding, answer[columns])
+    contact_mask = np.where(back, stuck, contact_mask)
+    touch = back & ~contact_mask
     if touch.any() and adhesion is not None:
         of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
-        answer, held = np.where(touch, of_touch, answer), np.where(touch, holds, held)
-    return np.where(held, answer, 0.0), held
+        answer, contact_mask = np.where(touch, of_touch, answer), np.where(touch, holds, contact_mask)
+    return np.where(contact_mask, answer, 0.0), contact_mask
 
 
 def relaxing_on_stage(
@@ -366,13 +366,13 @@ def relaxing_on_stage(
     depth = np.where(touched, travel - compliance * elastic, travel)
     slope = sphere.at(a)[2]
     scale = np.abs(travel).max(axis=-1, keepdims=True) + 1e-15
-    force, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=depth))
+    force, contact_mask = relaxing(sphere, relaxation, adhesion, replace(path, travel=depth))
     for _ in range(_ITERATIONS):
         residual = np.where(touched, depth + compliance * force - travel, 0.0)
         if (np.abs(residual) <= _SETTLED * scale).all():
             break
         moved = depth - residual / (1 + compliance * slope)
-        after, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=moved))
+        after, contact_mask = relaxing(sphere, relaxation, adhesion, replace(path, travel=moved))
         change = moved - depth
         with np.errstate(divide="ignore", invalid="ignore"):
             secant = (after - force) / change
@@ -380,8 +380,8 @@ def relaxing_on_stage(
         slope = np.where(far & np.isfinite(secant) & (secant > 0), 0.5 * (slope + np.minimum(secant, 4 * slope)), slope)
         depth, force = moved, after
     lost = np.maximum.accumulate(np.abs(residual) > _UNSETTLED * scale, axis=-1) & touched
-    held = held & ~lost
-    return np.where(held, force, 0.0), held
+    contact_mask = contact_mask & ~lost
+    return np.where(contact_mask, force, 0.0), contact_mask
 
 
 def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats, Floats]:
@@ -454,32 +454,36 @@ class IndentationModel(CurveModel):
             mechanism.on_curve(curve, values[mechanism.name])
         return curve
 
-    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         travel = self.displacement - contact
         samples = Samples(self._ids, travel, self.time)
         for law in curve.laws:
             travel = law.pressed_travel(samples, travel)
-        force, held, inside = self._force_at(curve, travel, held)
+        force, contact_mask, inside = self._force_at(curve, travel, contact_mask)
         for law in curve.laws:
             force = law.measured_force(samples, force)
-        return force, held, inside
+        return force, contact_mask, inside
 
-    def _force_at(self, curve: Curve, travel: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force_at(self, curve: Curve, travel: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         sphere, adhesion = self._sphere(curve), _adhesion(curve)
         relaxation = curve.prony_pairs
         if relaxation is not None:
-            on = relaxing if curve.stage_stiffness is None else relaxing_on_stage
-            return self._relaxing(sphere, partial(on, sphere, relaxation, adhesion), adhesion, travel, held)
+            relaxing_force = relaxing if curve.stage_stiffness is None else relaxing_on_stage
+            return self._relaxing(
+                sphere, partial(relaxing_force, sphere, relaxation, adhesion), adhesion, travel, contact_mask
+            )
         if adhesion is None:
             depth = np.maximum(travel, 0.0)
             a = sphere.radius_at(depth, None)
             force = np.where(travel > 0, sphere.at(a)[0], 0.0)
             return force, travel > 0, sphere.inside(a) | (travel <= 0)
-        if held is None:
-            held = in_contact(travel, self._last_travel(sphere, adhesion.separation))
-        a = edges(sphere, travel, held, adhesion.work, adhesion.separation if curve.work_of_separation else None)
-        force = np.where(held, sphere.force_at(travel, a), 0.0)
-        return force, held, sphere.inside(a) | ~held
+        if contact_mask is None:
+            contact_mask = in_contact(travel, self._last_travel(sphere, adhesion.separation))
+        a = edges(
+            sphere, travel, contact_mask, adhesion.work, adhesion.separation if curve.work_of_separation else None
+        )
+        force = np.where(contact_mask, sphere.force_at(travel, a), 0.0)
+        return force, contact_mask, sphere.inside(a) | ~contact_mask
 
     def _last_travel(self, sphere: Sphere, work: Floats) -> Floats:
         """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage known to be
@@ -497,19 +501,19 @@ class IndentationModel(CurveModel):
         force_on: Callable[[Path], tuple[Floats, Mask]],
         adhesion: Adhesion | None,
         travel: Floats,
-        held: Mask | None,
+        contact_mask: Mask | None,
     ) -> tuple[Floats, Mask, Mask]:
         """As `_force_at` through the history, which begins at the touch of a recording, between two samples."""
         path = _with_touch(travel, self.time)
-        force, contact_mask = force_on(path)
-        contact_mask = contact_mask & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
-        held = contact_mask if held is None else held
-        force = np.where(held, force, 0.0)
+        force, own_contact = force_on(path)
+        own_contact = own_contact & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
+        contact_mask = own_contact if contact_mask is None else contact_mask
+        force = np.where(contact_mask, force, 0.0)
         if sphere.layers is None:  # a half space, which has no tables to leave
-            return force, held, np.ones_like(held)
+            return force, contact_mask, np.ones_like(contact_mask)
         least = sphere.pull_off(None if adhesion is None else adhesion.work)[0]
         a = sphere.radius_at(np.maximum(path.travel, 0.0), None, least)
-        return force, held, sphere.inside(a) | ~held
+        return force, contact_mask, sphere.inside(a) | ~contact_mask
 
     def _sphere(self, curve: Curve) -> Sphere:
         poisson_ratio = numbers(curve.poisson_ratio)

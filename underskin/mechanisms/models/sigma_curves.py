@@ -150,7 +150,7 @@ class _Splines:
 class OffsetSigma:
     """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h).
 
-    Attributes: `hertz`, σ of the table; `end`, the largest offset e/h that has a place, beyond which σ is 0.
+    Attributes: `hertz`, σ of the table; `end`, the largest offset e/h, beyond which σ is 0.
     """
 
     def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> None:

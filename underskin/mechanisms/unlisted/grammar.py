@@ -261,7 +261,7 @@ _FORMS: Mapping[Form, float] = {
 _CONSTANT = 4.0  # a constant is looked for along one axis of several
 _COLUMNS = 1.5  # axes that all columns of `conditions` count for
 _FREQUENCY = 0.5  # of the frequency response: laws over frequency only
-_PLACES_FOLLOW = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
+_POSITION_AXES = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
 _CONSTANTS: Mapping[ActsOn, tuple[str, tuple[str, ...]]] = {  # what does it by name, and the axes that show it best
     "modulus": ("modulus_error", ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")),
     "thickness": ("thickness_error", ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")),
@@ -350,7 +350,7 @@ def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[s
     if axis.name == "sensor":
         return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in listed)
     if acts_on == "position":
-        return axis.name in _PLACES_FOLLOW or axis.name not in BUILT_IN
+        return axis.name in _POSITION_AXES or axis.name not in BUILT_IN
     if acts_on == "force":  # a force that is scaled is a modulus that is
         return not shape.logarithmic and axis.name not in ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")
     return True
@@ -393,8 +393,8 @@ def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, M
     if axis.words:
         words = [match.words[round(value)] for value in match.of(ids)]
         inside = np.array([word in axis.words for word in words])
-        places = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
-        return replace(axis, values=dict(zip(ids, places, strict=True)), range=(axis.low, axis.high)), inside
+        indices = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
+        return replace(axis, values=dict(zip(ids, indices, strict=True)), range=(axis.low, axis.high)), inside
     values = match.of(ids)
     slack = _ROUNDING * axis.span
     inside = (values >= axis.low - slack) & (values <= axis.high + slack)

@@ -37,7 +37,7 @@ _LOGS: Mapping[str, tuple[float, float]] = {  # s that are tabulated
     "contact_radius": (-0.9, 0.7),
 }
 _NODES, _NODES_OF_RADIUS = 22, 12
-_FURTHEST_MM, _PLACES = 2.0, 41  # beyond the largest offset; how many places from the sensor's centre
+_FURTHEST_MM, _DISTANCES = 2.0, 41  # beyond the largest offset; number of distances from the centre
 _FAINT = 1e-3  # of the largest level, below which a factor on it says nothing
 _ANY_LINE = np.array([1.0])  # Hz
 
@@ -79,13 +79,13 @@ class LevelTables:
         recordings = [recording.without_measurements(frequency_hz=_ANY_LINE) for recording in frf_of(conditions)]
         self._conditions = Conditions(conditions.name, conditions.skin, tuple(recordings))
         self._table, self._further_mechanisms = table, tuple(further_mechanisms)
-        self._places = {recording.id: number for number, recording in enumerate(recordings)}
+        self._row_numbers = {recording.id: number for number, recording in enumerate(recordings)}
         self.force = {recording.id: recording.preload_n for recording in recordings}
         self._curves: dict[str, Curve] = {}
 
     def rows(self, ids: Sequence[str]) -> Indices:
         """Row indices of these recordings in the tables."""
-        return np.array([self._places[name] for name in ids], dtype=np.intp)
+        return np.array([self._row_numbers[name] for name in ids], dtype=np.intp)
 
     def factor(self, acts_on: str, rows: Indices, log: Differentiated) -> Differentiated:
         """level(quantity · e^s)/level(quantity) of recordings, from s (…, recordings)."""
@@ -102,7 +102,7 @@ class LevelTables:
         distance = np.hypot(x.value, y.value)
         away = np.where(distance > 0, distance, 1.0)
         radius = chain(distance, (x.value / away, x), (y.value / away, y))
-        value, slope = self._over_places.at(rows, radius.value)
+        value, slope = self._over_distance.at(rows, radius.value)
         return chain(value, (slope, radius))
 
     @cached_property
@@ -125,7 +125,7 @@ class LevelTables:
         else:
             fits = np.tile(self._start, (len(s), 1))
             name = "youngs_modulus" if acts_on == "modulus" else "thickness"
-            fits[:, self._model.places_of_nuisances[name]] += s
+            fits[:, self._model.nuisance_indices[name]] += s
             levels = self._model.respond(fits, slopes=False).level.value
         return Curve.of(s, _over(levels, self._base))
 
@@ -138,7 +138,7 @@ class LevelTables:
             (), Conditions("radius", self._conditions.skin, tuple(recordings)), self._table, self._further_mechanisms
         )
         fit = self._start.copy()
-        fit[model.places_of_nuisances["youngs_modulus"]] -= 2 * s
+        fit[model.nuisance_indices["youngs_modulus"]] -= 2 * s
         return model.respond(fit, slopes=False).level.value
 
     @cached_property
@@ -152,13 +152,13 @@ class LevelTables:
         return 1e3 * np.column_stack([design.point_x, design.point_y])[design.point]
 
     @cached_property
-    def _over_places(self) -> Curve:
+    def _over_distance(self) -> Curve:
         """The level over the distance from the sensor's centre [mm]."""
         recordings = frf_of(self._conditions)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in self._conditions.skin.sensors}
         keys = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
         distinct = list(dict.fromkeys(keys))
-        radii = np.linspace(0.0, float(np.hypot(*self._offset.T).max()) + _FURTHEST_MM, _PLACES)
+        radii = np.linspace(0.0, float(np.hypot(*self._offset.T).max()) + _FURTHEST_MM, _DISTANCES)
         sensor = recordings[0].sensor
         x, y = centres[sensor]
         placed = [
@@ -182,7 +182,7 @@ def _over(levels: Floats, base: Floats) -> Floats:
 PREFIX = "unnamed_"
 LagKind = Literal["angle", "delay", "power", "corner"]
 LAG_KINDS: tuple[LagKind, ...] = get_args(LagKind)
-_USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a place in mm, of a lag in rad
+_USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a position in mm, of a lag in rad
     "gain": 0.2,
     "modulus": 0.4,
     "thickness": 0.2,
