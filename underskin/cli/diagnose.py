@@ -168,7 +168,7 @@ class _Outcome:
     source: str
     problem: str = ""
     answer: str = ""
-    notes: tuple[str, ...] = ()  # what was taken for what, and what to look at
+    notes: tuple[str, ...] = ()  # assumptions in reading, and warnings
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -268,7 +268,7 @@ def _file_outcomes(
         for file, outcome in _pool_outcomes(remaining, work, min(workers, len(remaining)), scheduler):
             remaining.remove(file)
             yield outcome
-        # A process that dies ends the pool: the files that may have caused it are diagnosed alone, one by one
+        # A process that dies ends the pool: the files that may have caused it are diagnosed one by one
         suspects = remaining[:workers]
         for file in suspects:
             outcomes = dict(_pool_outcomes([file], work, 1, scheduler))

@@ -69,7 +69,7 @@ def save(
         raise UnderskinError(f"{report}: cannot be read as a report: {error}") from error
     file = target / f"{name}.yaml"
     text = saving.document(document, name, description)
-    parse(text.encode(), str(file))  # which refuses a name or text that cannot be kept
+    parse(text.encode(), str(file))  # rejects an invalid name or text
     target.mkdir(parents=True, exist_ok=True)
     file.write_text(text, encoding="utf-8")
     typer.echo(str(file))

@@ -75,7 +75,7 @@ def _introduce(client: "Client", folder: Path, skin: str) -> None:
     new = ""
     try:
         client.skins.get(skin)
-    except Unreachable:  # told once there is something to send: a bench may be switched on before the server
+    except Unreachable:  # reported with the first file: a bench may be switched on before the server
         pass
     except ServiceError as error:
         if error.status in (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN):

@@ -39,7 +39,7 @@ def content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
     digests = [(file.name, content_sha256(file)) for file in inputs]
     options: list[Any] = [terms.get("skin"), terms.get("all_or_nothing", False), terms.get("together")]
     options.append(terms.get("rig") is None)
-    # What came later, only where it is said: keys of earlier versions hold.
+    # Later options only where given, so that keys of earlier versions stay valid.
     options += [(name, terms[name]) for name in ("corrects", "reason", "estimator") if terms.get(name) is not None]
     return f"content {hashlib.sha256(repr([options, digests]).encode()).hexdigest()}"
 

@@ -45,9 +45,9 @@ class Client:
         *,
         npz: bool = False,
     ) -> None:
-        """`api_key` where the service asks for one; `timeout` in seconds, between bytes, and 10 s at most to connect.
+        """`api_key` where the service requires one; `timeout` [s] between bytes, and 10 s at most to connect.
 
-        `npz`: columns travel as NumPy's .npz in place of JSON, which is faster for many rows.
+        `npz`: send and receive columns as NumPy's .npz instead of JSON, which is faster for many rows.
         """
         self._session = Session(base_url, api_key, timeout)
         self._npz = npz

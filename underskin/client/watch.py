@@ -33,7 +33,7 @@ _RETRIES, _LONGER = (
     4,
 )  # of a file whose refusal may pass, and how many times as long the wait is from one to the next
 _TEMPORARY = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".lock", "~")
-_INDEX_FILES = (".tdms_index",)  # LabVIEW's index of a file, which holds nothing of its own
+_INDEX_FILES = (".tdms_index",)  # LabVIEW's index of a file, without data
 
 
 @dataclass
@@ -61,7 +61,7 @@ class WatchedFolder:
         self.path = path
         self._settle_s = settle_s
         self._states: dict[Path, _FileState] = {}
-        self.unreadable: dict[Path, OSError] = {}  # what `settled` could not look at, and left out
+        self.unreadable: dict[Path, OSError] = {}  # skipped by `settled`
 
     def settled(self) -> list[Path]:
         """Files that no longer change and are not done, the oldest first; OSError where the folder is gone."""
@@ -271,7 +271,7 @@ def _write(journal: TextIO, lines: Iterable[str]) -> None:
 
 LOOK_S = 1.0  # between two looks at the folder
 _LONGEST_WAIT_S = 60.0  # between two tries of an outage
-# Answers that are about what was sent; any other failure is the service's, the network's or the key's, and may pass.
+# Refusals of the file; any other failure is of the service, the network or the key, and may be temporary.
 _OF_THE_FILE = frozenset(
     {
         HTTPStatus.BAD_REQUEST,
@@ -308,7 +308,7 @@ class Watcher:
         self._url, self._skin, self._rig, self._estimator = url, skin, rig, estimator
         self._on_stored, self._on_message = on_stored, on_message
         self._outage_s = 0.0  # to wait before the next try; 0 while all is well
-        self._unopened: set[Path] = set()  # of which was told that they cannot be opened or looked at
+        self._unopened: set[Path] = set()  # reported as unreadable
 
     def step(self) -> float:
         """Send complete files; returns the seconds to wait until the next step."""

@@ -17,7 +17,7 @@ from underskin.inversion.array_course import differ_from_others, differ_from_zer
 from underskin.units import Floats, Mask
 
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id
-_OUTLIER = {"color": COLOURS[1], "width": 3}  # the ring around one that stands out
+_OUTLIER = {"color": COLOURS[1], "width": 3}  # the ring around an outlier
 _ABSENT = {"color": "#5b6670", "width": 2}  # the edge of one that was not measured with the others
 _EDGE = {"color": "#5b6670", "width": 1}  # of the others
 _PALE, _RINGED = ("absent", "unknown"), ("absent", "unknown", "stands out")  # without a colour of a value; with a ring
@@ -26,8 +26,8 @@ _FROM_ZERO = ("zero", "bound")
 _SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
 _MOST_WITH_ID, _LONGEST_ID = 100, 6
-_MIXED = 0.01  # of the largest size, from which on the other sign is told apart by colour
-# Colours end at so many times what so many of the sensors that differ do not exceed: one far beyond would pale them.
+_MIXED = 0.01  # of the largest size, from which on colours show the other sign
+# Colours end at _FAR times the _MOST quantile of the sensors that differ, so that one outlier does not fade the rest.
 _FAR, _MOST = 3.0, 0.9
 _DARK = 0.55  # luminance below which an id is written in white
 
@@ -148,7 +148,7 @@ def array_map(
         discs.append(
             {"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", "name": "sensor", **disc}
         )
-    if chosen in sensors:  # on the ground too, since a disc may have the colour of its own ring
+    if chosen in sensors:  # below the disc too, which may have the colour of its ring
         discs.append(ring(x[sensors.index(chosen)], y[sensors.index(chosen)], radius))
     figure.update_layout(shapes=discs, showlegend=sum(trace.hoverinfo != "skip" for trace in figure.data) > 1)
     figure.update_layout(meta={"alike": _ALIKE, "unknown": _UNKNOWN})  # for a page, which has others in the dark
@@ -187,7 +187,7 @@ def _names(quantity: Quantity) -> dict[str, str]:
     }
     return {
         "differs": quantity.name,
-        "alike": alike.get(quantity.against, ""),  # where nothing is compared, every known value has a colour
+        "alike": alike.get(quantity.against, ""),  # without comparison every known value is coloured
         "unknown": f"no {quantity.name} known",
         "absent": "not in this campaign",
         "stands out": "stands out",

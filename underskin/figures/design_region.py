@@ -12,14 +12,14 @@ from underskin.units import Floats, Mask
 
 # Translucent, so that they recede on white paper and on a dark ground.
 _UNRESOLVED, _INFEASIBLE = "rgba(127,137,147,0.18)", "rgba(127,137,147,0.6)"
-_LEAST_SPAN = 0.05  # of the largest pitch: what differs by less looks alike
+_LEAST_SPAN = 0.05  # of the largest pitch: the least range of the colours
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)
 _BAR = {"title": {"text": "largest pitch [mm]", "side": "top"}, "orientation": "h", "y": -0.5, "thickness": 14}
 
 
 @dataclass(frozen=True)
 class Offered:
-    """A proposed design [mm], and what it is best in."""
+    """A proposed design [mm], and the criterion in which it is best."""
 
     name: str
     thickness_mm: float

@@ -46,7 +46,7 @@ class LawEffect:
 
     @property
     def changes(self) -> tuple[str, ...]:
-        """Of an FRF where it is largest, 30 Hz where it is the same everywhere; of a curve at its largest force."""
+        """For an FRF at its largest change, at 30 Hz where that is uniform; for a curve at its largest force."""
         return tuple(self._change(*pair) for pair in zip(*(panel.curves for panel in self.panels), strict=True))
 
     def _change(self, first: Floats, second: Floats) -> str:

@@ -13,7 +13,7 @@ from underskin.figures.style import COLOURS, styled
 from underskin.units import Floats
 
 _ROOM = 0.06  # of the map, between a load and its edge
-_TENSION = 0.01  # of the largest compression, below which it is not told apart by colour
+_TENSION = 0.01  # of the largest compression, below which colours do not show tension
 _CHARGE = Quantity("charge", "pC", "bound")
 
 

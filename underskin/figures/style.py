@@ -16,9 +16,9 @@ from underskin.units import Floats
 COLOURS = LINE_COLOURS[:7]
 MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
 INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
-SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations: what every error bar shows
+SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations, of every error bar
 _LONGEST_LABEL = 60
-_MARKS = 8  # at most, along a line that its colour alone does not tell apart
+_MARKS = 8  # at most, along a line whose colour is not unique
 PLAIN = {"exponentformat": "none"}  # else ticks had prefixes beside the unit of their axis: 10μ of N
 _AXIS = {
     "gridcolor": GRID,

@@ -88,7 +88,7 @@ class Mechanism:
     axes: ClassVar[tuple[str, ...]]
     needs: str = "nothing beyond the recordings themselves"
     parameters_stated: tuple[Parameter, ...] = ()  # those that are the same for all campaigns and kinds
-    # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they tell contacts apart.
+    # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they distinguish contacts.
     needs_fields: ClassVar[tuple[str, ...]] = ()
     reads_fields: ClassVar[tuple[str, ...]] = ()  # the same, but it can be predicted without them
     # What a model prepares for it: the contacts' stiffness, the neighbours' charge, room for an offset [m] and for a
@@ -98,12 +98,12 @@ class Mechanism:
     tells_recordings_apart: ClassVar[bool] = False  # its lines differ between recordings of one and the same contact
     largest_offset: ClassVar[float] = 0.0
     largest_stretch: ClassVar[float] = 1.0
-    moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
-    moves_contact_points: ClassVar[bool] = False  # of indentations: contact begins elsewhere than the base model has it
+    moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance only
+    moves_contact_points: ClassVar[bool] = False  # of indentations: contact begins at another travel
     begins_at_guesses: ClassVar[bool] = False  # fits begin only at its guesses, not at quantiles of its priors
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
-    extrapolates_modulus: ClassVar[bool] = False  # the modulus at no strain is what its law makes of larger ones
+    extrapolates_modulus: ClassVar[bool] = False  # its law extrapolates the modulus to zero strain
     # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
     figure: ClassVar[tuple[str, ...]] = ()
 

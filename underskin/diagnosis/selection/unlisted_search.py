@@ -175,7 +175,7 @@ class Screening:
         key = law.axis, law.shape
         if key not in self._features:
             grid = law.shape.points
-            values = grid_values(law.shape.bending, grid)
+            values = grid_values(law.shape.shape_parameters, grid)
             each = [
                 np.broadcast_to(one.value if isinstance(one, Differentiated) else one, (len(grid), len(self._ids)))
                 for one in law.shape.features(law.axis.of(self._ids), values)
@@ -300,7 +300,7 @@ class CurveScreening:
     @staticmethod
     def _changes(law: CurveLaw, samples: Samples, force: Floats, stiffness: Floats) -> Floats:
         """What each feature changes in the force by an amplitude of its prior's deviation (grid, features, samples)."""
-        values = {name: of_samples(value) for name, value in grid_values(law.shape.bending, law.grid).items()}
+        values = {name: of_samples(value) for name, value in grid_values(law.shape.shape_parameters, law.grid).items()}
         unit = {"force": np.ones_like(force), "position": stiffness}.get(law.description.acts_on, force)
         each = []
         for feature, deviation in zip(

@@ -149,8 +149,8 @@ _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 _AXIS_VALUES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, at which a law is checked
 _FAR_VALUES = np.concatenate([[0.0], np.geomspace(1e-3, 1e9, 61), -np.geomspace(1e-3, 1e9, 61)])  # up to load cycles
 _NEUTRAL = 1e-6
-_ADDED = ("force", "position")  # what a law adds to, where the others are factors
-# Least change of a law that each parameter can make: a thousandth of what any data show; an AFM shows 1e-12 N.
+_ADDED = ("force", "position")  # quantities that a law adds to; the others are factors
+# Least change of a law that each parameter can make: a thousandth of what data resolve; an AFM resolves 1e-12 N.
 _NOTICED_FACTOR, _NOTICED_ADDED = 1e-9, 1e-15
 _AXIS_SHIFT = 5  # of indices from one axis to the next
 _QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, for that test

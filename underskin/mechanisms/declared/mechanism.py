@@ -61,14 +61,14 @@ def read(text: str, field: str, allowed: Collection[str]) -> Expression:
     nodes = list(ast.walk(tree.body))
     if len(nodes) > _MOST_NODES:
         raise InvalidInput(field, text, "is too long to be a law: take several")
-    called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+    called_functions = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
     for node in nodes:
-        _check(node, field, allowed, called)
-    names = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called}
+        _check(node, field, allowed, called_functions)
+    names = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called_functions}
     return Expression(text.strip(), frozenset(names - set(CONSTANTS)), tree.body)
 
 
-def _check(node: ast.AST, field: str, allowed_names: Collection[str], called: Collection[int]) -> None:
+def _check(node: ast.AST, field: str, allowed_names: Collection[str], called_functions: Collection[int]) -> None:
     """Raise InvalidInput for every node that is not on the whitelist."""
     if isinstance(node, ast.expr_context | ast.operator | ast.unaryop):
         allowed = isinstance(node, ast.Load | ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow | ast.USub | ast.UAdd)
@@ -81,7 +81,7 @@ def _check(node: ast.AST, field: str, allowed_names: Collection[str], called: Co
         if not number:
             raise InvalidInput(location, repr(node.value)[:40], "must be a number of usual size")
     elif isinstance(node, ast.Name):
-        if id(node) not in called and node.id not in CONSTANTS and node.id not in allowed_names:
+        if id(node) not in called_functions and node.id not in CONSTANTS and node.id not in allowed_names:
             raise InvalidInput(location, node.id, f"must be one of {', '.join([*sorted(allowed_names), *CONSTANTS])}")
     elif isinstance(node, ast.Call):
         name = node.func.id if isinstance(node.func, ast.Name) else ""
@@ -107,7 +107,7 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
             return _combined(op, _value(left, values), _value(right, values))
         case ast.Call(func=ast.Name(id=name), args=args):
             return FUNCTIONS[name][1](*(_value(argument, values) for argument in args))
-    raise AssertionError(node)  # `read` lets nothing else through
+    raise AssertionError(node)  # `read` accepts no other node
 
 
 def _combined(op: ast.operator, a: Value, b: Value) -> Value:
@@ -152,7 +152,7 @@ def _larger(a: Value, b: Value) -> Value:
     return np.maximum(a, b)
 
 
-FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # how many arguments, and what it is
+FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # number of arguments, function
     "exp": (1, _exp),
     "log": (1, _log),
     "sqrt": (1, lambda x: _combined(ast.Pow(), x, 0.5)),
@@ -326,7 +326,7 @@ class DeclaredOfCurves(DeclaredMechanism):
     kinds = ("indentation",)
     stage = Stage.CURVE
     needs_axes = "of every sample"
-    start_times: Mapping[str, float] | None = None  # when each recording begins [s], by its id
+    start_times: Mapping[str, float] | None = None  # start of each recording [s], by its id
 
     def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredOfCurves":
         """A copy bound to the recordings of a campaign."""

@@ -29,12 +29,12 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
     values: dict[str, float] = {
         key.removeprefix("law_"): float(value) for key, value in provenance["parameters"].items()
     }
-    expressions, bending = _expressions(law, provenance["law"], values)
+    expressions, logarithmic = _expressions(law, provenance["law"], values)
     units = {parameter["name"]: parameter["unit"] for parameter in law.get("parameters", ())}
     strengths = {key for key in values if key.startswith(("change", "lag"))} or {"exponent"}
     parameters: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
-        if key in bending:
+        if key in logarithmic:
             declared = _logarithmic(value)
         elif key in _POSITIONS:
             declared = _within(next(iter(law["range"].values())))
@@ -73,7 +73,7 @@ def _within(ends: Sequence[float]) -> dict[str, Any]:
     return {"low": float(f"{low + margin:.6g}"), "high": float(f"{high - margin:.6g}")}
 
 
-_BENDING = {  # what lies on a logarithmic scale
+_LOGARITHMIC = {  # parameters with a logarithmic scale
     *("growth_length", "approach", "period", "width", "corner", "centre", "damping"),
 }
 
@@ -81,10 +81,10 @@ _BENDING = {  # what lies on a logarithmic scale
 def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float]) -> tuple[list[str], set[str]]:
     """The law's expressions, and which of its parameters have a logarithmic scale."""
     parts = name.removeprefix(PREFIX).split("__")
-    bending = {key for key in values if key in _BENDING}
+    logarithmic = {key for key in values if key in _LOGARITHMIC}
     if law["axis"] == "frequency_hz":
         low, high = next(iter(law["range"].values()))
-        return [_over_frequency(parts[-1], float(np.sqrt(low * high)))], bending
+        return [_over_frequency(parts[-1], float(np.sqrt(low * high)))], logarithmic
     ends = next(iter(law["range"].values()))
     if law["form"] == "free" or not all(isinstance(end, int | float) for end in ends):
         raise InvalidInput(
@@ -94,27 +94,27 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
     low, high = (float(end) for end in ends)
     form = parts[parts.index("relative") + 1 if "relative" in parts else 2]
     variant = parts[-1]
-    if law["form"] in ("peak", "notch") and "centre" in bending:
-        bending.discard("centre")  # along an axis of recordings the centre may be negative
+    if law["form"] in ("peak", "notch") and "centre" in logarithmic:
+        logarithmic.discard("centre")  # along an axis of recordings the centre may be negative
     kind = next((part for part in parts if part in ("angle", "delay", "power", "corner")), None)
     if law["acts_on"] == "frequency_response":
         raise InvalidInput("report", kind, "a lag that follows an axis of the recordings: write its file by hand")
     amplitudes = [key for key in values if key.startswith("change")]
     if law["axis"] in OF_SAMPLES and form == "power":
         growing = f"change * ({x} / {high:.6g}) ** exponent"
-        return [growing if law["acts_on"] in _ADDS else f"1 + {growing}"], {*bending, "exponent"}
+        return [growing if law["acts_on"] in _ADDS else f"1 + {growing}"], {*logarithmic, "exponent"}
     if law["axis"] in OF_SAMPLES and form == "step":
         raise InvalidInput("report", form, "a step where the sphere turns back is no expression: it cannot be kept")
     shape = _SHAPES[form](x, low, high, variant)
     if form == "power" and law["acts_on"] != "position":
         middle = float(np.sqrt(low * high))
-        return [f"({x}/{middle:.6g}) ** {amplitudes[0]}"], bending
+        return [f"({x}/{middle:.6g}) ** {amplitudes[0]}"], logarithmic
     features = len(shape)
     changes = [
         " + ".join(f"{key} * {feature}" for key, feature in zip(amplitudes[first:], shape, strict=False))
         for first in range(0, len(amplitudes), features)
     ]
-    return [change if law["acts_on"] in _ADDS else f"1 + {change}" for change in changes], bending
+    return [change if law["acts_on"] in _ADDS else f"1 + {change}" for change in changes], logarithmic
 
 
 def _linear(x: str, low: float, high: float, variant: str) -> list[str]:

@@ -70,7 +70,7 @@ class Adhesion(Mechanism):
         return (_WORK, _SEPARATION) if back else (_WORK,)
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """By the least forces on both ways: -4πwR/3 where a sphere snaps in, -5πwR/6 to -3πwR/2 where it parts."""
+        """From the least forces on both ways: -4πwR/3 at snap-in, -5πwR/6 to -3πwR/2 at pull-off."""
         measured = [recording for recording in conditions.recordings if isinstance(recording, IndentationRecording)]
         if kind != "indentation" or not measured:
             return ()
@@ -99,7 +99,7 @@ def _comes_back(recording: IndentationConditions) -> bool:
 
 
 def _works(recording: IndentationRecording) -> tuple[float, float]:
-    """What the least forces on the way in and on the way back would be with -4πwR/3 and -3πwR/2 [J/m²]."""
+    """Works of adhesion and separation [J/m²] for which the least forces on both ways are -4πwR/3 and -3πwR/2."""
     features = course(recording.displacement_mm, recording.force_n, recording.time_s)
     force = recording.force_n - features.zero
     radius = float(to_si("indenter_radius_mm", recording.indenter_radius_mm))

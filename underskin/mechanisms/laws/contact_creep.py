@@ -75,7 +75,8 @@ class ContactCreep(Mechanism):
     parameters_stated = _ONE_PAIR
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """One Prony pair, or for indentations two: their sum, mean time, how far apart they lie, and their shares."""
+        """One Prony pair, or for indentations two: sum of the fractions, mean time, ratio of the times, and share of
+        the first."""
         if kind != "indentation":
             return _ONE_PAIR
         fraction, time, *shares = _TWO_PAIRS
@@ -92,7 +93,7 @@ class ContactCreep(Mechanism):
         return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
 
     def told(self, values: Mapping[str, float]) -> str:
-        """Of two pairs, what each relaxes and in which time; of two that have one time, what both do."""
+        """For two pairs the relaxed percentage and time of each; of both together where the times are equal."""
         if "time_spread" not in values:
             return ""
         fraction, share = values["relaxed_fraction"], values["first_share"]
@@ -105,7 +106,7 @@ class ContactCreep(Mechanism):
         return f"The force relaxes by {first} and by {second}."
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
+        """Times must be independent of the loads: dwell_s that differ, or time_s that does not follow displacement."""
         if kind != "frf":
             curves = [
                 recording
@@ -144,7 +145,7 @@ class ContactCreep(Mechanism):
 
 
 def _times(conditions: Conditions) -> list[Floats]:
-    """Those of the indentations that have them [s]."""
+    """The times of the indentations that have them [s]."""
     indentations = (recording for recording in conditions.recordings if isinstance(recording, IndentationConditions))
     return [
         recording.time_s for recording in indentations if recording.time_s is not None and len(recording.time_s) > 1
@@ -152,7 +153,7 @@ def _times(conditions: Conditions) -> list[Floats]:
 
 
 def _again(conditions: Conditions) -> str | None:
-    """The first indentation that goes in again after it had come back."""
+    """A refusal of the first indentation that presses in again after its way back; None without one."""
     for recording in conditions.recordings:
         if isinstance(recording, IndentationConditions) and _presses_again(recording.displacement_mm):
             return (

@@ -46,8 +46,8 @@ class ContactResonance(Mechanism):
     )
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """The mass that has the resonances which recordings show on the base model's contacts, and their damping; a
-        larger one as well, from which a fit finds a sharp resonance that other contacts have elsewhere."""
+        """The tip mass and damping of the resonances that recordings show on the base model's contacts; and a
+        broader one, from which a fit finds a sharp resonance at other contacts' frequencies."""
         return _shown(conditions)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:

@@ -13,7 +13,7 @@ from underskin.recordings.campaign import Conditions, IndentationConditions
 
 _THICKNESS = "layer_thickness"
 _USUAL, _SD = 5.0, 1.5  # contact radii, and of the logarithm
-_LEAST, _MOST = 0.3, 300.0  # contact radii: beyond the solved layers, and where nothing shows of the base
+_LEAST, _MOST = 0.3, 300.0  # contact radii: beyond the solved layers, and where the base has no effect
 _REASON = "nobody declared it: 5 contact radii within a factor of 4.5, at 30 the base raises the force by 4 %"
 
 

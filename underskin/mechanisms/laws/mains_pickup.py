@@ -64,7 +64,7 @@ class MainsPickup(Mechanism):
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
     def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup:
-        """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
+        """On the lines within reach of the mains that stand out, each by its nearest harmonic."""
         return _pickup(conditions, design)
 
 
@@ -95,9 +95,9 @@ def _outstanding_mains(conditions: Conditions) -> float:
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:
-    """How much further the lines that these mains reach stray from a straight line between those that none reach than
-    the next ones do from each other: Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, the score of a variance of that
-    shape in units of its own scatter."""
+    """A score for pick-up at these mains: the scatter of the lines that they reach about a straight line between the
+    others, against the scatter of neighbouring other lines, Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, in
+    standard deviations."""
     score = weight = 0.0
     reaches: dict[bytes, _Reach] = {}  # most recordings have the same lines
     for lines in recordings:
@@ -118,8 +118,8 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
 
 @dataclass(frozen=True)
 class _Reach:
-    """Of the lines of a recording: those that the mains reach, `near` with their shape, the others, and of each near
-    one which of every second other are next to it."""
+    """Indices of a recording's lines: `near`, reached by the mains, with their `shape`; `far`, the others;
+    `neighbours`, for each near line the nearest of every second far one."""
 
     near: Indices
     shape: Floats
@@ -135,7 +135,7 @@ class _Reach:
 
 
 def _stray(lines: Frf, size: Floats, rows: Indices, neighbours: Indices) -> Floats:
-    """How far rows are from a straight line between others, relative to `size`."""
+    """The distance of rows from a straight line between `neighbours`, relative to `size`."""
     between = np.interp(lines.frequency[rows], lines.frequency[neighbours], lines.values[neighbours])
     return np.asarray(np.abs(lines.values[rows] - between) / size[rows])
 

@@ -40,7 +40,7 @@ class Misalignment(Mechanism):
     def parameters_with(
         self, others: Collection[Mechanism], conditions: Conditions, kind: Kind
     ) -> tuple[Parameter, ...]:
-        """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
+        """As `parameters`; the charge of neighbours, which lie in known directions, determines the direction too."""
         directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
         shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(

@@ -9,7 +9,7 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter, Uniform
 from underskin.recordings.campaign import CompressionConditions, Conditions
 
-_LEAST_SHAPE_RATIO = 1.05  # of S²: samples that differ by less tell friction from the modulus no better than noise
+_LEAST_SHAPE_RATIO = 1.05  # of S²: with a smaller ratio, friction and modulus cannot be separated
 _FRICTIONS = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95)  # even quantiles of its prior
 _REASON = "from well oiled to bonded: nothing is known beforehand"
 

@@ -125,8 +125,8 @@ class StrainStiffening(Mechanism):
         return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
 
     def shared_parameters(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
-        """s of 1 + s ε where the law of an indentation has strained ε = 0.1: how much stiffer than at no strain, over
-        that. A cylinder strains so much more that its law says nothing of so little."""
+        """s of 1 + s ε for the law of an indentation: the relative increase of the modulus at ε = 0.1, over ε. A
+        cylinder is strained so much more that its law gives no information on such small strains."""
         if kind == "frf":
             return values
         if kind == "compression":
@@ -141,7 +141,7 @@ class StrainStiffening(Mechanism):
         return {"stiffening": (factor - 1.0) / _COMPARED}
 
     def told(self, values: Mapping[str, float]) -> str:
-        """Of a compression, that it is softer than a neo-Hookean solid where it is."""
+        """That a compressed sample is softer than a neo-Hookean solid, where it is."""
         softer = values.get("second_over_first", 0.0) < 0
         return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
 

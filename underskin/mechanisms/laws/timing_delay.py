@@ -42,7 +42,7 @@ class TimingDelay(Mechanism):
     )  # fmt: skip
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """The delay that the phases of all recordings show: beyond a turn over the band no fit finds it from afar."""
+        """The delay of all recordings' phases: beyond one turn over the band no fit converges to it from afar."""
         return _shown(conditions)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:

@@ -15,7 +15,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 __all__ = ["Model", "Prediction", "compose"]
 
 
-# The `parameters` of each are the mechanisms' own, in order of composition, then the nuisances. `valid` (rows,) is
+# The `parameters` of each are those of the mechanisms, in order of composition, then the nuisances. `valid` (rows,) is
 # decided by the declared values, before any fit: False where the contact or its offset lies beyond the tables from the
 # start; such rows are predicted by continuation and should not be fitted.
 Model = FrfModel | IndentationModel | CompressionModel

@@ -109,7 +109,7 @@ class MechanismInModels:
         return values
 
 
-_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # what each class has of its own
+_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # the hooks that each class overrides
 
 
 def _overridden(mechanism_type: type[Mechanism]) -> frozenset[str]:

@@ -347,8 +347,8 @@ def as_in_the_table(contacts: Contacts) -> bool:
 def _transforms(
     k: Floats, contacts: Contacts, pressed: PressedContacts, rho: Floats, layer: ContactCurves | None
 ) -> tuple[Floats, list[Differentiated]]:
-    """p̂ · M · disc (quantities, …, contacts, k): value, then derivatives by a/h, rT/h and further variables; and
-    those."""
+    """p̂ · M · disc (quantities, …, contacts, k), with derivatives by a/h, rT/h and further variables; and these
+    variables."""
     slip = np.zeros(1) if contacts.slip is None else contacts.slip.value
     of_layer = [x for x in (contacts.poisson_ratio, contacts.slip) if x is not None and x.slopes.any()]
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer, moving=bool(of_layer))

@@ -19,15 +19,15 @@ from underskin.physics.contact_curves import LARGEST_A_OVER_H
 from underskin.physics.sphere_law import LOAD_OF_REDUCED, WHOLE_OF_LOAD
 from underskin.units import Floats, Indices, Mask
 
-_STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and where the law ends
-_EXPONENTIAL = 1e-6  # |q| below which the stiffening is
+_STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and its upper limit
+_EXPONENTIAL = 1e-6  # |q| below which the stiffening is exponential
 _LARGEST_RATIO = math.log(100.0)  # of stiffening: Gent's law ends at its limit
 _STEPS = 60
-_TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is about its square
-_NO_CONTACT = 1e-15  # m, which stands for no radius
+_TOLERANCE = 3e-7  # of the contact radius, of the last step: the remaining error is about its square
+_NO_CONTACT = 1e-15  # m, the radius without contact
 _EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
-_LARGEST_CORRECTION = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
-LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) where the correction ends, which then stays
+_LARGEST_CORRECTION = 0.25  # of a tangent's step, by which curvature may correct the next start
+LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) beyond which the correction is constant
 
 Constants = tuple[float, float, float, float, float, float, float, float, float]  # the nine numbers of a body
 Four = tuple[float, float, float, float]

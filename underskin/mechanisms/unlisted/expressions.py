@@ -26,7 +26,7 @@ from underskin.mechanisms.unlisted.laws import PREFIX, LagLaw, LawDescription, R
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, AXES, ActsOn, Form
 from underskin.units import Array, Floats
 
-_ENTERS: tuple[tuple[ActsOn, str, tuple[Form, ...]], ...] = (  # where, what it follows, and the forms it may have there
+_ENTERS: tuple[tuple[ActsOn, str, tuple[Form, ...]], ...] = (  # quantity, axis, and forms
     ("modulus", "displacement_mm", ("linear", "power", "saturating", "threshold")),
     ("modulus", "time_s", ("linear", "power", "saturating", "threshold", "step")),
     ("gain", "force_n", ("linear", "power", "saturating", "threshold")),
@@ -39,7 +39,7 @@ _FORMS: Mapping[Form, float] = {
     "linear": 0.25, "power": 0.25, "saturating": 0.2, "threshold": 0.1, "step": 0.1, "periodic": 0.1, "peak": 0.1,
 }  # fmt: skip
 _RELATIVE, _OF_LARGEST = 0.2, 0.1  # sds of the prior: of a relative change; of the largest force or depth
-_MOST = 0.9  # what they are bounded by
+_MOST = 0.9  # bound of these changes
 _LEVELS = 31  # at which an axis is looked at
 _LEAST = 1e-6  # of the range: powers begin at 0
 TURN = "turn"  # the variant of a step
@@ -77,7 +77,7 @@ class CurveLaw(UnlistedLaw):
         }.get(acts_on, ("-", _RELATIVE, 1.0))
         amplitudes = changes("law_change", unit, share * largest, shape.count, _MOST / share)
         self.amplitudes = tuple(parameter.name for parameter in amplitudes)
-        self.parameters_bound = (*amplitudes, *shape.bending)
+        self.parameters_bound = (*amplitudes, *shape.shape_parameters)
         self.grid = shape.points
 
     def on_curve(self, curve: Curve, values: Values) -> None:
@@ -166,7 +166,9 @@ def _power(axis: Axis) -> Shape:
     def growing(x: Floats, values: Values) -> list[Feature]:
         return [exp(values["law_exponent"] * np.log(np.maximum(x / axis.high, _LEAST)))]
 
-    return Shape("power", growing, bending=(exponent,), grid=tuple((float(np.log(n)),) for n in (0.5, 2.0, 3.0)))
+    return Shape(
+        "power", growing, shape_parameters=(exponent,), grid=tuple((float(np.log(n)),) for n in (0.5, 2.0, 3.0))
+    )
 
 
 def of_samples(value: Differentiated) -> Differentiated:
@@ -242,7 +244,7 @@ def _signed(value: float) -> tuple[str, str]:
 
 
 def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitudes: list[float]) -> str:
-    """What is added to 1, with its sign first; of a power the factor."""
+    """The change added to 1, with its sign first; of a power the factor."""
     axis, shape = law.axis, law.shape
     a = amplitudes[0]
     sign, size = _signed(a)

@@ -43,7 +43,7 @@ class Shape:
     count: int = 1  # of features
     variant: str = ""
     share: float = 1.0
-    bending: tuple[Parameter, ...] = ()  # not amplitudes
+    shape_parameters: tuple[Parameter, ...] = ()  # not amplitudes
     grid: tuple[tuple[float, ...], ...] = ((),)  # their values that a screening tries
     logarithmic: bool = False  # the feature is that of the logarithm: a power
     needs_peak: bool = False
@@ -108,7 +108,7 @@ def _exponential(axis: Axis) -> list[Shape]:
         rate = axis.span / values["law_growth_length"]
         return [(exp(((x - axis.low) / axis.span) * rate) - 1.0) / (exp(rate) - 1.0)]
 
-    return [Shape("exponential", growing, bending=(length,), grid=_over(axis, (0.15, 0.4)))]
+    return [Shape("exponential", growing, shape_parameters=(length,), grid=_over(axis, (0.15, 0.4)))]
 
 
 def _saturating(axis: Axis) -> list[Shape]:
@@ -119,7 +119,7 @@ def _saturating(axis: Axis) -> list[Shape]:
         rate = axis.span / values["law_approach"]
         return [(1.0 - exp(((axis.low - x) / axis.span) * rate)) / (1.0 - exp(-rate))]
 
-    return [Shape("saturating", approaching, bending=(length,), grid=_over(axis, (0.06, 0.2, 0.6)))]
+    return [Shape("saturating", approaching, shape_parameters=(length,), grid=_over(axis, (0.06, 0.2, 0.6)))]
 
 
 def _threshold(axis: Axis) -> list[Shape]:
@@ -145,7 +145,9 @@ def _threshold(axis: Axis) -> list[Shape]:
         return [where(behind.value > 0, behind, 0.0)]
 
     laws = (("above", above), ("below", below))
-    return [Shape("threshold", law, variant=name, share=0.5, bending=(onset,), grid=grid) for name, law in laws]
+    return [
+        Shape("threshold", law, variant=name, share=0.5, shape_parameters=(onset,), grid=grid) for name, law in laws
+    ]
 
 
 def _step(axis: Axis) -> list[Shape]:
@@ -191,7 +193,7 @@ def _periodic(axis: Axis) -> list[Shape]:
             count=2,
             variant=str(index),
             share=1 / len(periods),
-            bending=(length,),
+            shape_parameters=(length,),
             grid=((float(np.log(period)),),),
         )
 
@@ -212,7 +214,7 @@ def _peak(axis: Axis) -> list[Shape]:
         away = (x - values["law_centre"]) / values["law_width"]
         return [1.0 / (1.0 + away * away)]
 
-    return [Shape("peak", peaking, bending=(centre, width), grid=grid, needs_peak=True)]
+    return [Shape("peak", peaking, shape_parameters=(centre, width), grid=grid, needs_peak=True)]
 
 
 def _free(axis: Axis) -> list[Shape]:

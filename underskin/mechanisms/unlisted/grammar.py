@@ -51,7 +51,7 @@ class _Law:
     form: Form
     variant: str
     amplitudes: tuple[Parameter, ...]
-    bending: tuple[Parameter, ...]
+    shape_parameters: tuple[Parameter, ...]
     grid: Sequence[Sequence[float]]
     factor: Factor
     share: float = 1.0
@@ -70,7 +70,7 @@ class FrequencyLaw(UnlistedLaw):
         self.variant = law.variant
         self.share = law.share
         self.amplitudes = tuple(parameter.name for parameter in law.amplitudes)
-        self.parameters_bound = (*law.amplitudes, *law.bending)
+        self.parameters_bound = (*law.amplitudes, *law.shape_parameters)
         self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
         self.factor = law.factor
         self.middle_hz = middle
@@ -227,7 +227,7 @@ def _phase_table(width: float) -> tuple[Floats, Floats]:
     stride = width / 60
     x = np.arange(-6 * width, 6 * width, stride) + stride / 2
     slope = -x / width**2 * np.exp(-0.5 * (x / width) ** 2)
-    at = np.linspace(-12 * width, 12 * width, 481)  # halfway between those, so that none meets the logarithm's pole
+    at = np.linspace(-12 * width, 12 * width, 481)  # midpoints, off the logarithm's pole
     kernel = -np.log(np.tanh(np.abs(x - at[:, None]) / 2))
     return at / width, np.asarray(kernel @ slope * stride / np.pi)
 
@@ -262,7 +262,9 @@ _CONSTANT = 4.0  # a constant is looked for along one axis of several
 _COLUMNS = 1.5  # axes that all columns of `conditions` count for
 _FREQUENCY = 0.5  # of the frequency response: laws over frequency only
 _POSITION_AXES = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
-_CONSTANTS: Mapping[ActsOn, tuple[str, tuple[str, ...]]] = {  # what does it by name, and the axes that show it best
+_CONSTANTS: Mapping[
+    ActsOn, tuple[str, tuple[str, ...]]
+] = {  # the mechanism of the catalogue, and the axes that show it best
     "modulus": ("modulus_error", ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")),
     "thickness": ("thickness_error", ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")),
     "position": ("misalignment", ("x_mm", "y_mm", "preload_n", "indenter_radius_mm")),
@@ -357,7 +359,7 @@ def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[s
 
 
 _ROUNDING = 1e-9  # of the range, by which a value may lie beyond it
-CAMPAIGN_SPECIFIC_AXES = ("order",)  # axes that say nothing of other recordings
+CAMPAIGN_SPECIFIC_AXES = ("order",)  # axes without meaning for other recordings
 
 
 def bound_to(
@@ -382,20 +384,20 @@ def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, M
         for candidate in every_axis(conditions, axis.origin)
         if candidate.name not in CAMPAIGN_SPECIFIC_AXES
     }
-    match = axes.get((axis.name, axis.relative))
-    if match is not None and axis.name == "previous_preload_n":
+    current = axes.get((axis.name, axis.relative))
+    if current is not None and axis.name == "previous_preload_n":
         timed = all(recording.recorded_at is not None for recording in frf_of(conditions))
-        match = match if timed else None  # nothing says which came before
-    if match is None:
+        current = current if timed else None  # the order is unknown
+    if current is None:
         return replace(axis, values=dict.fromkeys(ids, axis.low), range=(axis.low, axis.high)), np.zeros(
             len(ids), dtype=bool
         )
     if axis.words:
-        words = [match.words[round(value)] for value in match.of(ids)]
+        words = [current.words[round(value)] for value in current.of(ids)]
         inside = np.array([word in axis.words for word in words])
         indices = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
         return replace(axis, values=dict(zip(ids, indices, strict=True)), range=(axis.low, axis.high)), inside
-    values = match.of(ids)
+    values = current.of(ids)
     slack = _ROUNDING * axis.span
     inside = (values >= axis.low - slack) & (values <= axis.high + slack)
     clipped = np.clip(values, axis.low, axis.high).tolist()

@@ -38,7 +38,7 @@ _LOGS: Mapping[str, tuple[float, float]] = {  # s that are tabulated
 }
 _NODES, _NODES_OF_RADIUS = 22, 12
 _FURTHEST_MM, _DISTANCES = 2.0, 41  # beyond the largest offset; number of distances from the centre
-_FAINT = 1e-3  # of the largest level, below which a factor on it says nothing
+_FAINT = 1e-3  # of the largest level, below which a factor on it is ignored
 _ANY_LINE = np.array([1.0])  # Hz
 
 
@@ -231,7 +231,7 @@ class UnlistedLaw(Mechanism):
     screened_fits: tuple[Floats, ...] = ()  # fit coordinates from screenings
 
     def parameters(self, conditions: object, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The same for all campaigns: they are bound to one."""
+        """The bound parameters, whatever the campaign."""
         return self.parameters_bound
 
     parameters_bound: tuple[Parameter, ...]
@@ -271,7 +271,7 @@ class RecordingLaw(UnlistedLaw):
             usual = usual / 2
         amplitudes = changes("law_change", self._unit, usual, count)
         self.amplitudes = tuple(parameter.name for parameter in amplitudes)
-        self.parameters_bound = (*amplitudes, *shape.bending)
+        self.parameters_bound = (*amplitudes, *shape.shape_parameters)
         self.grid = shape.points
 
     def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
@@ -391,7 +391,7 @@ class LagLaw(UnlistedLaw):
         power = shape.logarithmic
         lags = changes("law_lag", "-", usual, shape.count)
         self.amplitudes = tuple(parameter.name for parameter in lags)
-        self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.bending)
+        self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.shape_parameters)
         self.grid = _EXPONENTS if power else shape.points
 
     def on(self, axis: Axis) -> "LagLaw":

@@ -4,7 +4,7 @@ from typing import Literal
 
 ActsOn = Literal["gain", "modulus", "thickness", "contact_radius", "force", "position", "frequency_response"]
 Form = Literal["linear", "power", "exponential", "saturating", "threshold", "step", "periodic", "peak", "notch", "free"]
-ACTS_ON: dict[ActsOn, tuple[str, str]] = {  # what it is called, and its symbol
+ACTS_ON: dict[ActsOn, tuple[str, str]] = {  # name and symbol
     "gain": ("gain of the charge", "Q"),
     "modulus": ("modulus", "E"),
     "thickness": ("thickness", "h"),
@@ -32,7 +32,7 @@ AXES: dict[str, tuple[str, str]] = {  # of built-in axes the words and the symbo
     "time_s": ("the time", "t"),
 }
 OF_SAMPLES = ("displacement_mm", "force_n", "time_s")  # axes of laws on curves
-OF_CURVES: dict[str, str] = {  # what laws act on there, and what it is called
+OF_CURVES: dict[str, str] = {  # quantities that laws of curves act on, with their names
     "modulus": "modulus",
     "gain": "gain of the cell",
     "force": "force that is read",
