@@ -40,9 +40,9 @@ def annotate(
     if json:
         write_json(document)
         return
-    noted = [f"tags: {', '.join(document['tags'])}"] if document["tags"] else []
-    noted += [f"notes: {document['remark']}"] if document["remark"] else []
-    typer.echo("; ".join([f"{_noun(campaign, skin)} is called {document[name_field] or document['id']}", *noted]))
+    remarks = [f"tags: {', '.join(document['tags'])}"] if document["tags"] else []
+    remarks += [f"notes: {document['remark']}"] if document["remark"] else []
+    typer.echo("; ".join([f"{_noun(campaign, skin)} is called {document[name_field] or document['id']}", *remarks]))
 
 
 def discard(

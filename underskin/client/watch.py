@@ -254,8 +254,8 @@ class Journal:
             return []
         except (OSError, ValueError, KeyError, TypeError) as error:
             self.close()
-            again = "move it away; what was sent is sent again then, and kept once"
-            raise UnderskinError(f"the journal {self._path} cannot be read: {error}; {again}") from error
+            advice = "move it away; what was sent is sent again then, and kept once"
+            raise UnderskinError(f"the journal {self._path} cannot be read: {error}; {advice}") from error
 
 
 def _line(record: JournalEntry) -> str:

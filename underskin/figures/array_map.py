@@ -132,12 +132,12 @@ def array_map(
         [go.Scatter(**ids, textfont={"size": 11 if len(sensors) <= 16 else 9, "color": INK}) for ids in below]
     )
     # In the legend as their discs are ringed.
-    for name, shown, border in (
+    for name, ringed_mask, border in (
         ("unknown", unknown, _EDGE),
         ("absent", away & plain, _ABSENT),
         ("stands out", ~plain, _OUTLIER),
     ):
-        if shown.any():
+        if ringed_mask.any():
             ringed = {"symbol": "circle-open", "size": 10, "color": border["color"], "line": border}
             figure.add_scatter(x=[None], y=[None], mode="markers", marker=ringed, name=_names(quantity)[name])
     discs = []
@@ -152,9 +152,9 @@ def array_map(
         discs.append(ring(x[sensors.index(chosen)], y[sensors.index(chosen)], radius))
     figure.update_layout(shapes=discs, showlegend=sum(trace.hoverinfo != "skip" for trace in figure.data) > 1)
     figure.update_layout(meta={"alike": _ALIKE, "unknown": _UNKNOWN})  # for a page, which has others in the dark
-    for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
+    for update, coordinates in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
         edge = 1.3 * max(radius, SHARE * distance)
-        update(range=[float(along.min()) - edge, float(along.max()) + edge])
+        update(range=[float(coordinates.min()) - edge, float(coordinates.max()) + edge])
     figure.update_xaxes(title="x [mm]", constrain="domain", showgrid=False, zeroline=False)
     figure.update_yaxes(
         title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False
@@ -218,8 +218,8 @@ def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str,
         low, high = min(0.0, float(finite.min())), max(0.0, float(finite.max()))
         return _SCALE, low, high if high > low else 1.0
     middle = 0.0 if quantity.against in _FROM_ZERO else float(np.median(finite))
-    sure = uncertainty[np.isfinite(uncertainty)]
-    by_chance = threshold(len(finite)) * float(np.median(sure)) if len(sure) else 0.0
+    finite_uncertainty = uncertainty[np.isfinite(uncertainty)]
+    by_chance = threshold(len(finite)) * float(np.median(finite_uncertainty)) if len(finite_uncertainty) else 0.0
     sizes = np.abs(finite - middle)
     coloured = np.abs(value - middle)[_coloured(value, uncertainty, quantity) & np.isfinite(value)]
     most = _FAR * float(np.quantile(coloured, _MOST)) if len(coloured) else np.inf

@@ -71,10 +71,10 @@ def design_region(
     return styled(figure, "Which skins resolve it", 520).update_layout(margin={"l": 70, "r": 20, "t": 90, "b": 150})
 
 
-def _pitches(shown: Floats) -> dict[str, Any]:
+def _pitches(pitches: Floats) -> dict[str, Any]:
     """A scale from the smallest to the largest, unless these are nearly equal."""
-    high = float(np.max(shown, initial=0.0)) or 1.0
-    low = min(float(np.min(shown, initial=high)), (1 - _LEAST_SPAN) * high)
+    high = float(np.max(pitches, initial=0.0)) or 1.0
+    low = min(float(np.min(pitches, initial=high)), (1 - _LEAST_SPAN) * high)
     return {"colorscale": "Cividis", "zmin": low, "zmax": high, "colorbar": _BAR}
 
 

@@ -89,7 +89,7 @@ def strengths(parameters: Sequence[Parameter]) -> list[list[float]]:
     if not any(_is_strength(parameter) for parameter in parameters):
         return [[usual(parameter) for parameter in parameters]]
     for factors in (STRENGTHS, _WEAKER):
-        rows = [[_at(parameter, factor) for parameter in parameters] for factor in factors]
+        rows = [[_scaled(parameter, factor) for parameter in parameters] for factor in factors]
         pairs = [pair for row in rows for pair in zip(parameters, row, strict=True)]
         if all(parameter.bounds[0] <= at <= parameter.bounds[1] for parameter, at in pairs):
             break
@@ -190,7 +190,7 @@ def usual(parameter: Parameter) -> float:
     return parameter.typical if parameter.shown is None else parameter.to_fit(parameter.shown)
 
 
-def _at(parameter: Parameter, factor: float) -> float:
+def _scaled(parameter: Parameter, factor: float) -> float:
     """`factor` times the distance from the limit; shape parameters are unchanged."""
     middle = usual(parameter)
     if not _is_strength(parameter):

@@ -56,7 +56,7 @@ def law_twins(table: SigmaTable) -> Mapping[str, tuple[Twin, ...]]:
         change = _relative(model.predict(fit).value - prediction.value, prediction.value)
         change = change - nuisances.T @ (projection @ change)
         directions[name] = change / np.linalg.norm(change)
-    return {name: _alike(name, directions) for name in directions}
+    return {name: _ranked_twins(name, directions) for name in directions}
 
 
 def _relative(change: Array, response: Array) -> Floats:
@@ -65,7 +65,7 @@ def _relative(change: Array, response: Array) -> Floats:
     return np.concatenate([relative.real, relative.imag])
 
 
-def _alike(name: str, directions: Mapping[str, Floats]) -> tuple[Twin, ...]:
+def _ranked_twins(name: str, directions: Mapping[str, Floats]) -> tuple[Twin, ...]:
     mechanism = CATALOGUE[name]
     twins = []
     for other in directions:

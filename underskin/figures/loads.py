@@ -44,8 +44,8 @@ def loaded_array(
             hovertemplate="%{text}: x %{x:.4g} mm, y %{y:.4g} mm<extra></extra>",
             marker={"symbol": "x-thin", "size": 14, "line": {"width": 3, "color": "#D55E00"}},
         )
-        for axis, along in ((figure.layout.xaxis, 0), (figure.layout.yaxis, 1)):
-            positions = [position[along] for position in loads_mm]
+        for axis, coordinate in ((figure.layout.xaxis, 0), (figure.layout.yaxis, 1)):
+            positions = [position[coordinate] for position in loads_mm]
             low, high = axis.range
             room = _ROOM * (max(high, *positions) - min(low, *positions))
             axis.range = [min(low, min(positions) - room), max(high, max(positions) + room)]
@@ -127,8 +127,10 @@ def stress_on_base(
             hoverinfo="skip",
             line=line,
         )
-    for update, along in ((figure.update_xaxes, stress.x_mm), (figure.update_yaxes, stress.y_mm)):
-        update(range=[float(along[0]), float(along[-1])], constrain="domain", showgrid=False, zeroline=False)
+    for update, coordinates in ((figure.update_xaxes, stress.x_mm), (figure.update_yaxes, stress.y_mm)):
+        update(
+            range=[float(coordinates[0]), float(coordinates[-1])], constrain="domain", showgrid=False, zeroline=False
+        )
     figure.update_xaxes(title="x [mm]")
     figure.update_yaxes(title="y [mm]", scaleanchor="x", scaleratio=1)
     return styled(figure, "Stress on the base")

@@ -185,15 +185,15 @@ def _check_relative(parameter: Parameter, parameters: Sequence[Parameter]) -> No
 def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     """The prediction and its derivatives must be finite at the centres of the priors and at every bound."""
     campaign = reference_campaign(kind)
-    if _called(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
+    if _result_of(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
         return
     field = f"law ({kind})"
-    model = _called(field, lambda: _model(mechanism, campaign, kind))
+    model = _result_of(field, lambda: _model(mechanism, campaign, kind))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
     for fit, label in points:
         with np.errstate(all="ignore"):
-            answer = _called(f"{field} at {label}", partial(model.predict, fit))
+            answer = _result_of(f"{field} at {label}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
             raise not_finite(f"{field} at {label}", None, "gives numbers that are not finite")
@@ -204,8 +204,8 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
 def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
     """Evaluated at several points at once, as in a diagnosis, a law must give the values of single points."""
     with np.errstate(all="ignore"):
-        batch = _called(f"{field} at several points", lambda: model.respond(fits))
-        singles = joined([_called(field, partial(model.respond, fit[None])) for fit in fits])
+        batch = _result_of(f"{field} at several points", lambda: model.respond(fits))
+        singles = joined([_result_of(field, partial(model.respond, fit[None])) for fit in fits])
     real = np.isrealobj(batch.level.value)
     _require(f"{field}, level", None, real, "must be real: a complex factor belongs in on_lines")
     allowed = "must be what each point gives alone: hooks must treat the last axis as rows and keep those before it"
@@ -235,10 +235,10 @@ def _points(parameters: Sequence[Parameter], nuisances: Sequence[Parameter]) -> 
 
 
 def _parameters(mechanism: Mechanism, kind: Kind) -> tuple[Parameter, ...]:
-    return _called("parameters", lambda: mechanism.parameters(reference_campaign(kind), kind))
+    return _result_of("parameters", lambda: mechanism.parameters(reference_campaign(kind), kind))
 
 
-def _called(field: str, function: Callable[[], T]) -> T:
+def _result_of(field: str, function: Callable[[], T]) -> T:
     """The result of another package's code; an exception becomes InvalidInput for the field."""
     try:
         return function()

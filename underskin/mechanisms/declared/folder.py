@@ -29,7 +29,7 @@ def in_folder() -> LabFolder:
     for file in _files():
         try:
             content = _content(file)
-            usable.append((checked(content, _shown(file)), f"{file.name} {sha256(content).hexdigest()[:12]}"))
+            usable.append((checked(content, _printable(file)), f"{file.name} {sha256(content).hexdigest()[:12]}"))
         except FileError as error:
             refused.append(error)
     return LabFolder(tuple(usable), tuple(refused))
@@ -67,8 +67,8 @@ def _files() -> Iterator[Path]:
 
 def _content(file: Path) -> bytes:
     """At most one byte more than a document may have; raises FileError where the file cannot be read."""
-    if _shown(file) != str(file):
-        raise FileError(_shown(file), "", "its name must be UTF-8")
+    if _printable(file) != str(file):
+        raise FileError(_printable(file), "", "its name must be UTF-8")
     if not file.is_file():  # a pipe would be waited for
         raise FileError(str(file), "", "is no file")
     try:
@@ -78,5 +78,5 @@ def _content(file: Path) -> bytes:
         raise FileError(str(file), "", f"cannot be read: {error.strerror}") from None
 
 
-def _shown(file: Path) -> str:
+def _printable(file: Path) -> str:
     return os.fsencode(file).decode("utf-8", "replace")

@@ -63,11 +63,11 @@ class Adhesion(Mechanism):
         """The work of adhesion, and of separation where an indentation has a way back."""
         if kind == "frf":
             return self.parameters_stated
-        back = any(
+        returns = any(
             isinstance(recording, IndentationConditions) and _comes_back(recording)
             for recording in conditions.recordings
         )
-        return (_WORK, _SEPARATION) if back else (_WORK,)
+        return (_WORK, _SEPARATION) if returns else (_WORK,)
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """From the least forces on both ways: -4πwR/3 at snap-in, -5πwR/6 to -3πwR/2 at pull-off."""
@@ -75,12 +75,12 @@ class Adhesion(Mechanism):
         if kind != "indentation" or not measured:
             return ()
         works = np.array([_works(recording) for recording in measured])
-        snapping, parting = np.clip(np.median(works, axis=0), _WORK.low, _WORK.high)
+        snap_in, pull_off = np.clip(np.median(works, axis=0), _WORK.low, _WORK.high)
         if len(self.parameters(conditions, kind)) == 1:
-            return [(snapping,)]
-        parting = max(parting, snapping)
+            return [(snap_in,)]
+        pull_off = max(pull_off, snap_in)
         return [
-            (work, max(share * parting, work)) for work in (snapping, 0.5 * parting, parting) for share in (1.0, 1.8)
+            (work, max(share * pull_off, work)) for work in (snap_in, 0.5 * pull_off, pull_off) for share in (1.0, 1.8)
         ]
 
     def on_material(self, contacts: Contacts, values: Values) -> None:

@@ -118,7 +118,7 @@ class ContactCreep(Mechanism):
                 return f"recording {lacking[0]!r} has no time_s"
             if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
-            return _again(conditions)
+            return _repeated_press(conditions)
         dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
         lacking = [name for name, value in dwell.items() if value is None]
         if lacking:
@@ -152,7 +152,7 @@ def _times(conditions: Conditions) -> list[Floats]:
     ]
 
 
-def _again(conditions: Conditions) -> str | None:
+def _repeated_press(conditions: Conditions) -> str | None:
     """A refusal of the first indentation that presses in again after its way back; None without one."""
     for recording in conditions.recordings:
         if isinstance(recording, IndentationConditions) and _presses_again(recording.displacement_mm):
@@ -164,6 +164,6 @@ def _again(conditions: Conditions) -> str | None:
 
 def _presses_again(displacement: Floats) -> bool:
     least = _RETURN * np.ptp(displacement)
-    back = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
-    after = displacement[back[0] :] if len(back) else displacement[:1]
+    returned = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
+    after = displacement[returned[0] :] if len(returned) else displacement[:1]
     return bool((after - np.minimum.accumulate(after)).max() > least)

@@ -48,7 +48,7 @@ class ContactResonance(Mechanism):
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """The tip mass and damping of the resonances that recordings show on the base model's contacts; and a
         broader one, from which a fit finds a sharp resonance at other contacts' frequencies."""
-        return _shown(conditions)
+        return _resonance_guesses(conditions)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """The tip's transfer function."""
@@ -59,7 +59,7 @@ class ContactResonance(Mechanism):
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
-def _shown(conditions: Conditions) -> list[tuple[float, float]]:
+def _resonance_guesses(conditions: Conditions) -> list[tuple[float, float]]:
     """Tip mass [g] and damping ratio."""
     skin = conditions.skin
     measured = [recording for recording in conditions.recordings if isinstance(recording, FrfRecording)]

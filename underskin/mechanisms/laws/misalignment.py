@@ -42,12 +42,12 @@ class Misalignment(Mechanism):
     ) -> tuple[Parameter, ...]:
         """As `parameters`; the charge of neighbours, which lie in known directions, determines the direction too."""
         directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
-        shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
+        figure_values, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
             Parameter(
                 name, "mm", low, _LARGEST_MM, HeavyTailed(0.0, 0.7), "linear", limit=0.0, shown=value, reason=_REASON
             )
-            for name, value in shown.items()
+            for name, value in figure_values.items()
         )
 
     def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:

@@ -43,7 +43,7 @@ class TimingDelay(Mechanism):
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """The delay of all recordings' phases: beyond one turn over the band no fit converges to it from afar."""
-        return _shown(conditions)
+        return _delay_guess(conditions)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """exp(−iωt0)."""
@@ -51,7 +51,7 @@ class TimingDelay(Mechanism):
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
-def _shown(conditions: Conditions) -> list[tuple[float]]:
+def _delay_guess(conditions: Conditions) -> list[tuple[float]]:
     """The delay [µs]."""
     measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]
     delay = common_delay(stacked(measured)) if measured else 0.0

@@ -42,16 +42,16 @@ _WIDE_SD = 1.5  # of the logarithm of an undeclared modulus
 
 def frf_nuisances(skin: SkinDescription) -> tuple[Parameter, ...]:
     """d33, and the factors on the declared modulus and thickness, within the skin's tolerances where stated."""
-    off = skin.tolerances
-    if off is None:
+    tolerances = skin.tolerances
+    if tolerances is None:
         return D33, YOUNGS_MODULUS, THICKNESS
-    return D33, _within(YOUNGS_MODULUS, off.youngs_modulus_percent), thickness_parameter(skin)
+    return D33, _within(YOUNGS_MODULUS, tolerances.youngs_modulus_percent), thickness_parameter(skin)
 
 
 def thickness_parameter(skin: SkinDescription) -> Parameter:
     """The factor on the declared thickness."""
-    off = skin.tolerances
-    return THICKNESS if off is None else _within(THICKNESS, off.thickness_percent)
+    tolerances = skin.tolerances
+    return THICKNESS if tolerances is None else _within(THICKNESS, tolerances.thickness_percent)
 
 
 def _within(factor: Parameter, percent: float) -> Parameter:

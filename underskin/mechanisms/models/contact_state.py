@@ -143,6 +143,6 @@ def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurve
     by_alpha, by_poisson_ratio, by_slip = at_radius.slopes.reshape(-1, *shape)
     terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
     terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]
-    held = chain(at_radius.value.reshape(shape), *terms) * alpha * contacts.thickness
-    held = 2.0 * contacts.reduced_modulus * held
-    return held if contacts.relaxed is None else held / contacts.relaxed
+    result = chain(at_radius.value.reshape(shape), *terms) * alpha * contacts.thickness
+    result = 2.0 * contacts.reduced_modulus * result
+    return result if contacts.relaxed is None else result / contacts.relaxed

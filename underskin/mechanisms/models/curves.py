@@ -203,8 +203,8 @@ class CompressionModel(CurveModel):
         relaxation = curve.prony_pairs
         if relaxation is not None:
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
-        every = np.ones(force.shape, dtype=bool)
-        return force, every, every
+        all_samples = np.ones(force.shape, dtype=bool)
+        return force, all_samples, all_samples
 
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
         """Nominal stress over E, compression positive.

@@ -256,8 +256,8 @@ class FrfModels:
         repeated = np.tile(np.arange(positions), nodes)
         sigma = of_contacts.at(contact, offset.spread(positions)[repeated] if nodes > 1 else offset)
         near = (offset.value <= table.end) & (offset.value + of_contacts.rho.value <= PROFILE_END)
-        reached = of_contacts.inside[..., contact]
-        inside = near & reached.reshape(*reached.shape[:-1], nodes, positions).all(axis=-2)
+        contact_inside = of_contacts.inside[..., contact]
+        inside = near & contact_inside.reshape(*contact_inside.shape[:-1], nodes, positions).all(axis=-2)
         return [sigma[positions * node : positions * (node + 1)] for node in range(nodes)] if nodes > 1 else [
             sigma
         ], inside
@@ -412,8 +412,8 @@ class FrfModel:
             max(1 / parameter.low, parameter.high) for parameter in self.parameters if parameter.name == "thickness"
         )
         stretch = _ROOM * bounds * max((mechanism.largest_stretch for mechanism in room), default=1.0)
-        reached = min(PROFILE_END, stretch * largest_offset(design, further) / self.thickness)
-        self.sigma = offset_sigma(table, self.sensor_radius / self.thickness, stretch, reached)
+        offset_range = min(PROFILE_END, stretch * largest_offset(design, further) / self.thickness)
+        self.sigma = offset_sigma(table, self.sensor_radius / self.thickness, stretch, offset_range)
         self.needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
         pickups = [mechanism.pickup(conditions, design) for mechanism in self.mechanisms]
         self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])

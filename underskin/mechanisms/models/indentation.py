@@ -271,12 +271,12 @@ def edges(sphere: Sphere, travel: Floats, contact_mask: Mask, work: Floats, sepa
     The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of
     `separation`, and rests in between.
     """
-    parting = work if separation is None else separation
-    least, _ = sphere.pull_off(parting)
+    receding_work = work if separation is None else separation
+    least, _ = sphere.pull_off(receding_work)
     if separation is None:
         return sphere.radius_at(travel, work, least)
     first_least, _ = sphere.pull_off(work)
-    advancing, receding = sphere.radius_at(travel, work, first_least), sphere.radius_at(travel, parting, least)
+    advancing, receding = sphere.radius_at(travel, work, first_least), sphere.radius_at(travel, receding_work, least)
     a = np.empty_like(receding)
     edge_rows(advancing, receding, contiguous(np.broadcast_to(contact_mask, a.shape)), a)
     return a
@@ -328,26 +328,38 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     least, lowest = sphere.pull_off(work)
     contact_mask = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
     a = sphere.radius_at(depth, work, np.maximum(least, 1e-12))
-    force, stiffness, slack, parting, stiffer = _elastic(sphere, a, adhesion)
+    force, stiffness, advancing_stretch, receding_stretch, stiffer = _elastic(sphere, a, adhesion)
     force = np.where(contact_mask, force, 0.0)
     depth_memory, force_memory = memories(depth, time, relaxation), memories(force, time, relaxation)
     growing = relaxation.convolved(force, force_memory)
     record = np.maximum.accumulate(np.where(depth >= np.maximum.accumulate(depth, axis=-1), number, 0), axis=-1)
     record = np.maximum(record, first_contact)
-    back = started & (record < number)
-    if not back.any():
+    returning = started & (record < number)
+    if not returning.any():
         return np.where(contact_mask, stiffer * growing, 0.0), contact_mask
-    edge, carried, memory_force = (np.zeros(depth.shape) for _ in range(3))
+    edge, relaxed_depth, memory_force = (np.zeros(depth.shape) for _ in range(3))
     stuck = np.zeros(depth.shape, dtype=bool)
-    reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, first_contact[..., 0])
-    creep_edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, memory_force, stuck)
-    answer, columns = stiffer * growing, np.s_[..., np.flatnonzero(back.any(axis=(0, 1)))]
+    inputs = (
+        depth,
+        time,
+        depth_memory,
+        advancing_stretch,
+        receding_stretch,
+        force,
+        force_memory,
+        record,
+        first_contact[..., 0],
+    )
+    creep_edge_rows(
+        *map(contiguous, inputs), *relaxation.of_points(len(depth)), edge, relaxed_depth, memory_force, stuck
+    )
+    answer, columns = stiffer * growing, np.s_[..., np.flatnonzero(returning.any(axis=(0, 1)))]
     a = sphere.radius_at(contiguous(edge[columns]), work, np.maximum(least, 1e-12))
     ring, stiffness, _, _, stiffer_ring = _elastic(sphere, a, adhesion)
-    receding = stiffer_ring * (relaxation.unrelaxed * ring + memory_force[columns] + stiffness * carried[columns])
-    answer[columns] = np.where(back[columns], receding, answer[columns])
-    contact_mask = np.where(back, stuck, contact_mask)
-    touch = back & ~contact_mask
+    receding = stiffer_ring * (relaxation.unrelaxed * ring + memory_force[columns] + stiffness * relaxed_depth[columns])
+    answer[columns] = np.where(returning[columns], receding, answer[columns])
+    contact_mask = np.where(returning, stuck, contact_mask)
+    touch = returning & ~contact_mask
     if touch.any() and adhesion is not None:
         of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
         answer, contact_mask = np.where(touch, of_touch, answer), np.where(touch, holds, contact_mask)
@@ -394,8 +406,8 @@ def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floa
     if adhesion is None:
         none = np.zeros_like(force)
         return force, stiffness, none, none, stiffer
-    stretch, parting = unit * np.sqrt(adhesion.work), unit * np.sqrt(adhesion.separation)
-    return force - stiffness * stretch, stiffness, stretch, parting, stiffer
+    stretch, receding_stretch = unit * np.sqrt(adhesion.work), unit * np.sqrt(adhesion.separation)
+    return force - stiffness * stretch, stiffness, stretch, receding_stretch, stiffer
 
 
 def _first_touch(

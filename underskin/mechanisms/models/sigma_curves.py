@@ -161,11 +161,11 @@ class OffsetSigma:
         rho = np.asarray(rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes), dtype=np.float64)
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
-        along = CubicBasis(radii)
+        radial_basis = CubicBasis(radii)
         self._of_rho, self._of_offset = of_rho, of_offset = CubicBasis(np.log(rho)), CubicBasis(offsets)
         self.end = min(float(offsets[-1]), PROFILE_END)
         # Splines and averages are all linear: the smaller arrays are turned into coefficients before their product
-        average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
+        average = np.stack([_disc_averages(radial_basis, np.abs(offsets), ratio) for ratio in rho])
         self._radii, self._average = radii, of_offset.coefficients(of_rho.coefficients(average, 0), 1)
         self.hertz = self._splines(*table.contact_axes, table.profile_over(radii))
         self._turns = float(offsets[-1] + rho[-1] + table.contact_axes[0][-1])
@@ -244,18 +244,25 @@ def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_o
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
-def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
+def _disc_averages(radial_basis: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
     """The matrix (offsets, radii) that averages a profile given at its radii over the offset disc; 0 beyond them."""
     from underskin.mechanisms.models.sigma_kernels import disc_averages
 
     x, weight = np.polynomial.legendre.leggauss(_RADIAL)
     radius = rt_over_h * (x + 1) / 2
     cosine = np.cos(np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR)
-    total = np.zeros((len(offsets), len(along.nodes)))
+    total = np.zeros((len(offsets), len(radial_basis.nodes)))
     disc_averages(
-        offsets, radius, weight * (x + 1) / 2 / _ANGULAR, cosine, along.nodes[-1], along.knots, along.cubics, total
+        offsets,
+        radius,
+        weight * (x + 1) / 2 / _ANGULAR,
+        cosine,
+        radial_basis.nodes[-1],
+        radial_basis.knots,
+        radial_basis.cubics,
+        total,
     )
-    return total @ along.to_coefficients
+    return total @ radial_basis.to_coefficients
 
 
 def _panels(highest: float) -> int:

@@ -168,7 +168,7 @@ def _travel(a: float, root_work: float, constants: Constants, cubics: Floats) ->
 
 
 @compiled()
-def _solved(aim: float, start: float, lowest: float, root_work: float, constants: Constants, cubics: Floats) -> Four:
+def _solved(target: float, start: float, lowest: float, root_work: float, constants: Constants, cubics: Floats) -> Four:
     """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: its radius, travel and slope.
 
     Newton steps, and halvings where one leaves the current bracket.
@@ -178,11 +178,11 @@ def _solved(aim: float, start: float, lowest: float, root_work: float, constants
     for _ in range(_STEPS):
         touching = radius
         at_touching, slope = _travel(radius, root_work, constants, cubics)
-        if at_touching > aim:
+        if at_touching > target:
             above = radius
         else:
             below, bounded = radius, True
-        step = (at_touching - aim) / slope if slope > 0 else 0.5 * radius
+        step = (at_touching - target) / slope if slope > 0 else 0.5 * radius
         radius = max(radius - min(max(step, -radius), 0.9 * radius), lowest)
         if slope > 0 and abs(radius - touching) <= _TOLERANCE * touching:
             break
@@ -214,23 +214,23 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
     last two samples' tangents gives a start for the next from which one step is mostly enough.
     """
     points, curves, samples = travel.shape
-    alike = work.shape[2] == 1 and body.shape[2] == 1
+    is_uniform = work.shape[2] == 1 and body.shape[2] == 1
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
             constants, root_work = _constants(body, point, curve, 0), math.sqrt(work[point, curve, 0])
             touching, at_touching, slope, curvature = 0.0, 0.0, 0.0, 0.0
             for sample in range(samples):
-                if not alike:
+                if not is_uniform:
                     constants = _constants(body, point, curve, sample)
                     root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
                 lowest = least[point, curve, min(sample, least.shape[2] - 1)]
-                aim, radius = travel[point, curve, sample], a[point, curve, sample]
-                if root_work == 0 and aim <= 0:  # not in contact, where Newton's steps would shrink without end
+                target, radius = travel[point, curve, sample], a[point, curve, sample]
+                if root_work == 0 and target <= 0:  # not in contact, where Newton's steps would shrink without end
                     a[point, curve, sample], slope = max(lowest, _NO_CONTACT), 0.0
                     continue
-                if alike and slope > 0:
-                    tangent = (aim - at_touching) / slope
+                if is_uniform and slope > 0:
+                    tangent = (target - at_touching) / slope
                     correction = 0.5 * curvature * tangent / slope
                     radius = min(
                         radius,
@@ -238,7 +238,7 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
                     )
                 before, former = touching, slope
                 radius, touching, at_touching, slope = _solved(
-                    aim, max(radius, lowest), lowest, root_work, constants, layer
+                    target, max(radius, lowest), lowest, root_work, constants, layer
                 )
                 curvature = (slope - former) / (touching - before) if former > 0 and touching != before else 0.0
                 a[point, curve, sample] = radius
@@ -291,7 +291,7 @@ def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, tr
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, boolean[:, :, ::1], {_ROWS})")
-def edge_rows(advancing: Floats, receding: Floats, held: Mask, a: Floats) -> None:
+def edge_rows(advancing: Floats, receding: Floats, contact_mask: Mask, a: Floats) -> None:
     """Fill the radius of an edge that advances to `advancing`, recedes to `receding`, and rests in between; it restarts
     after a sample out of contact."""
     points, curves, samples = a.shape
@@ -300,12 +300,12 @@ def edge_rows(advancing: Floats, receding: Floats, held: Mask, a: Floats) -> Non
             edge = 0.0
             for sample in range(samples):
                 forward = advancing[point, curve, sample]
-                if held[point, curve, sample] and edge > 0:
+                if contact_mask[point, curve, sample] and edge > 0:
                     edge = min(max(edge, forward), receding[point, curve, sample])
                 else:
                     edge = forward
                 a[point, curve, sample] = edge
-                if not held[point, curve, sample]:
+                if not contact_mask[point, curve, sample]:
                     edge = 0.0
 
 
@@ -342,23 +342,23 @@ def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) ->
 
 
 @compiled()
-def _carried(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) -> tuple[float, float]:
+def _relaxed_depth(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) -> tuple[float, float]:
     """H(s,t) of a ring reached at a depth and time, with the memory of depths then, and e(t−s)."""
     age = max(now[1] - time, 0.0)
-    carried, remaining = now[0] - depth, 1.0
+    relaxed_depth, remaining = now[0] - depth, 1.0
     for pair in range(len(pairs[0])):
         fraction, decay = pairs[0][pair], math.exp(-age / pairs[1][pair])
-        carried += fraction * (now[2][pair] - decay * memory[pair] - now[0] + depth)
+        relaxed_depth += fraction * (now[2][pair] - decay * memory[pair] - now[0] + depth)
         remaining -= fraction * (1.0 - decay)
-    return carried, remaining
+    return relaxed_depth, remaining
 
 
 @compiled()
 def _excess(ring: int, rings: Rings, pairs: Pairs, now: Now) -> float:
     """H(s,t) + ℓ_s − ℓ e(t−s) of a ring: at least 0 while it holds."""
-    depth, time, memory, slack, parting = rings
-    carried, remaining = _carried(depth[ring], time[ring], memory[ring], pairs, now)
-    return float(carried + parting[ring] - slack[ring] * remaining)
+    depth, time, memory, advancing_stretch, receding_stretch = rings
+    relaxed_depth, remaining = _relaxed_depth(depth[ring], time[ring], memory[ring], pairs, now)
+    return float(relaxed_depth + receding_stretch[ring] - advancing_stretch[ring] * remaining)
 
 
 @compiled()
@@ -388,7 +388,7 @@ def _last_sample(low: int, high: int, record: Indices, rings: Rings, pairs: Pair
 @compiled()
 def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Floats) -> float:
     """The fraction of the way between two samples up to which rings hold (regula falsi, Illinois)."""
-    depth, time, _, slack, parting = rings
+    depth, time, _, advancing_stretch, receding_stretch = rings
     at_near, at_far = _excess(low, rings, pairs, now), _excess(high, rings, pairs, now)
     inner, outer, share = 0.0, 1.0, 0.0
     for _ in range(_SECANTS):
@@ -400,9 +400,15 @@ def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Fl
             break
         _between(low, high, share, rings, pairs, memory)
         position = depth[low] + share * (depth[high] - depth[low])
-        carried, remaining = _carried(position, time[low] + share * (time[high] - time[low]), memory, pairs, now)
-        stretch = parting[low] + share * (parting[high] - parting[low])
-        value = carried + stretch - (slack[low] + share * (slack[high] - slack[low])) * remaining
+        relaxed_depth, remaining = _relaxed_depth(
+            position, time[low] + share * (time[high] - time[low]), memory, pairs, now
+        )
+        stretch = receding_stretch[low] + share * (receding_stretch[high] - receding_stretch[low])
+        value = (
+            relaxed_depth
+            + stretch
+            - (advancing_stretch[low] + share * (advancing_stretch[high] - advancing_stretch[low])) * remaining
+        )
         if value >= 0:
             inner, at_near, at_far = share, value, 0.5 * at_far
         else:
@@ -418,8 +424,8 @@ def creep_edge_rows(
     depth: Floats,
     time: Floats,
     depth_memory: Floats,
-    slack: Floats,
-    parting: Floats,
+    advancing_stretch: Floats,
+    receding_stretch: Floats,
     force: Floats,
     force_memory: Floats,
     record: Indices,
@@ -427,7 +433,7 @@ def creep_edge_rows(
     fractions: Floats,
     times: Floats,
     edge: Floats,
-    carried: Floats,
+    relaxed_depth: Floats,
     memory_force: Floats,
     stuck: Mask,
 ) -> None:
@@ -442,7 +448,7 @@ def creep_edge_rows(
         pairs = fractions[point], times[point]
         for curve in range(curves):
             here = point, curve
-            rings = depth[here], time[here], depth_memory[here], slack[here], parting[here]
+            rings = depth[here], time[here], depth_memory[here], advancing_stretch[here], receding_stretch[here]
             first = first_contact[here]
             for sample in range(first, samples):
                 high = record[point, curve, sample]
@@ -454,14 +460,14 @@ def creep_edge_rows(
                 share = _share(low, high, rings, pairs, now, memory) if high > low else 0.0
                 _between(low, high, share, rings, pairs, memory)
                 position = rings[0][low] + share * (rings[0][high] - rings[0][low])
-                reached = rings[1][low] + share * (rings[1][high] - rings[1][low])
+                ring_time = rings[1][low] + share * (rings[1][high] - rings[1][low])
                 stuck[point, curve, sample] = True
                 edge[point, curve, sample] = position
-                carried[point, curve, sample] = _carried(position, reached, memory, pairs, now)[0]
-                of_force = force[here], time[here], force_memory[here], slack[here], parting[here]
+                relaxed_depth[point, curve, sample] = _relaxed_depth(position, ring_time, memory, pairs, now)[0]
+                of_force = force[here], time[here], force_memory[here], advancing_stretch[here], receding_stretch[here]
                 _between(low, high, share, of_force, pairs, memory)
                 total = 0.0
                 for pair in range(len(memory)):
-                    age = max(now[1] - reached, 0.0)
+                    age = max(now[1] - ring_time, 0.0)
                     total += pairs[0][pair] * math.exp(-age / pairs[1][pair]) * memory[pair]
                 memory_force[point, curve, sample] = total

@@ -87,9 +87,9 @@ class CurveLaw(UnlistedLaw):
 
     def features(self, samples: Samples, force: Floats, values: Values) -> Sequence[Feature]:
         """The features at samples (points, curves, samples) where the contact force is `force` [N]."""
-        return self.shape.features(self._along(samples, force), values)
+        return self.shape.features(self._axis_values(samples, force), values)
 
-    def _along(self, samples: Samples, force: Floats) -> Floats:
+    def _axis_values(self, samples: Samples, force: Floats) -> Floats:
         """The axis at each sample."""
         if self.axis.name == "displacement_mm":
             return np.asarray(1e3 * np.maximum(samples.travel, 0.0))

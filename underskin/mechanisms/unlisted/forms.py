@@ -137,12 +137,12 @@ def _threshold(axis: Axis) -> list[Shape]:
     grid = tuple((axis.low + share * axis.span,) for share in (0.15, 0.3, 0.5, 0.7, 0.85))
 
     def above(x: Floats, values: Values) -> list[Feature]:
-        ahead = (x - values["law_onset"]) / (axis.high - values["law_onset"])
-        return [where(ahead.value > 0, ahead, 0.0)]
+        relative = (x - values["law_onset"]) / (axis.high - values["law_onset"])
+        return [where(relative.value > 0, relative, 0.0)]
 
     def below(x: Floats, values: Values) -> list[Feature]:
-        behind = (values["law_onset"] - x) / (values["law_onset"] - axis.low)
-        return [where(behind.value > 0, behind, 0.0)]
+        relative = (values["law_onset"] - x) / (values["law_onset"] - axis.low)
+        return [where(relative.value > 0, relative, 0.0)]
 
     laws = (("above", above), ("below", below))
     return [

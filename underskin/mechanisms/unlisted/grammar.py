@@ -398,7 +398,7 @@ def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, M
         indices = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
         return replace(axis, values=dict(zip(ids, indices, strict=True)), range=(axis.low, axis.high)), inside
     values = current.of(ids)
-    slack = _ROUNDING * axis.span
-    inside = (values >= axis.low - slack) & (values <= axis.high + slack)
+    tolerance = _ROUNDING * axis.span
+    inside = (values >= axis.low - tolerance) & (values <= axis.high + tolerance)
     clipped = np.clip(values, axis.low, axis.high).tolist()
     return replace(axis, values=dict(zip(ids, clipped, strict=True)), range=(axis.low, axis.high)), inside
