@@ -16,9 +16,9 @@ from underskin.units import Array, Indices, Mask
 class Differentiated:
     """An array with its derivatives: `value`, (…, rows), and `slopes`, with the parameters along its first axis.
 
-    A single row stands for all rows, as NumPy broadcasts. Axes before the rows are those of several points at which a
-    model is evaluated at once. In a mechanism the derivatives are those with respect to the fit coordinates of the
-    model's parameters; a function of `underskin.physics` states what its own are taken by.
+    A single row is broadcast to all rows. Axes before the rows are those of several points at which a model is
+    evaluated at once. In a mechanism the derivatives are those with respect to the fit coordinates of the model's
+    parameters; a function of `underskin.physics` states its own variables.
     """
 
     __slots__ = ("slopes", "value")
@@ -69,13 +69,13 @@ class Differentiated:
         return Differentiated(power * self.value, exponent * power * self.slopes)
 
     def __getitem__(self, rows: Any) -> Differentiated:
-        """The rows that an index array or slice selects; a single row that stands for all stays one."""
+        """The rows that an index array or slice selects; a single row stays one."""
         if self.value.shape[-1] == 1:
             return self
         return Differentiated(self.value[..., rows], self.slopes[..., rows])
 
     def spread(self, rows: int) -> Differentiated:
-        """The same with that many rows, where a single row stands for all."""
+        """The same with this number of rows, where a single row is broadcast."""
         if self.value.shape[-1] == self.slopes.shape[-1] == rows:
             return self
         return Differentiated(
@@ -83,28 +83,28 @@ class Differentiated:
             np.broadcast_to(self.slopes, (*self.slopes.shape[:-1], rows)),
         )
 
-    def at_points(self, some: Indices | None) -> Differentiated:
+    def at_points(self, subset: Indices | None) -> Differentiated:
         """At some of several points (points, rows), at all for None."""
-        if some is None or len(self.value) == 1:
+        if subset is None or len(self.value) == 1:
             return self
-        return Differentiated(self.value[some], self.slopes[:, some])
+        return Differentiated(self.value[subset], self.slopes[:, subset])
 
-    def times(self, factor: Differentiated | None, some: Indices | None, points: int) -> Differentiated:
-        """With those at some of so many points multiplied; None stands for 1, and for all."""
+    def times(self, factor: Differentiated | None, subset: Indices | None, points: int) -> Differentiated:
+        """Multiplied by a factor at some of the points; None stands for 1, and for all points."""
         if factor is None:
             return self
-        return self * factor if some is None else self._with(some, self.at_points(some) * factor, points)
+        return self * factor if subset is None else self._with(subset, self.at_points(subset) * factor, points)
 
-    def plus(self, term: Differentiated, some: Indices | None, points: int) -> Differentiated:
-        """With something added to those at some of so many points; None stands for all."""
-        return self + term if some is None else self._with(some, self.at_points(some) + term, points)
+    def plus(self, term: Differentiated, subset: Indices | None, points: int) -> Differentiated:
+        """With a term added at some of the points; None stands for all."""
+        return self + term if subset is None else self._with(subset, self.at_points(subset) + term, points)
 
-    def _with(self, some: Indices, changed: Differentiated, points: int) -> Differentiated:
+    def _with(self, subset: Indices, changed: Differentiated, points: int) -> Differentiated:
         shape = points, max(self.value.shape[-1], changed.value.shape[-1])
         dtype = np.result_type(self.value, changed.value)
         value = np.broadcast_to(self.value, shape).astype(dtype)
         slopes = np.broadcast_to(self.slopes, (len(self.slopes), *shape)).astype(dtype)
-        value[some], slopes[:, some] = changed.value, changed.slopes
+        value[subset], slopes[:, subset] = changed.value, changed.slopes
         return Differentiated(value, slopes)
 
 
@@ -152,7 +152,7 @@ def where(condition: Mask, yes: Differentiated, no: Differentiated | float) -> D
 
 
 def constant(value: Array | float, parameters: int, points: tuple[int, ...] = ()) -> Differentiated:
-    """A number whose derivatives with respect to so many parameters are 0, at all of so many points."""
+    """A number whose derivatives by all parameters are 0, at all points."""
     rows = np.atleast_1d(np.asarray(value))
     ones = (1,) * len(points)
     return Differentiated(rows.reshape(*ones, -1), np.zeros((parameters, *ones, 1)))
@@ -173,11 +173,11 @@ def variables(values: Array, slopes: Array) -> list[Differentiated]:
     list of Differentiated
         One of a single row for each variable.
     """
-    return [Differentiated(values[..., [place]], slopes[..., [place]]) for place in range(values.shape[-1])]
+    return [Differentiated(values[..., [index]], slopes[..., [index]]) for index in range(values.shape[-1])]
 
 
 def stacked(parts: Sequence[Differentiated], points: Sequence[int]) -> Differentiated:
-    """Several with (points, rows) one after another, each with so many points."""
+    """Several with (points, rows), concatenated along the points; `points` is the number of each."""
     if len(parts) == 1:
         return parts[0]
     rows = max(part.value.shape[-1] for part in parts)
@@ -207,7 +207,7 @@ def contiguous(x: Array) -> Array:
 
 
 def unfilled(parameters: int, shape: tuple[int, ...]) -> Differentiated:
-    """What a compiled function is to fill, with derivatives by so many parameters."""
+    """An uninitialised result for a compiled function."""
     return Differentiated(np.empty(shape), np.empty((parameters, *shape)))
 
 
@@ -234,5 +234,5 @@ def sum_rows(x: Differentiated, owner: Indices, rows: int) -> Differentiated:
 
 def _summed(terms: Array, owner: Indices, rows: int) -> Array:
     sets = int(np.prod(terms.shape[:-1]))
-    place = (rows * np.arange(sets)[:, None] + owner).ravel()
-    return np.bincount(place, terms.ravel(), sets * rows).reshape(*terms.shape[:-1], rows)
+    target = (rows * np.arange(sets)[:, None] + owner).ravel()
+    return np.bincount(target, terms.ravel(), sets * rows).reshape(*terms.shape[:-1], rows)

@@ -1,7 +1,7 @@
-"""Functions as machine code: numba compiles them at set-up, and later processes load them from its cache.
+"""Functions compiled by numba at set-up; later processes load them from its cache.
 
 `python -m underskin.compiled` fills the cache. Modules of compiled functions (named in `KERNELS`) are imported where
-they are called, since the import of numba takes a tenth of a second and 50 MB that small answers can do without.
+they are called, since importing numba takes a tenth of a second and 50 MB, which small answers do not need.
 """
 
 import gc
@@ -32,7 +32,7 @@ vars(config).update(CPU_NAME="generic", CPU_FEATURES="")
 Function = Callable[..., Any]
 
 
-class _BesideSource(InTreeCacheLocator):
+class _SourceCacheLocator(InTreeCacheLocator):
     """The cache in `__pycache__`, also where it was made at set-up and is read-only now."""
 
     def ensure_cache_path(self) -> None:
@@ -51,7 +51,7 @@ def _digest() -> bytes:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()
 
 
-CacheImpl._locator_classes.insert(0, _BesideSource)
+CacheImpl._locator_classes.insert(0, _SourceCacheLocator)
 
 
 def compiled(signature: str | None = None) -> Callable[[Function], Function]:
@@ -69,9 +69,9 @@ def compiled(signature: str | None = None) -> Callable[[Function], Function]:
 
 
 def load_all() -> None:
-    """Load all compiled functions, and compile what the cache does not hold.
+    """Load all compiled functions, and compile those that the cache does not hold.
 
-    What the modules hold stays for good, so garbage collections leave it out: one takes a tenth of a second with it.
+    The modules' objects are permanent, so garbage collection ignores them: with them one takes a tenth of a second.
     """
     for name in KERNELS:
         importlib.import_module(name)

@@ -1,10 +1,10 @@
-"""Everything that underskin raises on purpose.
+"""All errors that underskin raises on purpose.
 
 UnderskinError
-├── InvalidInput      a value that cannot be used: names the field, the value and what is allowed
-├── FileError         a file that cannot be read: names the file and the place in it
+├── InvalidInput      an invalid value: names the field, the value and what is allowed
+├── FileError         an unreadable file: names the file and the place in it
 ├── TableError        a table that is missing, damaged, altered or of another schema
-├── ExtensionError    a mechanism or file format of another package that cannot be used: names package and field
+├── ExtensionError    an unusable mechanism or file format of another package: names package and field
 ├── SolverError       a finite-element solve that did not converge: names the point
 ├── ServiceError      an answer of the server that is not a success (raised by the client)
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
@@ -19,7 +19,7 @@ from typing import Any, Self
 
 
 class ErrorCode(StrEnum):
-    """What kind of error a value or a file has; docs/findings.md explains each."""
+    """The kind of an error of a value or a file; docs/findings.md explains each."""
 
     INVALID_VALUE = "invalid_value"
     REQUIRED = "required"
@@ -41,7 +41,7 @@ class ErrorCode(StrEnum):
 
 @dataclass(frozen=True)
 class Mention:
-    """A field in what a value must be; `words` stand for it where its users know it by its name."""
+    """A field named in a requirement; `words` replace its name where users know it by another one."""
 
     field: str
     words: str = ""
@@ -51,24 +51,24 @@ class Mention:
 
 
 class Requirement(str):
-    """What a refused value must be: plain parts, and mentions of other fields kept apart from them.
+    """The requirement that a value must meet: text, and mentions of other fields kept apart from it.
 
-    As a text it has the mentions as they stand. An interface whose users know the fields by other names, such as a
-    form, words the mentions itself.
+    As a string it holds the mentions as they are. An interface whose users know the fields by other names, such as a
+    form, replaces them.
     """
 
     __slots__ = ("parts",)
     parts: tuple[str | Mention, ...]
 
     def __new__(cls, *parts: str | Mention) -> Self:
-        """Parts that are requirements themselves are taken apart."""
-        flat = tuple(one for part in parts for one in (part.parts if isinstance(part, Requirement) else (part,)))
-        made = super().__new__(cls, "".join(map(str, flat)))
-        made.parts = flat
-        return made
+        """Parts that are requirements themselves are flattened."""
+        flat = tuple(piece for part in parts for piece in (part.parts if isinstance(part, Requirement) else (part,)))
+        requirement = super().__new__(cls, "".join(map(str, flat)))
+        requirement.parts = flat
+        return requirement
 
     def worded(self, word: Callable[[Mention], str]) -> str:
-        """The sentence with each mention as `word` has it."""
+        """The sentence with each mention replaced by `word`."""
         return "".join(word(part) if isinstance(part, Mention) else part for part in self.parts)
 
 
@@ -80,10 +80,10 @@ class UnderskinError(Exception):
 
 
 class InvalidInput(UnderskinError, ValueError):
-    """A value that cannot be used.
+    """An invalid value.
 
     Attributes: `field` (the name the user knows), `index` (row in a column, or None), `place` (both), `value`,
-    `allowed` (what would be accepted, in words), `code` (what kind of error it is).
+    `allowed` (what would be accepted, in words), `code` (the kind of error).
     """
 
     def __init__(
@@ -104,22 +104,22 @@ class InvalidInput(UnderskinError, ValueError):
         super().__init__(f"{self.place} = {value!r}: {allowed}")
 
     def at(self, field: str) -> "InvalidInput":
-        """The same error of a field that is called differently from outside."""
+        """The same error under another field name."""
         return InvalidInput(field, self.value, self.allowed, self.index, code=self.code)
 
 
 def required(field: str, allowed: str = "required") -> InvalidInput:
-    """A field that is missing."""
+    """A missing field."""
     return InvalidInput(field, None, allowed, code=ErrorCode.REQUIRED)
 
 
 def wrong_type(field: str, value: Any, allowed: str = "must be a number", index: int | None = None) -> InvalidInput:
-    """A text where a number belongs, and the like."""
+    """A value of the wrong type, such as a text for a number."""
     return InvalidInput(field, value, allowed, index, code=ErrorCode.WRONG_TYPE)
 
 
 def out_of_range(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
-    """A number, or a size, outside what is possible."""
+    """A number, or a size, outside the allowed range."""
     return InvalidInput(field, value, allowed, index, code=ErrorCode.OUT_OF_RANGE)
 
 
@@ -128,15 +128,15 @@ def not_finite(field: str, value: Any, allowed: str = "must be finite", index: i
     return InvalidInput(field, value, allowed, index, code=ErrorCode.NOT_FINITE)
 
 
-def not_one_of(field: str, value: Any, known: Iterable[str]) -> InvalidInput:
-    """A name that is none of those `known`."""
-    names = tuple(known)
-    one_of = "one of " if len(names) != 1 else ""
-    return InvalidInput(field, value, f"must be {one_of}{', '.join(names)}", code=ErrorCode.NOT_ONE_OF)
+def not_one_of(field: str, value: Any, allowed: Iterable[str]) -> InvalidInput:
+    """A name that is not among the `allowed` ones."""
+    names = tuple(allowed)
+    prefix = "one of " if len(names) != 1 else ""
+    return InvalidInput(field, value, f"must be {prefix}{', '.join(names)}", code=ErrorCode.NOT_ONE_OF)
 
 
 def not_unique(field: str, value: Any, allowed: str = "must be given once") -> InvalidInput:
-    """What is given twice, or a name that is in use."""
+    """A repeated value, or a name that is in use."""
     return InvalidInput(field, value, allowed, code=ErrorCode.NOT_UNIQUE)
 
 
@@ -152,7 +152,7 @@ def too_few(field: str, value: Any, allowed: str) -> InvalidInput:
 
 
 def conflicting(field: str, value: Any, allowed: str) -> InvalidInput:
-    """What contradicts another field."""
+    """A value that contradicts another field."""
     return InvalidInput(field, value, allowed, code=ErrorCode.CONFLICTING)
 
 
@@ -167,10 +167,10 @@ def unreadable(field: str, file: Any, allowed: str) -> InvalidInput:
 
 
 class FileError(UnderskinError):
-    """A file that cannot be read.
+    """An unreadable file.
 
-    Attributes: `file` (the name the user knows), `place` (line, field or byte; empty where the whole file is meant),
-    `reason`, `code` (what kind of error it is).
+    Attributes: `file` (the name the user knows), `place` (line, field or byte; empty for the file as a whole),
+    `reason`, `code` (the kind of error).
     """
 
     def __init__(self, file: str, place: str, reason: str, *, code: ErrorCode = ErrorCode.UNREADABLE_FILE) -> None:
@@ -181,28 +181,28 @@ class FileError(UnderskinError):
         super().__init__(": ".join(part for part in (file, place, reason) if part))
 
     def of_field(self, field: str, file: str | None) -> InvalidInput:
-        """The same error of a field whose value is the file, by the name that it was sent under."""
+        """The same error for a field whose value is the file, under the name that it was sent with."""
         allowed = ": ".join(part for part in (self.place, self.reason) if part)
         return InvalidInput(field, file, allowed, code=self.code)
 
 
 @contextmanager
-def damage_said(file: str, place: str, said: Callable[[Exception], str]) -> Iterator[None]:
-    """Turns whatever a library lets through where a file is damaged into FileError; memory that is short stays so."""
+def damage_said(file: str, place: str, describe: Callable[[Exception], str]) -> Iterator[None]:
+    """Convert any exception of a library on a damaged file into FileError; MemoryError is passed on."""
     try:
         yield
     except (MemoryError, FileError):
         raise
     except Exception as error:
-        raise FileError(file, place, said(error)) from None
+        raise FileError(file, place, describe(error)) from None
 
 
 class TableError(UnderskinError):
-    """A table that cannot be trusted or read; the message says why and what to do."""
+    """An untrusted or unreadable table; the message says why and what to do."""
 
 
 class ExtensionError(UnderskinError):
-    """Something that another package adds and that cannot be used.
+    """An unusable extension of another package.
 
     Attributes: `package` (with its version), `name` (of the mechanism or file format), `field`, `reason`.
     """
@@ -215,7 +215,7 @@ class ExtensionError(UnderskinError):
         super().__init__(f"{name!r} of the package {package} cannot be used: {field}: {reason}")
 
     def __reduce__(self) -> tuple[type["ExtensionError"], tuple[str, str, str, str]]:
-        """It crosses from worker processes."""
+        """Make it picklable, for worker processes."""
         return type(self), (self.package, self.name, self.field, self.reason)
 
 
@@ -232,8 +232,8 @@ class ServiceError(UnderskinError):
     def __init__(self, status: int, problem: dict[str, Any]) -> None:
         self.status = status
         self.problem = problem
-        where = _KEY if status == HTTPStatus.UNAUTHORIZED else ""
-        super().__init__(f"{status} {problem.get('title', '')}: {problem.get('detail', '')}{where}")
+        hint = _KEY if status == HTTPStatus.UNAUTHORIZED else ""
+        super().__init__(f"{status} {problem.get('title', '')}: {problem.get('detail', '')}{hint}")
 
     @property
     def is_foreign(self) -> bool:

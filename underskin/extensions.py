@@ -1,4 +1,4 @@
-"""What other installed packages add through an entry-point group: mechanisms, file formats."""
+"""Extensions of other installed packages through an entry-point group: mechanisms, file formats."""
 
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
@@ -9,14 +9,14 @@ from underskin.errors import ExtensionError
 
 @dataclass(frozen=True)
 class Extension:
-    """What one entry point names, and the package that it comes from, with its version."""
+    """The object that one entry point names, and its package with version."""
 
     package: str
     name: str
     value: Any
 
     def refused(self, field: str, reason: str, name: str | None = None) -> ExtensionError:
-        """The error that says why it cannot be used; `name` where it is called otherwise than its entry point."""
+        """The error that says why it cannot be used; `name` where it differs from the entry point's."""
         return ExtensionError(self.package, name or self.name, field, reason)
 
 
@@ -28,15 +28,21 @@ def load(group: str) -> list[Extension]:
     ExtensionError
         Where an entry point cannot be imported.
     """
-    return sorted(map(_loaded, entry_points(group=group)), key=lambda entry: (entry.package, entry.name))
+    return sorted(map(_loaded, entry_points(group=group)), key=lambda extension: (extension.package, extension.name))
 
 
-def _loaded(entry: EntryPoint) -> Extension:
-    package = "a package without a name" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+def _loaded(entry_point: EntryPoint) -> Extension:
+    package = (
+        "a package without a name"
+        if entry_point.dist is None
+        else f"{entry_point.dist.name} {entry_point.dist.version}"
+    )
     try:
-        return Extension(package, entry.name, entry.load())
+        return Extension(package, entry_point.name, entry_point.load())
     except Exception as error:  # it may do anything when it is imported
-        raise ExtensionError(package, entry.name, f"the entry point {entry.value}", described(error)) from error
+        raise ExtensionError(
+            package, entry_point.name, f"the entry point {entry_point.value}", described(error)
+        ) from error
 
 
 def described(error: Exception) -> str:

@@ -1,7 +1,7 @@
-"""Processes for many independent computations, and what a process may take of the machine.
+"""Processes for independent computations, and limits of a process.
 
-Each process of a pool is a fresh interpreter with one BLAS thread, so results do not depend on the number of cores.
-They end with the process that started them, however that one ends.
+Each process of a pool is a new interpreter with one BLAS thread, so results do not depend on the number of cores.
+They end with the process that started them, however it ends.
 """
 
 import os
@@ -38,14 +38,14 @@ def processes(count: int) -> Iterator[Executor]:
 
 
 def limit_process(memory_bytes: int, *, file_bytes: int | None = None, cpu_seconds: int | None = None) -> None:
-    """Limit this process for good: address space beyond what it has now, files that it writes, time on processors.
+    """Limit this process for good: address space beyond its present one, size of written files, CPU time [s].
 
-    For Linux. It leaves no core dump; SIGXCPU tells that time is up.
+    For Linux. No core dump is written; SIGXCPU signals that time is up.
     """
     import resource  # not on Windows, where no server runs
 
-    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    limits = {resource.RLIMIT_AS: own + memory_bytes, resource.RLIMIT_CORE: 0}
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    limits = {resource.RLIMIT_AS: used + memory_bytes, resource.RLIMIT_CORE: 0}
     if file_bytes is not None:
         limits[resource.RLIMIT_FSIZE] = file_bytes
     for kind, most in limits.items():
@@ -55,7 +55,7 @@ def limit_process(memory_bytes: int, *, file_bytes: int | None = None, cpu_secon
 
 
 def _end_with_the_parent() -> None:
-    """End this process with its parent, also if that is killed; Ctrl-C is left to the parent."""
+    """End this process with its parent, also if that is killed; Ctrl-C is handled by the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_await_the_parent, daemon=True).start()
 

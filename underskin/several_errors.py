@@ -1,4 +1,4 @@
-"""Errors of one input told together, so that its author puts all right at once."""
+"""Several errors of one input, reported together so that its author can correct all at once."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -8,7 +8,7 @@ from underskin.errors import InvalidInput
 
 
 class SeveralInvalid(InvalidInput):
-    """The first of several `errors`, for who tells one only; as a text it is all of them."""
+    """The first of several `errors`, for callers that report one; as a text it is all of them."""
 
     def __init__(self, errors: Sequence[InvalidInput]) -> None:
         first = errors[0]
@@ -18,13 +18,13 @@ class SeveralInvalid(InvalidInput):
 
 
 def errors_of(error: InvalidInput) -> Sequence[InvalidInput]:
-    """All of several, or the one."""
+    """All errors of a SeveralInvalid, or the single one."""
     return error.errors if isinstance(error, SeveralInvalid) else [error]
 
 
 @contextmanager
 def noting(errors: list[InvalidInput]) -> Iterator[None]:
-    """Appends what is raised inside to `errors`, and goes on after the block."""
+    """Append errors raised in the block to `errors`, and continue after it."""
     try:
         yield
     except InvalidInput as error:
@@ -32,7 +32,7 @@ def noting(errors: list[InvalidInput]) -> Iterator[None]:
 
 
 def all_of(readings: Mapping[str, Callable[[], Any]]) -> dict[str, Any]:
-    """What each gives; raises SeveralInvalid with what is wrong in any of them."""
+    """The results of all readings; raises SeveralInvalid with the errors of any of them."""
     values: dict[str, Any] = {}
     wrong: list[InvalidInput] = []
     for name, reading in readings.items():

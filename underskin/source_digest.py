@@ -1,8 +1,8 @@
 """A digest of what Python sources compute, independent of module names and documentation.
 
-Results that take hours are kept as long as the code that made them computes the same. The digest covers the syntax
-trees without docstrings, comments and layout; each module counts by its content, not by its name or folder. An imported
-name stands for its origin: the content of a module among those digested, the full name in another package, the last
+Results that take hours are reused as long as the code that made them computes the same. The digest covers the syntax
+trees without docstrings, comments and layout; each module counts by its content, not by its name or folder. An
+imported name stands for its origin: the content of a digested module, the full name in another package, the last
 name in another module of this project. Any other change, also of the name of a function or a variable, changes the
 digest.
 """
@@ -32,7 +32,7 @@ def _without_docstrings(tree: ast.Module) -> ast.Module:
 
 
 def _digest(tree: ast.Module, identities: Mapping[str, str]) -> str:
-    """Of one module, with identities for the modules that it may import."""
+    """The digest of one module, with identities for the modules that it may import."""
     meanings = _meanings(tree, identities)
     parts = [
         meanings.get(node.id, node.id) if isinstance(node, ast.Name) else ast.dump(_bare(node), annotate_fields=False)
@@ -43,14 +43,14 @@ def _digest(tree: ast.Module, identities: Mapping[str, str]) -> str:
 
 
 def _bare(node: ast.AST) -> ast.AST:
-    """A node with the kinds of its children in their places; the children are digested as nodes of their own."""
+    """A node with the types of its children in their positions; the children are digested separately."""
     fields: dict[str, Any] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, ast.AST):
             fields[name] = type(value).__name__
         elif isinstance(value, list):
-            kept = [entry for entry in value if not isinstance(entry, _IMPORTS)]
-            fields[name] = [type(entry).__name__ if isinstance(entry, ast.AST) else entry for entry in kept]
+            elements = [element for element in value if not isinstance(element, _IMPORTS)]
+            fields[name] = [type(element).__name__ if isinstance(element, ast.AST) else element for element in elements]
         else:
             fields[name] = value
     return type(node)(**fields)
@@ -58,7 +58,7 @@ def _bare(node: ast.AST) -> ast.AST:
 
 def _meanings(tree: ast.Module, identities: Mapping[str, str]) -> dict[str, str]:
     """The origin of each imported name."""
-    ours = {name.partition(".")[0] for name in identities}
+    local_packages = {name.partition(".")[0] for name in identities}
     meanings = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -68,12 +68,12 @@ def _meanings(tree: ast.Module, identities: Mapping[str, str]) -> dict[str, str]
         elif isinstance(node, ast.ImportFrom):
             module = node.module or ""
             for alias in node.names:
-                whole = f"{module}.{alias.name}"
-                if whole in identities:
-                    meaning = identities[whole]
+                full_name = f"{module}.{alias.name}"
+                if full_name in identities:
+                    meaning = identities[full_name]
                 elif module in identities:
                     meaning = f"{identities[module]}.{alias.name}"
                 else:
-                    meaning = alias.name if module.partition(".")[0] in ours else whole
+                    meaning = alias.name if module.partition(".")[0] in local_packages else full_name
                 meanings[alias.asname or alias.name] = f"<{meaning}>"
     return meanings

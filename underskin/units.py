@@ -1,8 +1,8 @@
 """Lab units at the boundary, SI inside: the only place of conversion.
 
-A boundary field carries its unit in its name (`thickness_mm`). `LAB` lists every such field with its unit, its factor
-to SI and the range of magnitudes that are likely in a piezoelectric skin's lab. `checked` rejects values that are not
-finite, not positive, or of unlikely magnitude, and guesses the unit that was meant.
+A boundary field carries its unit in its name (`thickness_mm`). `LAB` lists every such field with its unit, its
+factor to SI and the range of magnitudes that are likely in a piezoelectric skin's lab. `checked` rejects values that
+are not finite, not positive, or of unlikely magnitude, and guesses the intended unit.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class LabField:
-    """A field as a lab writes it: SI value = number × `to_si`; `likely` bounds the number's magnitude."""
+    """A field in lab units: SI value = number × `to_si`; `likely` bounds the number's magnitude."""
 
     name: str
     unit: str
@@ -76,7 +76,7 @@ LAB: dict[str, LabField] = {
 }
 
 _FINER = {"mm": ("µm", "nm"), "N": ("mN", "µN", "nN", "pN")}  # each a thousandth of the one before
-_LEAST_READ = 0.1  # of an axis' unit, below which its numbers are hard to read
+_LEAST_READABLE = 0.1  # of an axis' unit, below which its numbers are hard to read
 _NEIGHBOURS = {
     "mm": {1e-3: "µm", 1e-6: "nm", 1e3: "m"},
     "MPa": {1e-3: "kPa", 1e-6: "Pa", 1e3: "GPa"},
@@ -97,13 +97,14 @@ def to_lab(name: str, value: ArrayLike) -> Floats:
 
 
 def readable_unit(name: str, largest: float) -> tuple[str, float]:
-    """The unit in which values up to `largest` (lab unit) of a length or force read well, and how many make the lab's.
+    """The unit in which values up to `largest` (lab unit) of a length or force are readable, and its number per lab
+    unit.
 
-    Of 2e-5 N it is ("µN", 1e6). Zero is shown in the lab's own unit.
+    For 2e-5 N it is ("µN", 1e6). Zero is shown in the lab unit.
     """
     unit, count = LAB[name].unit, 1.0
     for finer in _FINER[unit]:
-        if largest == 0 or largest * count >= _LEAST_READ:
+        if largest == 0 or largest * count >= _LEAST_READABLE:
             break
         unit, count = finer, 1e3 * count
     return unit, count
@@ -161,7 +162,7 @@ def finite(name: str, values: Floats) -> Floats:
 
 
 def unusual(name: str, value: ArrayLike) -> list[Finding]:
-    """The first entry of a measured field whose magnitude looks like a slip of units or a dead sensor, if any.
+    """The first element of a measured field whose magnitude suggests a wrong unit or a dead sensor, if any.
 
     Measured values are never rejected for their magnitude, unlike declared ones (`checked`).
     """
@@ -187,7 +188,7 @@ def _refuse(name: str, values: Floats, bad: Mask, allowed: str, code: ErrorCode)
 
 
 def _likely_range(field: LabField, size: float) -> Requirement:
-    """The allowed range, and the unit that was probably meant."""
+    """The allowed range, and the unit that was probably intended."""
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude"
@@ -201,17 +202,19 @@ def unit_guess(name: str, size: float, usual: tuple[float, float] | None = None)
     low, high = usual or field.likely or (0.0, np.inf)
     if size == 0:
         return UnitGuess(size, field.unit)
-    meant = [(size * factor, unit) for factor, unit in _NEIGHBOURS[field.unit].items() if low <= size * factor <= high]
-    if meant:
-        return UnitGuess(size, field.unit, meant=_nearest(meant, np.sqrt(low * high)))
+    candidates = [
+        (size * factor, unit) for factor, unit in _NEIGHBOURS[field.unit].items() if low <= size * factor <= high
+    ]
+    if candidates:
+        return UnitGuess(size, field.unit, meant=_nearest(candidates, np.sqrt(low * high)))
     for power in (3, 6, 9, 12, -3, -6, -9, -12):
         if low <= size * 10.0**power <= high:
             return UnitGuess(size, field.unit, meant=((size * 10.0**power, ""),), off_by=-power)
     return UnitGuess(size, field.unit)
 
 
-def _nearest(meant: Sequence[tuple[float, str]], middle: float) -> tuple[tuple[float, str], ...]:
+def _nearest(candidates: Sequence[tuple[float, str]], middle: float) -> tuple[tuple[float, str], ...]:
     """The readings whose values lie nearest to the middle of a range, and those about as near."""
-    off = [abs(float(np.log10(value / middle))) for value, _ in meant]
+    off = [abs(float(np.log10(value / middle))) for value, _ in candidates]
     order = np.argsort(off, kind="stable").tolist()
-    return tuple(meant[place] for place in order if off[place] <= min(off) + _AS_NEAR)
+    return tuple(candidates[index] for index in order if off[index] <= min(off) + _AS_NEAR)

@@ -1,4 +1,4 @@
-"""A cache whose entries end with the object that they were worked out from."""
+"""A cache whose results are dropped with the object that they were computed from."""
 
 from collections.abc import Callable, Hashable
 from functools import wraps
@@ -10,19 +10,19 @@ T = TypeVar("T")
 
 
 def cached_while_alive(function: Callable[P, T]) -> Callable[P, T]:
-    """A decorator: keep results for as long as the first argument lives, and for each set of the others.
+    """A decorator: keep results as long as the first argument lives, for each set of the other arguments.
 
-    The first argument is told apart by its hash, which for a dataclass without `eq` is its identity; a result must not
-    hold it, or neither ends. All arguments are positional.
+    The first argument is identified by its hash, which for a dataclass without `eq` is its identity; a result must
+    not refer to it, or neither is freed. All arguments are positional.
     """
-    kept: WeakKeyDictionary[Any, dict[tuple[Hashable, ...], T]] = WeakKeyDictionary()
+    cache: WeakKeyDictionary[Any, dict[tuple[Hashable, ...], T]] = WeakKeyDictionary()
 
     @wraps(function)
-    def cached(*arguments: P.args, **named: P.kwargs) -> T:
+    def cached(*arguments: P.args, **keywords: P.kwargs) -> T:
         first, others = arguments[0], arguments[1:]
-        results = kept.setdefault(first, {})
+        results = cache.setdefault(first, {})
         if others not in results:
-            results[others] = function(*arguments, **named)
+            results[others] = function(*arguments, **keywords)
         return results[others]
 
     return cached

@@ -40,7 +40,7 @@ def whole_catalogue() -> Mapping[str, Mechanism]:
     another one."""
     known = catalogue()
     try:
-        CATALOGUE.require_whole()
+        CATALOGUE.require_complete()
     except FileError as error:
         raise Refusal(409, f"A mechanism of the lab's own cannot be used: {error}. Mend or remove it.") from None
     return known
@@ -66,7 +66,7 @@ def keep(content: bytes) -> MechanismEntry:
     Raises FileError where it cannot be used, and Refusal 409 where its name is taken.
     """
     folder = mechanism_files.folder_of_lab()
-    mechanism = checked(content, "", apart=True)
+    mechanism = checked(content, "", in_sandbox=True)
     file = folder / f"{mechanism.name}.yaml"
     entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
     if mechanism.name in catalogue():

@@ -25,7 +25,7 @@ def opened(folder: Path) -> Iterator[Journal]:
 
 def known(folder: Path, *digests: str) -> list[bool]:
     with opened(folder) as journal:
-        return [journal.known(TARGET, digest) is not None for digest in digests]
+        return [journal.find(TARGET, digest) is not None for digest in digests]
 
 
 def test_an_entry_is_appended_and_read_again(tmp_path: Path) -> None:
@@ -37,7 +37,7 @@ def test_an_entry_is_appended_and_read_again(tmp_path: Path) -> None:
         assert len(lines) == 1 + 2 * (number + 1)
     assert known(tmp_path, "a0", "b0", "a3", "b3", "c0") == [True, True, True, True, False]
     with opened(tmp_path) as journal:
-        entry = journal.known(TARGET, "a2")
+        entry = journal.find(TARGET, "a2")
         assert entry is not None
         assert entry.file == os.fsdecode(b"\xfcber Nacht.csv")
 
@@ -62,7 +62,7 @@ def test_journal_first_schema_read_gone(tmp_path: Path) -> None:
     first = {"schema": "watch/1", "entries": [{**entry, "campaigns": ["c-1"], "at": "2026-01-01T00:00:00+00:00"}]}
     (tmp_path / NAME).write_text(json.dumps(first, indent=1))
     with opened(tmp_path) as journal:
-        assert journal.known(TARGET, "a") is not None
+        assert journal.find(TARGET, "a") is not None
         journal.add(TARGET, "b", "other.csv", ["c-2"])
     assert known(tmp_path, "a", "b") == [True, True]
 

@@ -71,8 +71,8 @@ def watched(folder: Path, service: Service, clock: list[float]) -> Iterator[Benc
         skin="palm",
         rig=None,
         estimator=None,
-        kept=lambda name, _: told.append(f"{name}: kept"),
-        told=lambda _, words: told.append(words),
+        on_stored=lambda name, _: told.append(f"{name}: kept"),
+        on_message=lambda _, words: told.append(words),
     )
     try:
         yield Bench(folder, service, told, clock, watcher)

@@ -5,7 +5,7 @@ import plotly.graph_objects as go
 import pytest
 
 from underskin.figures.array_discs import disc_size
-from underskin.figures.array_map import D33, Quantity, array_map, told_apart
+from underskin.figures.array_map import D33, Quantity, array_map, significance_note
 from underskin.figures.loads import loaded_array
 from underskin.inversion.array_course import differ_from_others
 from underskin.units import Floats
@@ -31,7 +31,7 @@ def test_sensors_that_are_alike_are_grey() -> None:
     wrong = sum(bool(differ_from_others(13.1 + one, np.full(64, 0.12)).any()) for one in errors)
     assert 5 <= wrong <= 35  # 5 % of 400 are expected
     assert set(fills(drawn(np.full(64, 13.1)))) == {GREY}
-    assert "no sensor's differs" in told_apart(np.full(64, 13.1), np.full(64, 0.12))
+    assert "no sensor's differs" in significance_note(np.full(64, 13.1), np.full(64, 0.12))
 
 
 def test_differs_coloured_scale_reaches_far() -> None:
@@ -46,7 +46,7 @@ def test_differs_coloured_scale_reaches_far() -> None:
     middle = float(np.median(values))
     assert (high - middle, middle - low) == pytest.approx((14.2 - middle, 14.2 - middle))
     assert high - low > 6 * 0.12
-    assert "1 of 64 differ" in told_apart(values, np.full(64, 0.12))
+    assert "1 of 64 differ" in significance_note(values, np.full(64, 0.12))
 
 
 def test_far_beyond_many_differ_not_pale() -> None:
@@ -55,7 +55,7 @@ def test_far_beyond_many_differ_not_pale() -> None:
     quantity = Quantity("difference", "pC/N", "zero")
     (differs,) = [trace for trace in drawn(values, quantity=quantity).data if trace.name == "difference"]
     assert -differs.marker.cmin == differs.marker.cmax == pytest.approx(3 * np.quantile(-values, 0.9), rel=0.01)
-    told = told_apart(values, np.full(64, 0.12), quantity)
+    told = significance_note(values, np.full(64, 0.12), quantity)
     assert told.endswith(". 1 beyond the scale has the colour of its end.")
 
 

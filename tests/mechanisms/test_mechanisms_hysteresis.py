@@ -85,7 +85,7 @@ def test_radius_travel_travel_stiffening_law() -> None:
         return np.exp(random.uniform(np.log(low), np.log(high), (count, 1, 1)))
 
     law = Stiffening(drawn(0.1, 20), random.uniform(-2, 2, (count, 1, 1)), random.uniform(1, 2, (count, 1, 1)))
-    sphere = Sphere(drawn(1e5, 1e7), np.full((1, 1), 7.5e-6), stiffening=law, give=1 / drawn(1, 1e3))
+    sphere = Sphere(drawn(1e5, 1e7), np.full((1, 1), 7.5e-6), stiffening=law, compliance=1 / drawn(1, 1e3))
     work = drawn(1e-3, 1.0)
     least, lowest = sphere.pull_off(work)
     travel = lowest + np.linspace(0.01, 1, 40) * (2e-6 - np.minimum(lowest, 0))
@@ -94,7 +94,7 @@ def test_radius_travel_travel_stiffening_law() -> None:
 
 
 def test_without_adhesion_the_edge_is_hertz_s() -> None:
-    sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), give=np.full((1, 1, 1), 1e-5))
+    sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), compliance=np.full((1, 1, 1), 1e-5))
     travel = np.linspace(1e-6, 1e-4, 20)[None, None]
     a = sphere.radius_at(travel, np.zeros((1, 1, 1)))
     force, depth, _, _ = sphere.at(a)
@@ -104,7 +104,7 @@ def test_without_adhesion_the_edge_is_hertz_s() -> None:
 
 def test_sphere_not_stick_no_contact() -> None:
     """A sphere that does not stick has no contact before the surface and hertzs beyond."""
-    sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), give=np.full((1, 1, 1), 1e-5))
+    sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), compliance=np.full((1, 1, 1), 1e-5))
     travel = np.array([[[-1e-4, -1e-9, 0.0, 1e-6, 2e-5, 3e-5, -1e-5, 1e-4]]])
     a = sphere.radius_at(travel, None)
     away = travel <= 0

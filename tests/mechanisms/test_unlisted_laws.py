@@ -13,7 +13,7 @@ from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.unlisted.axes import Axis, axes_of, recording_order
-from underskin.mechanisms.unlisted.expressions import course, expression
+from underskin.mechanisms.unlisted.expressions import change_along, expression
 from underskin.mechanisms.unlisted.forms import shapes
 from underskin.mechanisms.unlisted.grammar import Grammar, combination
 from underskin.mechanisms.unlisted.laws import LevelTables, RecordingLaw, UnlistedLaw
@@ -189,7 +189,7 @@ def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
         kept = parse(document(report, "kept").encode(), "kept.yaml")
         short = {name.removeprefix("law_"): value for name, value in values.items()}
         x = np.linspace(law.axis.low, law.axis.high, 7)
-        exact = course(law, values, x).reshape(len(x), -1)
+        exact = change_along(law, values, x).reshape(len(x), -1)
         axes = {law.axis.name: x, **({"preload_n": np.ones(len(x))} if law.axis.relative else {})}
         for place, expected in zip(kept.laws, exact.T, strict=True):
             told = np.broadcast_to(np.asarray(place({**short, **axes})), x.shape)

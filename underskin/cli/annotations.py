@@ -1,4 +1,4 @@
-"""The commands that rename, note, put away and undo: annotate, discard, changes and undo. Nothing is deleted."""
+"""The commands that annotate, discard and undo; nothing is deleted."""
 
 from typing import Annotated
 
@@ -25,10 +25,10 @@ def annotate(
     key: KeyOption = None,
 ) -> None:
     """Name a campaign or a skin, or change its notes or tags; what is not given stays."""
-    _require_one(campaign, skin)
-    called = "name" if campaign is not None else "title"
-    given = {called: name, "remark": notes, "tags": None if tags is None else tags.split(",")}
-    fields = {field: value for field, value in given.items() if value is not None}
+    _require_exactly_one(campaign, skin)
+    name_field = "name" if campaign is not None else "title"
+    values = {name_field: name, "remark": notes, "tags": None if tags is None else tags.split(",")}
+    fields = {field: value for field, value in values.items() if value is not None}
     if not fields:
         raise UnderskinError("give at least one of --name, --notes and --tags")
     document: Document
@@ -40,9 +40,9 @@ def annotate(
     if json:
         write_json(document)
         return
-    noted = [f"tags: {', '.join(document['tags'])}"] if document["tags"] else []
-    noted += [f"notes: {document['remark']}"] if document["remark"] else []
-    typer.echo("; ".join([f"{_noun(campaign, skin)} is called {document[called] or document['id']}", *noted]))
+    remarks = [f"tags: {', '.join(document['tags'])}"] if document["tags"] else []
+    remarks += [f"notes: {document['remark']}"] if document["remark"] else []
+    typer.echo("; ".join([f"{_noun(campaign, skin)} is called {document[name_field] or document['id']}", *remarks]))
 
 
 def discard(
@@ -54,7 +54,7 @@ def discard(
     key: KeyOption = None,
 ) -> None:
     """Put a trial campaign that nothing builds on, or a skin without campaigns in use, into no list any more."""
-    _require_one(campaign, skin)
+    _require_exactly_one(campaign, skin)
     document: Document
     with connect(url, key) as client:
         if campaign is not None:
@@ -75,7 +75,7 @@ def changes(
     key: KeyOption = None,
 ) -> None:
     """What was changed of a campaign or of a skin itself, the latest first, and what can be undone."""
-    _require_one(campaign, skin)
+    _require_exactly_one(campaign, skin)
     with connect(url, key) as client:
         entries = client.campaigns.changes(campaign) if campaign is not None else client.skins.changes(str(skin))
     if json:
@@ -101,16 +101,16 @@ def undo(
         typer.echo(f"undone of {noun}: {document['statement']}")
 
 
-def _row(entry: Document) -> tuple[str, ...]:
-    undoing = "can be undone" if entry["may_be_undone"] else "undone" if entry["undone"] else "-"
-    by, why = entry["made_from"] or "-", entry["reason"] or "-"
-    return entry["id"], moment(entry["at"]), entry["statement"], by, why, undoing
+def _row(change: Document) -> tuple[str, ...]:
+    undoing = "can be undone" if change["may_be_undone"] else "undone" if change["undone"] else "-"
+    by, why = change["made_from"] or "-", change["reason"] or "-"
+    return change["id"], moment(change["at"]), change["statement"], by, why, undoing
 
 
 def _noun(campaign: str | None, skin: str | None) -> str:
     return f"skin {skin}" if campaign is None else f"campaign {campaign}"
 
 
-def _require_one(campaign: str | None, skin: str | None) -> None:
+def _require_exactly_one(campaign: str | None, skin: str | None) -> None:
     if (campaign is None) == (skin is None):
         raise UnderskinError("give one of --campaign ID and --skin ID")

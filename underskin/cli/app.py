@@ -1,6 +1,6 @@
 """The command `underskin`: sigma, frf, d33 and stress from the shipped tables, and the commands of the other packages.
 
-Nothing heavy is imported before a command needs it, so that `underskin --help` answers at once.
+Heavy modules are imported when a command needs them, so that `underskin --help` answers at once.
 """
 
 import sys
@@ -31,7 +31,7 @@ app = typer.Typer(
 
 
 class Body(StrEnum):
-    """Which body carries the stress to the sensor."""
+    """The body that transmits the stress to the sensor."""
 
     LAYER = "layer"
     HALF_SPACE = "half_space"
@@ -45,13 +45,13 @@ def _column(meaning: str) -> object:
 _PRESSED_SKIN = (
     *("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio", "indenter_radius_mm", "preload_n"),
 )
-_Given = list[str] | None
-ThicknessMm = Annotated[_Given, _column("Thickness h of the layer over the sensors [mm].")]
-YoungsModulusMpa = Annotated[_Given, _column("Young's modulus E of the layer [MPa].")]
-SensorRadiusMm = Annotated[_Given, _column("Radius rT of a sensor [mm].")]
-PoissonRatio = Annotated[_Given, _column("Poisson's ratio of the layer, 0.5 if left out; others are out_of_domain.")]
-IndenterRadiusMm = Annotated[_Given, _column("Radius R of the sphere [mm].")]
-PreloadN = Annotated[_Given, _column("Static force F [N].")]
+_Numbers = list[str] | None
+ThicknessMm = Annotated[_Numbers, _column("Thickness h of the layer over the sensors [mm].")]
+YoungsModulusMpa = Annotated[_Numbers, _column("Young's modulus E of the layer [MPa].")]
+SensorRadiusMm = Annotated[_Numbers, _column("Radius rT of a sensor [mm].")]
+PoissonRatio = Annotated[_Numbers, _column("Poisson's ratio of the layer, 0.5 if left out; others are out_of_domain.")]
+IndenterRadiusMm = Annotated[_Numbers, _column("Radius R of the sphere [mm].")]
+PreloadN = Annotated[_Numbers, _column("Static force F [N].")]
 Input = Annotated[
     str | None,
     typer.Option(
@@ -81,9 +81,9 @@ UnitsChecked = Annotated[
 
 @app.command(no_args_is_help=True)
 def sigma(
-    a_over_h: Annotated[_Given, _column("Contact radius over thickness.")] = None,
-    rt_over_h: Annotated[_Given, _column("Sensor radius over thickness; 0 is a point sensor.")] = None,
-    load_parameter: Annotated[_Given, _column("L = F/(R² E), 0 if left out: the linear layer.")] = None,
+    a_over_h: Annotated[_Numbers, _column("Contact radius over thickness.")] = None,
+    rt_over_h: Annotated[_Numbers, _column("Sensor radius over thickness; 0 is a point sensor.")] = None,
+    load_parameter: Annotated[_Numbers, _column("L = F/(R² E), 0 if left out: the linear layer.")] = None,
     model: Annotated[Body, typer.Option(help="The layer on a rigid base, or the half space.")] = Body.LAYER,
     input_file: Input = None,
     sheet: Sheet = None,
@@ -106,7 +106,7 @@ def frf(
     sensor_radius_mm: SensorRadiusMm = None,
     indenter_radius_mm: IndenterRadiusMm = None,
     preload_n: PreloadN = None,
-    d33_pc_per_n: Annotated[_Given, _column("Piezoelectric coefficient d33 of the sensor [pC/N].")] = None,
+    d33_pc_per_n: Annotated[_Numbers, _column("Piezoelectric coefficient d33 of the sensor [pC/N].")] = None,
     poisson_ratio: PoissonRatio = None,
     contact: ContactOption = Contact.PAPER,
     units_checked: UnitsChecked = False,
@@ -115,8 +115,8 @@ def frf(
     csv: Csv = False,
 ) -> None:
     """The FRF, charge over force, that a skin should show under a sphere."""
-    given = locals()
-    options = {name: given[name] for name in (*_PRESSED_SKIN, "d33_pc_per_n")}
+    arguments = locals()
+    options = {name: arguments[name] for name in (*_PRESSED_SKIN, "d33_pc_per_n")}
     from underskin.prediction import answers
     from underskin.surrogate.solved_contact import contact_model
 
@@ -133,9 +133,9 @@ def d33(
     sensor_radius_mm: SensorRadiusMm = None,
     indenter_radius_mm: IndenterRadiusMm = None,
     preload_n: PreloadN = None,
-    frf_pc_per_n: Annotated[_Given, _column("Measured FRF on the plateau, real part [pC/N].")] = None,
+    frf_pc_per_n: Annotated[_Numbers, _column("Measured FRF on the plateau, real part [pC/N].")] = None,
     frf_uncertainty_pc_per_n: Annotated[
-        _Given, _column("Standard uncertainty of the measured FRF [pC/N]; without it d33 has none.")
+        _Numbers, _column("Standard uncertainty of the measured FRF [pC/N]; without it d33 has none.")
     ] = None,
     poisson_ratio: PoissonRatio = None,
     contact: ContactOption = Contact.PAPER,
@@ -154,8 +154,8 @@ def d33(
 
     Files also tell the elastomer's modulus, where it was recorded on the same bench (compression, indentation).
     """
-    given = locals()
-    options = {name: given[name] for name in (*_PRESSED_SKIN, "frf_pc_per_n", "frf_uncertainty_pc_per_n")}
+    arguments = locals()
+    options = {name: arguments[name] for name in (*_PRESSED_SKIN, "frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     if files:
         for_columns = [f"--{name.replace('_', '-')}" for name, values in options.items() if values]
         of_columns = (("--input", input_file), ("--sheet", sheet), ("--units-checked", units_checked))
@@ -166,7 +166,7 @@ def d33(
         invert_files(files, rig, estimator, band, figures, together, csv, contact.value)
         return
     only_files = ("rig", "estimator", "band", "figures", "together")
-    for_files = [f"--{name}" for name in only_files if given[name] is not None]
+    for_files = [f"--{name}" for name in only_files if arguments[name] is not None]
     _refuse(for_files, "goes with FILE, and none is given")
 
     defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
@@ -176,9 +176,9 @@ def d33(
 
     def compute(table: "SigmaTable", columns: "Mapping[str, Floats]") -> "ComputedColumns":
         answer = answers.d33(contact_model(table, contact.value), columns, units_checked)
-        found = answer.columns["d33_pc_per_n"]
+        d33_values = answer.columns["d33_pc_per_n"]
         try:
-            other = other_contact(table, contact.value, columns, found, units_checked=units_checked)
+            other = other_contact(table, contact.value, columns, d33_values, units_checked=units_checked)
             sentence = other.sentence
         except TableError as error:
             sentence = f"d33 by the other contact is not known: {error}"
@@ -196,13 +196,13 @@ def _refuse(options: Sequence[str], why: str) -> None:
 
 
 def _answer(
-    options: Mapping[str, _Given],
+    options: Mapping[str, _Numbers],
     defaults: Mapping[str, float | None],
     source: tuple[str | None, str | None],
     as_csv: bool,
     compute: "Callable[[SigmaTable, Mapping[str, Floats]], ComputedColumns]",
 ) -> None:
-    """Gather the columns, compute, and write inputs and results; `source`: a file of columns, and a sheet of it."""
+    """Gather the columns, compute, and write inputs and results; `source`: a file of columns, and its sheet."""
     from underskin.cli import columns
     from underskin.prediction.columns import rows
     from underskin.surrogate.sigma_table import load_table
@@ -214,12 +214,12 @@ def _answer(
     count = rows(gathered)
     table = load_table()
     answer = compute(table, gathered)
-    everything = {**gathered, **answer.columns}
+    results = {**gathered, **answer.columns}
     columns.write_findings(answer.findings)
     if as_csv:
-        columns.write_csv(everything, answer.inside, answer.limits, count, labels)
+        columns.write_csv(results, answer.inside, answer.limits, count, labels)
     else:
-        columns.write_table(everything, answer.inside, answer.limits, count, labels)
+        columns.write_table(results, answer.inside, answer.limits, count, labels)
         if not answer.inside.all():
             typer.echo(f"The domain is {answer.domain}.")
 

@@ -80,7 +80,7 @@ def join(
     """Say that two ids mean one skin: figures of SKIN use the campaigns of both."""
     with connect(url, key) as client:
         detail = client.skins.join(skin, other, reason)
-    joined = " and ".join(entry["id"] for entry in detail["joined"])
+    joined = " and ".join(joined_skin["id"] for joined_skin in detail["joined"])
     differ = "".join(f"\nwarning: they differ: {difference}" for difference in detail["differences"])
     _say(detail, f"skin {detail['id']} counts as one with {joined}{differ}", json)
 

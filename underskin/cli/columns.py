@@ -1,4 +1,4 @@
-"""Columns at the command line: from options and a CSV file into arrays, and back as CSV or as a table to read."""
+"""Columns at the command line: from options and a CSV file to arrays, and back to CSV or a table."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -68,11 +68,11 @@ def gather(
     path: str | None,
     sheet: str | None = None,
 ) -> tuple[dict[str, Floats], dict[str, list[str]]]:
-    """Every field of `options`, from its option, the CSV file at `path` (`-` is standard input), or a workbook's
-    `sheet`, or its default; one whose default is None may be left out. Then the file's columns of words.
+    """Every field of `options`, from its option, the CSV file at `path` (`-` is standard input), a workbook's `sheet`,
+    or its default; one whose default is None may be left out. Then the file's columns of text.
 
-    An option such as ["0.5,1", "2"] is a column of three; a single number has shape () and holds for all rows. Raises
-    InvalidInput, or UnderskinError for a field that has no value.
+    An option such as ["0.5,1", "2"] is a column of three; a single number has shape () and applies to all rows.
+    Raises InvalidInput, or UnderskinError for a field without a value.
     """
     in_file, labels = ({}, {}) if path is None else _from_csv(path, sheet, list(options))
     columns = {}
@@ -99,25 +99,25 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
 
 def _from_csv(path: str, sheet: str | None, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     try:
-        found = from_csv(_content(path, sheet), allowed)
+        table = from_csv(_content(path, sheet), allowed)
     except OSError as error:
         raise unreadable("input", path, f"must be a readable CSV or .xlsx file ({error.strerror})") from error
     except FileError as error:
         raise error.of_field("input", path) from None
     except CsvError as error:
         raise unreadable("input", path, str(error)) from error
-    for name in found.unknown:
-        meant = misspelt(name, allowed)
-        guess = f"did you mean {meant}? Allowed" if meant else "allowed"
+    for name in table.unknown:
+        suggestion = misspelt(name, allowed)
+        guess = f"did you mean {suggestion}? Allowed" if suggestion else "allowed"
         words = f"has the column {name!r}; {guess}, once each: {', '.join(allowed)}"
         raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
-    for note in found.notes:
+    for note in table.notes:
         sys.stderr.write(f"underskin: {note}\n")
-    return {name: np.array(column.numbers(name)) for name, column in found.fields.items()}, found.labels
+    return {name: np.array(column.numbers(name)) for name, column in table.fields.items()}, table.labels
 
 
 def _content(path: str, sheet: str | None) -> bytes:
-    """A CSV file, or as one a sheet of a workbook: of a name, or the only one."""
+    """The bytes of a CSV file, or of a workbook's sheet as CSV: the named one, or the only one."""
     source = sys.stdin.fileno() if path == STANDARD_INPUT else path
     with open(source, "rb", closefd=path != STANDARD_INPUT) as file:
         content = file.read()
@@ -135,9 +135,10 @@ def write_csv(
     count: int,
     names: Mapping[str, Sequence[str]] = _NO_NAMES,
 ) -> None:
-    """All columns, `limit` and `status` as CSV on standard output, numbers in full, NaN where there is no value.
+    """All columns, `limit` and `status` as CSV on standard output, numbers in full, NaN for missing values.
 
-    `names`: columns of text, one a row, that go first; `limits`: which limit each row exceeds that is not inside.
+    `names`: columns of text, one per row, that come first; `limits`: the limit that each row outside the domain
+    exceeds.
     """
     full = {name: np.broadcast_to(values, (count,)) for name, values in columns.items()}
     sys.stdout.write(to_csv({**names, **full, **told(inside, limits, count)}, "\n"))
@@ -150,7 +151,7 @@ def write_table(
     count: int,
     names: Mapping[str, Sequence[str]] = _NO_NAMES,
 ) -> None:
-    """Columns that are constant as a list, the others as a table, rounded; `names` go first."""
+    """Constant columns as a list, the others as a table, rounded; `names` come first."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
     varying = {name: values for name, values in columns.items() if values.size > 1 and np.unique(values).size > 1}
     listed = Table.grid(padding=(0, 2))
@@ -181,7 +182,7 @@ def _rows_table(columns: Mapping[str, Floats], status: Sequence[str], names: Map
         table.add_column(Text(f"{_NAMES[name][1]}\n{_unit(name)}"), justify="right", overflow="fold")
     table.add_column("status", overflow="fold")
     for number, row_status in enumerate(status):
-        texts = (Text(each[number]) for each in names.values())
+        texts = (Text(labels[number]) for labels in names.values())
         rounded = (_rounded(name, values[number]) for name, values in columns.items())
         table.add_row(*texts, *rounded, row_status)
     return table

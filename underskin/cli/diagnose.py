@@ -1,12 +1,9 @@
-"""The command `diagnose`.
+"""The commands `diagnose` and `plan`: what recordings and model disagree about, and which recordings would resolve it.
 
-Reports written as files, whole or not at all, each named like its campaign; and what the terminal says of them.
-`diagnose --together` and `--fleet`: files of campaigns of one skin, or of skins of one make, in one report.
-
-The commands `diagnose` and `plan`: what recordings and model disagree about, and which recordings would settle it.
-
-`diagnose` writes one report (`report/1`) a campaign, named like its input; it uses all cores, or a Dask cluster, one
-campaign a process, so that the reports do not depend on how many there are.
+`diagnose` writes one report (`report/1`) per campaign, named like its input; each file is written completely or not
+at all. It uses all cores, or a Dask cluster, one campaign per process, so that reports do not depend on the number
+of processes. With `--together` campaigns of one skin, with `--fleet` skins of one batch, are diagnosed in one
+report.
 """
 
 import json
@@ -34,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path) -> None:
-    """Reports are named like their campaigns: two of one name, or a campaign in the folder, would be lost."""
+    """Raise BadParameter where two reports would have one name, or a report would overwrite a campaign."""
     names = [*(file.stem for file in files), *campaigns]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -51,17 +48,17 @@ def refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_d
 
 
 def in_words(document: Mapping[str, Any]) -> str:
-    """A report's verdict and, below it, its statement."""
+    """A report's verdict and statement, on two lines."""
     return f"{document['verdict']}\n{document['statement']}"
 
 
 def write_report(document: dict[str, Any], path: Path) -> None:
-    """Write a report as JSON, the same bytes for the same report."""
+    """Write a report as JSON; equal reports give equal bytes."""
     _write(json.dumps(document, ensure_ascii=False, indent=1, allow_nan=False) + "\n", path)
 
 
 def write_page(document: dict[str, Any], path: Path, figures: Mapping[str, Any] | None = None) -> None:
-    """Write a report as a page, with those of its figures that are given."""
+    """Write a report as a page, with the given figures."""
     from underskin.diagnosis.reporting.html_report import page
 
     _write(page(document, figures), path)
@@ -78,7 +75,7 @@ _NAME = re.compile(r"\w[\w .-]*")
 
 def of_several(
     files: Sequence[Path],
-    read: "Callable[[Path], Reading]",
+    read_file: "Callable[[Path], Reading]",
     without: Sequence[str],
     output_dir: Path,
     *,
@@ -86,7 +83,7 @@ def of_several(
     together: str | None,
     fleet: str | None,
 ) -> None:
-    """Write NAME.json, and NAME.html with `html`; `read` reads a file."""
+    """Write NAME.json, and NAME.html with `html`; `read_file` reads one file."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -95,23 +92,23 @@ def of_several(
     target = output_dir / f"{_name(together, fleet)}.json"
     if any(file.resolve() == target.resolve() for file in files):
         raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
-    readings = _read(files, read)
-    known = sorted({reading.campaign.skin.id for reading in readings if reading.campaign.skin.id is not None})
-    if together is not None and len(known) > 1:
-        allowed = f"the campaigns are of several skins (skin.id): {', '.join(known)}"
+    readings = _read_all(files, read_file)
+    skin_ids = sorted({reading.campaign.skin.id for reading in readings if reading.campaign.skin.id is not None})
+    if together is not None and len(skin_ids) > 1:
+        allowed = f"the campaigns are of several skins (skin.id): {', '.join(skin_ids)}"
         raise typer.BadParameter(allowed, param_hint="--together")
     console = Console(stderr=True)
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
 
-        def told(share: float) -> None:
+        def show_progress(share: float) -> None:
             progress.update(bar, completed=share)
 
         if together is not None:
-            report = diagnose_together(readings, target.stem, without=without, progress=told)
+            report = diagnose_together(readings, target.stem, without=without, progress=show_progress)
         else:
-            report = diagnose_fleet(_by_skin(readings), target.stem, without=without, progress=told)
-        told(1.0)
+            report = diagnose_fleet(_by_skin(readings), target.stem, without=without, progress=show_progress)
+        show_progress(1.0)
     document = dict(report)
     write_report(document, target)
     if html:
@@ -123,7 +120,7 @@ def of_several(
 
 
 def _name(together: str | None, fleet: str | None) -> str:
-    """What the report is called."""
+    """The name of the report."""
     name = together if together is not None else fleet
     if name is None or (together is not None and fleet is not None):
         raise typer.BadParameter("one of --together and --fleet", param_hint="--fleet")
@@ -134,19 +131,19 @@ def _name(together: str | None, fleet: str | None) -> str:
     return name
 
 
-def _read(files: Sequence[Path], read: "Callable[[Path], Reading]") -> list["Reading"]:
+def _read_all(files: Sequence[Path], read_file: "Callable[[Path], Reading]") -> list["Reading"]:
 
     readings = []
     for file in files:
         try:
-            readings.append(read(file))
+            readings.append(read_file(file))
         except UnderskinError as error:
             raise UnderskinError(f"{file}: {error}") from error
     return readings
 
 
 def _by_skin(readings: Sequence["Reading"]) -> dict[str, list["Reading"]]:
-    """By skin.id, which each must have."""
+    """The readings by skin.id, which each must have."""
     skins: dict[str, list[Reading]] = {}
     for reading in readings:
         skin = reading.campaign.skin.id
@@ -166,12 +163,12 @@ Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each 
 
 @dataclass(frozen=True)
 class _Outcome:
-    """The outcome of one campaign: its verdict and, below it, its statement, or why there is no report."""
+    """The outcome of one campaign: verdict and statement, or why there is no report."""
 
     source: str
     problem: str = ""
     answer: str = ""
-    notes: tuple[str, ...] = ()  # what was taken for what, and what to look at
+    notes: tuple[str, ...] = ()  # assumptions in reading, and warnings
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -223,26 +220,28 @@ def diagnose(
     output_dir.mkdir(parents=True, exist_ok=True)
     if campaign and several:
         raise typer.BadParameter("takes files; of stored campaigns ask the service", param_hint="--together, --fleet")
-    read = partial(read_by, rig=description, estimator=estimator)
+    read_file = partial(read_by, rig=description, estimator=estimator)
     if several:
-        of_several(files, read, without or [], output_dir, html=html, together=together, fleet=fleet)
+        of_several(files, read_file, without or [], output_dir, html=html, together=together, fleet=fleet)
         return
     # Absolute, since a cluster's workers have a working folder of their own
-    one = partial(_one, read=read, output_dir=output_dir.resolve(), html=html, without=without or [])
+    work = partial(
+        _diagnose_file, read_file=read_file, output_dir=output_dir.resolve(), html=html, without=without or []
+    )
     failed = False
     console = Console(stderr=True)
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=len(files) + len(campaign))
         for outcomes in (
-            _of_files(files, one, workers or os.cpu_count() or 1, scheduler),
-            _of_store(campaign, output_dir, html, without or [], url, key),
+            _file_outcomes(files, work, workers or os.cpu_count() or 1, scheduler),
+            _stored_outcomes(campaign, output_dir, html, without or [], url, key),
         ):
             for outcome in outcomes:
                 progress.advance(bar)
                 failed |= bool(outcome.problem)
                 line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.source}: {outcome.answer}"
-                for said in (line, *(f"{outcome.source}: {note}" for note in outcome.notes)):
-                    console.print(said, markup=False, highlight=False, soft_wrap=True)
+                for message in (line, *(f"{outcome.source}: {note}" for note in outcome.notes)):
+                    console.print(message, markup=False, highlight=False, soft_wrap=True)
     if output_dir == _REPORTS and any(output_dir.iterdir()):
         console.print(f"reports are in {output_dir}", markup=False, highlight=False)
     if failed:
@@ -250,40 +249,40 @@ def diagnose(
 
 
 def _check_inputs(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path, *, several: bool) -> None:
-    """Raise BadParameter for nothing to diagnose, and for a report in the place of another file; `several`: in one."""
+    """Raise BadParameter without inputs, and where a report would overwrite a file; `several`: one report of all."""
     if not files and not campaigns:
         raise typer.BadParameter("give files or --campaign", param_hint="FILES")
     if not several:
         refuse_overwriting(files, campaigns, output_dir)
 
 
-def _of_files(
-    files: Sequence[Path], one: Callable[[Path], _Outcome], workers: int, scheduler: str | None
+def _file_outcomes(
+    files: Sequence[Path], work: Callable[[Path], _Outcome], workers: int, scheduler: str | None
 ) -> Iterator[_Outcome]:
     if scheduler is None and (len(files) <= 1 or workers == 1):
         for file in files:
-            yield one(file)
+            yield work(file)
         return
     remaining = list(files)
     while remaining:
-        for file, outcome in _of_pool(remaining, one, min(workers, len(remaining)), scheduler):
+        for file, outcome in _pool_outcomes(remaining, work, min(workers, len(remaining)), scheduler):
             remaining.remove(file)
             yield outcome
-        # A process that dies ends the pool: the files that may have caused it are diagnosed alone, one by one
+        # A process that dies ends the pool: the files that may have caused it are diagnosed one by one
         suspects = remaining[:workers]
         for file in suspects:
-            alone = dict(_of_pool([file], one, 1, scheduler))
+            outcomes = dict(_pool_outcomes([file], work, 1, scheduler))
             remaining.remove(file)
-            yield alone.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
+            yield outcomes.get(file, _Outcome(str(file), f"{file}: the process that worked it out was killed; memory?"))
 
 
-def _of_pool(
-    files: Sequence[Path], one: Callable[[Path], _Outcome], workers: int, scheduler: str | None
+def _pool_outcomes(
+    files: Sequence[Path], work: Callable[[Path], _Outcome], workers: int, scheduler: str | None
 ) -> Iterator[tuple[Path, _Outcome]]:
-    """The outcomes of the files that were diagnosed before any process died."""
+    """The outcomes of the files that were finished before any process died."""
     with _executor(workers, scheduler) as pool:
         pending: dict[Future[_Outcome], Path] = {
-            pool.submit(one, file if scheduler is None else file.resolve()): file for file in files
+            pool.submit(work, file if scheduler is None else file.resolve()): file for file in files
         }
         for done in as_completed(pending):
             file = pending[done]
@@ -315,8 +314,8 @@ def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def _one(
-    file: Path, *, read: "Callable[[Path], Reading]", output_dir: Path, html: bool, without: Sequence[str]
+def _diagnose_file(
+    file: Path, *, read_file: "Callable[[Path], Reading]", output_dir: Path, html: bool, without: Sequence[str]
 ) -> _Outcome:
     """Read, diagnose and write one campaign."""
     from underskin.diagnosis.pipeline import diagnose as work_out
@@ -324,7 +323,7 @@ def _one(
     from underskin.diagnosis.reporting.report import report
 
     try:
-        reading = read(file)
+        reading = read_file(file)
         diagnosis = with_refused(work_out(reading.campaign, _table(), without=without), reading.problems)
     except UnderskinError as error:
         return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
@@ -339,16 +338,16 @@ def _one(
 
 @cache
 def _table() -> "SigmaTable":
-    """The table, loaded once in a process."""
+    """The table, loaded once per process."""
     from underskin.surrogate.sigma_table import load_table
 
     return load_table()
 
 
-def _of_store(
+def _stored_outcomes(
     campaigns: Sequence[str], output_dir: Path, html: bool, without: Sequence[str], url: str, key: str | None
 ) -> Iterator[_Outcome]:
-    """Have the service diagnose stored campaigns; all are started before the first is awaited."""
+    """Diagnoses of stored campaigns by the service; all are started before the first is awaited."""
     if not campaigns:
         return
     with connect(url, key) as client:
@@ -358,7 +357,7 @@ def _of_store(
 
 
 def _start(client: "Client", campaign: str, without: Sequence[str]) -> str | _Outcome:
-    """The id of the diagnosis."""
+    """The id of the diagnosis, or an outcome where it cannot be started."""
     try:
         return client.diagnoses.start(campaign, without=without).id
     except UnderskinError as error:
@@ -366,7 +365,7 @@ def _start(client: "Client", campaign: str, without: Sequence[str]) -> str | _Ou
 
 
 def _fetched(client: "Client", campaign: str, diagnosis: str, output_dir: Path, html: bool) -> _Outcome:
-    """Await one diagnosis and write its report; its page has the one figure that can be drawn from a report."""
+    """Await one diagnosis and write its report; its page has the one figure that a report holds."""
     try:
         finished = client.diagnoses.wait(diagnosis)
     except UnderskinError as error:

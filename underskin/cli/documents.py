@@ -1,4 +1,4 @@
-"""What the service answered, for scripts as JSON, for eyes as tables."""
+"""Answers of the service: as JSON for scripts, as tables for people."""
 
 import json
 import sys
@@ -12,12 +12,12 @@ AsJson = Annotated[bool, typer.Option("--json", help="Write JSON, with the field
 
 
 def write_json(document: Any) -> None:
-    """A document, or a list of them."""
+    """Write a document, or a list of documents."""
     typer.echo(json.dumps(document, default=dict, ensure_ascii=False, indent=1))
 
 
 def write_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A table; the last column takes what is left of the line.
+    """Write a table; the last column takes the remaining width.
 
     Raises ValueError where a row has more or fewer cells than there are headings.
     """
@@ -44,7 +44,7 @@ def moment(time: str | None) -> str:
 
 
 def state_of(campaign: Document) -> str:
-    """Whether figures use a campaign and, where not, why."""
+    """Whether results use a campaign and, where not, why."""
     if campaign["state"] == "withdrawn":
         if campaign["discarded_at"] is not None:
             return f"discarded: {campaign['withdraw_reason']}"

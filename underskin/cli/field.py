@@ -29,7 +29,7 @@ def field(
     csv: Annotated[bool, typer.Option("--csv", help="Write the whole section as CSV instead of a table.")] = False,
 ) -> None:
     """The stress σ_zz in the layer under a sphere: as a table on the base, as CSV at every depth."""
-    given = {
+    inputs = {
         "thickness_mm": thickness_mm,
         "youngs_modulus_mpa": youngs_modulus_mpa,
         "sensor_radius_mm": sensor_radius_mm,
@@ -48,18 +48,24 @@ def field(
     from underskin.units import to_lab
 
     model = contact_model(load_table(), contact.value)
-    found = field_from_lab(model, given, r_points, depth_points, units_checked=units_checked)
+    stress_field = field_from_lab(model, inputs, r_points, depth_points, units_checked=units_checked)
     r, depth, stress = (
         to_lab(name, values)
-        for name, values in (("r_mm", found.r), ("depth_mm", found.depth), ("sigma_zz_mpa", found.sigma_zz[0]))
+        for name, values in (
+            ("r_mm", stress_field.r),
+            ("depth_mm", stress_field.depth),
+            ("sigma_zz_mpa", stress_field.sigma_zz[0]),
+        )
     )
-    limits = None if found.limits[0] is None else [found.limits[0]] * (r.size * depth.size if csv else r.size)
+    limits = (
+        None if stress_field.limits[0] is None else [stress_field.limits[0]] * (r.size * depth.size if csv else r.size)
+    )
     if csv:
         section = {"depth_mm": np.repeat(depth, r.size), "r_mm": np.tile(r, depth.size), "sigma_zz_mpa": stress.ravel()}
-        columns.write_csv(section, found.contact.inside, limits, stress.size)
+        columns.write_csv(section, stress_field.contact.inside, limits, stress.size)
         return
-    pressed = {**{name: np.array(value) for name, value in given.items()}, **lab_columns(found.contact)}
+    pressed = {**{name: np.array(value) for name, value in inputs.items()}, **lab_columns(stress_field.contact)}
     bounded = poisson_ratio == INCOMPRESSIBLE and contact is Contact.PAPER
-    error = {"section_error": found.section_error} if bounded else {}
+    error = {"section_error": stress_field.section_error} if bounded else {}
     base = {**error, "r_mm": r, "sigma_zz_mpa": stress[-1]}
-    columns.write_table({**pressed, **base}, found.contact.inside, limits, r.size)
+    columns.write_table({**pressed, **base}, stress_field.contact.inside, limits, r.size)

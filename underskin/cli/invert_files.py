@@ -1,7 +1,6 @@
-"""The command `d33`.
+"""The command `d33` for files: the d33 of an array and the elastomer's modulus from recordings, without a server.
 
-The d33 and the modulus of the elastomer of campaigns, for the command line: as tables, or as CSV. `underskin d33
-FILE...`: the d33 of an array, and the elastomer's modulus, from files of recordings; no server.
+Results are written as tables, or as CSV.
 """
 
 import csv
@@ -45,7 +44,7 @@ _HEADER = (
 
 @dataclass(frozen=True)
 class InvertedFile:
-    """An inverted file, or several as one campaign: the reading, its d33 or why there is none, and its moduli."""
+    """An inverted file, or several as one campaign: the reading, its d33 or the reason for none, and its moduli."""
 
     file: str
     reading: Reading
@@ -67,7 +66,7 @@ class InvertedFile:
 
     @property
     def notes(self) -> list[str]:
-        """What was taken for what, findings in words, and each recording or sensor that is left out."""
+        """Assumptions in reading, findings, and each recording or sensor that is left out."""
         notes = reading_notes(self.reading)
         notes += [self.by_other_contact] if self.by_other_contact else []
         campaign = self.reading.campaign
@@ -80,42 +79,44 @@ class InvertedFile:
             why = f"none of the {count} recordings can be used" if count else self.inversion
             notes.append(f"no d33: {why}")
         refused = [(problem.recording, problem.as_error(problem.field)) for problem in self.reading.problems]
-        refused += [(one.recording, one.result) for one in self.moduli if isinstance(one.result, InvalidInput)]
+        refused += [
+            (modulus.recording, modulus.result) for modulus in self.moduli if isinstance(modulus.result, InvalidInput)
+        ]
         for names, why in told_together((recording, str(why)) for recording, why in refused):
             notes.append(f"left out: {recordings_called(names)}: {why}")
         if isinstance(self.inversion, Inversion):
-            notes += [f"left out: {left.sentence}" for left in self.inversion.left_out]
+            notes += [f"left out: {omission.sentence}" for omission in self.inversion.left_out]
         return notes
 
 
-def write_tables(everything: Iterable[InvertedFile]) -> None:
-    """Each file's array, sensors and elastomer, what was left out, and its findings."""
+def write_tables(results: Iterable[InvertedFile]) -> None:
+    """Each file's array, sensors and elastomer, omissions, and findings."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
-    for entry in everything:
-        console.print(Text(entry.title, style="bold"))
-        if isinstance(entry.inversion, Inversion):
-            console.print(_array(entry.inversion))
-            console.print(_sensors(entry.inversion))
-        if any(not isinstance(modulus.result, InvalidInput) for modulus in entry.moduli):
-            console.print(_elastomer(entry.moduli))
-        for note in entry.notes:
+    for result in results:
+        console.print(Text(result.title, style="bold"))
+        if isinstance(result.inversion, Inversion):
+            console.print(_array(result.inversion))
+            console.print(_sensors(result.inversion))
+        if any(not isinstance(modulus.result, InvalidInput) for modulus in result.moduli):
+            console.print(_elastomer(result.moduli))
+        for note in result.notes:
             console.print(Text(note), soft_wrap=True)
         console.print()
 
 
-def write_csv(everything: Iterable[InvertedFile]) -> None:
-    """d33 in rows: of the array, with what the skin may be off as declared and without, of each sensor, and of each
-    sensor × indenter × preload.
+def write_csv(results: Iterable[InvertedFile]) -> None:
+    """d33 in rows: of the array, with the skin's tolerances and without, of each sensor, and of each sensor × indenter
+    × preload.
 
-    Findings, and what was left out, go to standard error.
+    Findings and omissions go to standard error.
     """
     writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(_HEADER)
-    for entry in everything:
-        if isinstance(entry.inversion, Inversion):
-            writer.writerows([entry.file, *row] for row in _rows(entry.inversion))
-        for note in entry.notes:
-            print(f"underskin: {entry.file}: {note}", file=sys.stderr)
+    for result in results:
+        if isinstance(result.inversion, Inversion):
+            writer.writerows([result.file, *row] for row in _rows(result.inversion))
+        for note in result.notes:
+            print(f"underskin: {result.file}: {note}", file=sys.stderr)
 
 
 def _rows(inversion: Inversion) -> list[list[str]]:
@@ -129,8 +130,8 @@ def _rows(inversion: Inversion) -> list[list[str]]:
     radii = to_lab("indenter_radius_mm", cells.indenter_radius).round(9)
     conditions = zip(cells.sensor, radii.tolist(), cells.preload.tolist(), cells.recordings.tolist(), strict=True)
     for (sensor, radius, preload, count), numbers in zip(conditions, cells.d33.d33_rows(), strict=True):
-        where = [inversion.sensor_ids[sensor], repr(radius), repr(preload), str(count)]
-        rows.append(["cell", *where, *_full(numbers), ""])
+        condition = [inversion.sensor_ids[sensor], repr(radius), repr(preload), str(count)]
+        rows.append(["cell", *condition, *_full(numbers), ""])
     return rows
 
 
@@ -141,8 +142,8 @@ def _full(numbers: Sequence[float]) -> list[str]:
 def _array(inversion: Inversion) -> Table:
     listed = Table.grid(padding=(0, 2))
     zone = inversion.zone
-    named = ("d33 of the array", inversion.absolute_d33), ("relative to others", inversion.campaign_d33)
-    for name, d33 in named:
+    quantities = ("d33 of the array", inversion.absolute_d33), ("relative to others", inversion.campaign_d33)
+    for name, d33 in quantities:
         if d33 is not None:
             value, uncertainty, low, high = d33.d33_rows()[0]
             ends = f"{significant(low, 4)} to {significant(high, 4)}"
@@ -188,7 +189,7 @@ def _table(first: str, *numbers: str, remark: str) -> Table:
 
 
 def _short(numbers: Sequence[float]) -> list[str]:
-    """Four significant digits of a value and its limits, two of the uncertainty, which comes second."""
+    """A value and its limits to four significant digits, the uncertainty, second, to two."""
     digits = (4, 2, 4, 4)
     return [
         "-" if number != number else significant(number, most) for number, most in zip(numbers, digits, strict=False)
@@ -199,7 +200,7 @@ _BandHz = tuple[float, float]
 
 
 class _FileErrors:
-    """Prints errors of files beside the progress bar, and counts them."""
+    """Prints errors of files above the progress bar, and counts them."""
 
     def __init__(self, console: Console) -> None:
         self.count = 0
@@ -226,7 +227,8 @@ def invert_files(
     as_csv: bool,
     contact: ContactName,
 ) -> None:
-    """Print d33 and moduli of each file, or of all `together`; exit status 2 where one is unreadable or gives neither.
+    """Print d33 and moduli of each file, or of all `together`; exit status 2 for an unreadable file or one without
+    result.
 
     Raises UnderskinError where files that go together are not of one skin.
     """
@@ -247,8 +249,8 @@ def invert_files(
         readings: Iterable[tuple[str, Reading]] = _readings(
             progress.track(files, description="inverting"), description, estimator, errors
         )
-        if together is not None and (every := list(readings)):
-            readings = [(together, join(together, every))]
+        if together is not None and (all_readings := list(readings)):
+            readings = [(together, join(together, all_readings))]
         for name, reading in readings:
             with errors.about(name):
                 result = _inverted(name, reading, table, contact, band_hz)
@@ -262,7 +264,7 @@ def invert_files(
 def _readings(
     files: Iterable[Path], rig: RigDescription | None, estimator: Estimator | None, errors: _FileErrors
 ) -> Iterator[tuple[str, Reading]]:
-    """Each file that can be read, by its name."""
+    """Each readable file, with its name."""
     for file in files:
         with errors.about(str(file)):
             reading = read_file(file, str(file), rig).with_estimator(estimator)
@@ -286,7 +288,7 @@ def _inverted(
 def _by_other_contact(
     reading: Reading, table: SigmaTable, contact: ContactName, band_hz: _BandHz | None, inversion: Inversion
 ) -> str:
-    """d33 of the array by it, in words; empty where it is nearly the same."""
+    """d33 of the array with the other contact model, in words; empty where it is nearly the same."""
     try:
         other = array_d33_by_other(reading.campaign, table, band_hz, inversion, contact)
     except TableError as error:

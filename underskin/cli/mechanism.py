@@ -1,4 +1,4 @@
-"""The commands `mechanism list`, `save` and `check`: the mechanisms that a lab declares itself (`mechanism/1`)."""
+"""The commands `mechanism list`, `save` and `check`: mechanisms declared by the lab (`mechanism/1`)."""
 
 import json
 import os
@@ -35,7 +35,7 @@ def check(files: Annotated[list[Path], typer.Argument(help="Files of mechanisms 
     failed = False
     for file in files:
         try:
-            mechanism = _read(file)
+            mechanism = _load(file)
         except UnderskinError as error:
             failed = True
             typer.echo(f"underskin: {error}", err=True)
@@ -58,8 +58,8 @@ def save(
     from underskin.mechanisms.declared.folder import FOLDER
     from underskin.mechanisms.registry import CATALOGUE
 
-    where = folder or (Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None)
-    if where is None:
+    target = folder or (Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None)
+    if target is None:
         raise UnderskinError(f"give --folder, or set {FOLDER}")
     if name in CATALOGUE:
         raise InvalidInput("name", name, "is taken by another mechanism")
@@ -67,25 +67,25 @@ def save(
         document = json.loads(report.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise UnderskinError(f"{report}: cannot be read as a report: {error}") from error
-    file = where / f"{name}.yaml"
+    file = target / f"{name}.yaml"
     text = saving.document(document, name, description)
-    parse(text.encode(), str(file))  # which refuses a name or text that cannot be kept
-    where.mkdir(parents=True, exist_ok=True)
+    parse(text.encode(), str(file))  # rejects an invalid name or text
+    target.mkdir(parents=True, exist_ok=True)
     file.write_text(text, encoding="utf-8")
     typer.echo(str(file))
 
 
 def _on(mechanism: "DeclaredMechanism") -> str:
-    """On what, with the columns of `conditions` that it reads: a name that nobody records is a slip."""
+    """The recordings it acts on, with the columns of `conditions` that it reads, so that a misspelt name shows."""
     from underskin.mechanisms.declared.mechanism import FREQUENCY
     from underskin.mechanisms.unlisted.axes import BUILT_IN
 
-    own = [name for name in mechanism.axes if name not in (*BUILT_IN, FREQUENCY)]
-    columns = f", by {' and '.join(own)} of their conditions" if own else ""
+    column_names = [name for name in mechanism.axes if name not in (*BUILT_IN, FREQUENCY)]
+    columns = f", by {' and '.join(column_names)} of their conditions" if column_names else ""
     return ("on FRFs" if "frf" in mechanism.kinds else "on indentation curves") + columns
 
 
-def _read(file: Path) -> "DeclaredMechanism":
+def _load(file: Path) -> "DeclaredMechanism":
     from underskin.mechanisms.declared.folder import checked
 
     try:

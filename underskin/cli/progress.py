@@ -1,4 +1,4 @@
-"""Progress in bytes, on a terminal; a pipe gets none."""
+"""Progress in bytes, on a terminal; nothing is written to a pipe."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def byte_progress() -> "Progress":
-    """A bar on standard error: what is done, how many bytes of how many, how fast."""
+    """A progress bar on standard error: bytes done, total, rate."""
     from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
 
@@ -22,13 +22,13 @@ def byte_progress() -> "Progress":
 
 @contextmanager
 def byte_steps() -> Iterator[Callable[[str, int, int | None], None]]:
-    """A bar for each step of a task, told by name with its bytes so far and, where known, in all."""
+    """A bar for each step of a task; the function takes the step's name, its bytes so far and, where known, in all."""
     with byte_progress() as bar:
         tasks: dict[str, TaskID] = {}
 
-        def told(step: str, done: int, of: int | None) -> None:
+        def advance(step: str, done: int, of: int | None) -> None:
             if step not in tasks:
                 tasks[step] = bar.add_task(step, total=None)
             bar.update(tasks[step], completed=done, total=of)
 
-        yield told
+        yield advance

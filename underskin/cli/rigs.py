@@ -1,4 +1,4 @@
-"""The rig description that a command was given, the estimator, and what was read by them."""
+"""The options for rig description and estimator, and reading with them."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -34,13 +34,13 @@ def rig_description_in(rig: Path) -> "RigDescription":
 
 
 def read_by(file: Path, rig: "RigDescription | None", estimator: "Estimator | None") -> "Reading":
-    """A file by the rig description and the estimator that were given; raises as `read_file`."""
+    """Read a file with a rig description and an estimator; raises as `read_file`."""
     from underskin.recordings import read_file
 
     return read_file(file, file.name, rig).with_estimator(estimator)
 
 
 def reading_notes(reading: "Reading") -> list[str]:
-    """What was taken for what, a line a field, and what to look at."""
-    taken = [f"read {field or 'the text as'}: {how}" for field, how in reading.taken.items()]
-    return [*taken, *(f"look at: {warning}" for warning in reading.warnings)]
+    """Assumptions in reading, a line for each field, and warnings."""
+    mappings = [f"read {field or 'the text as'}: {how}" for field, how in reading.taken.items()]
+    return [*mappings, *(f"look at: {warning}" for warning in reading.warnings)]

@@ -1,4 +1,4 @@
-"""Files sent to the service, and what became of them, in lines."""
+"""Files sent to the service, and the outcome in lines of text."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ def sent(
 ) -> list[Line]:
     """The outcome of files sent at once: a line for each campaign, each remark and each refused recording.
 
-    `terms` as `client.campaigns.post_files` takes them; `progress` is called with the bytes that are sent.
+    `terms` as `client.campaigns.post_files` takes them; `progress` is called with the number of bytes sent.
     """
     try:
         if terms["together"] is None and _is_export(files[0]):
@@ -30,20 +30,20 @@ def sent(
     except UnderskinError as error:
         return [(False, str(error))]
     except OSError as error:
-        place = f"{error.filename} " if len(files) > 1 else ""
-        return [(False, f"{place}cannot be opened: {error.strerror}")]
+        prefix = f"{error.filename} " if len(files) > 1 else ""
+        return [(False, f"{prefix}cannot be opened: {error.strerror}")]
     return [line for result in results for line in outcome(client, result)]
 
 
 def results_of(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> list["SentFile"]:
-    """What the service answers to files, the same however often they are sent; raises UnderskinError, OSError."""
+    """The service's answer to files, the same however often they are sent; raises UnderskinError, OSError."""
     from underskin.client.campaigns import content_key
 
     return client.campaigns.post_files(files, **terms, idempotency_key=content_key(files, terms))
 
 
 def _is_export(file: Path) -> bool:
-    """Whether a file is what `export` writes, by its content."""
+    """Whether a file was written by `export`, by its content."""
     from underskin.recordings.skin_export import is_export
 
     with file.open("rb") as opened:
@@ -51,11 +51,13 @@ def _is_export(file: Path) -> bool:
 
 
 def outcome(client: "Client", result: Mapping[str, Any]) -> list[Line]:
-    """What became of one campaign: its id and d33, remarks, and what was refused of it."""
-    accepted = [entry for entry in result["recordings"] if entry["status"] == "ok"]
+    """The outcome of one campaign: its id and d33, remarks, and refused recordings."""
+    accepted = [recording for recording in result["recordings"] if recording["status"] == "ok"]
     lines = [(False, why_refused(error)) for error in result["errors"]]
-    left_out = ((entry["id"], why_refused(error)) for entry in result["recordings"] for error in entry["errors"])
-    lines += [(False, f"{names} {reason}") for names, reason in told_together(left_out)]
+    refusals = (
+        (recording["id"], why_refused(error)) for recording in result["recordings"] for error in recording["errors"]
+    )
+    lines += [(False, f"{names} {reason}") for names, reason in told_together(refusals)]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
         count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"
@@ -67,15 +69,15 @@ def outcome(client: "Client", result: Mapping[str, Any]) -> list[Line]:
 
 
 def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
-    """d33 and moduli of a campaign in one line, and a line for each finding and for each thing left out."""
+    """d33 and moduli of a campaign in one line, and a line for each finding and each omission."""
     try:
         answer = client.campaigns.d33(campaign_id)
     except UnderskinError as error:  # the campaign is stored nevertheless
         return f"no d33: {error}", []
     moduli = [
-        f"E of {one['recording']} {significant(one['youngs_modulus_mpa'], 4)} "
-        f"± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa by its noise alone"
-        for one in answer["moduli"]
+        f"E of {modulus['recording']} {significant(modulus['youngs_modulus_mpa'], 4)} "
+        f"± {significant(modulus['youngs_modulus_uncertainty_mpa'], 2)} MPa by its noise alone"
+        for modulus in answer["moduli"]
     ]
     array = answer["array"]
     if array is not None:
@@ -84,7 +86,7 @@ def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
         d33 = f"no d33: {answer['reason'] or 'every sensor stands out'}"
     results = moduli if moduli and answer["status"] == "none" else [d33, *moduli]
     remarks = [f"look at: {finding}" for finding in answer["findings"]]
-    for left in answer["left_out"]:
-        of = "" if left["recording"] is None else f"recording {left['recording']}: "
-        remarks.append(f"left out: {of}{left['reason']}")
+    for omission in answer["left_out"]:
+        of = "" if omission["recording"] is None else f"recording {omission['recording']}: "
+        remarks.append(f"left out: {of}{omission['reason']}")
     return ", ".join(results), remarks

@@ -75,7 +75,7 @@ def export_skin(
 
 
 def _size(file: Path) -> int:
-    """In bytes; 0 of a file that cannot be read, which is told when it is sent."""
+    """Size in bytes; 0 for an unreadable file, whose error is reported when it is sent."""
     try:
         return file.stat().st_size
     except OSError:

@@ -1,4 +1,4 @@
-"""The commands that read what the service keeps: campaigns, skins and history."""
+"""The commands that list stored campaigns, skins and history."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -42,11 +42,11 @@ def campaigns(
 def skins(json: AsJson = False, url: Url = LOCAL, key: KeyOption = None) -> None:
     """Skins that the service keeps, by id."""
     with connect(url, key) as client:
-        entries = list(client.skins.all())
+        records = list(client.skins.all())
     if json:
-        write_json(entries)
+        write_json(records)
     else:
-        rows = ((entry["id"], moment(entry["created_at"]), str(entry["campaigns"])) for entry in entries)
+        rows = ((skin["id"], moment(skin["created_at"]), str(skin["campaigns"])) for skin in records)
         write_rows(("skin", "since (UTC)", "campaigns"), rows)
 
 
@@ -61,34 +61,43 @@ def history(
 ) -> None:
     """The d33 of each sensor of a skin over time, the array's change and each sensor's beside it; what is left out."""
     with connect(url, key) as client:
-        found = client.skins.history(skin, model=model)
+        document = client.skins.history(skin, model=model)
     if json:
-        write_json(found)
+        write_json(document)
         return
-    points = [(sensor["sensor"], point) for sensor in found["sensors"] for point in sensor["points"]]
+    points = [(sensor["sensor"], point) for sensor in document["sensors"] for point in sensor["points"]]
     headings = ("sensor", "time (UTC)", "time is", "d33 pC/N", "±", "campaign")
     write_rows(headings, (_point(sensor, point) for sensor, point in points))
-    array = found["array"]
+    array = document["array"]
     if array is not None:
         typer.echo(f"{array['statement']}.")
-    beside = any(sensor["departure"] is not None for sensor in found["sensors"])
-    told = _departure if beside else _trend
-    heading = "beside the array" if beside else "trend"
-    write_rows(("sensor", heading), ((sensor["sensor"], told(sensor)) for sensor in found["sensors"]))
-    for left in found["left_out_campaigns"]:
-        typer.echo(f"left out: campaign {left['campaign_id']}: {left['reason']}")
-    for left in found["left_out_points"]:
-        typer.echo(f"left out: sensor {left['sensor']} of campaign {left['campaign_id']}: {left['reason']}")
-    for left in found["left_out_recordings"]:
-        typer.echo(f"left out: recording {left['recording']} of campaign {left['campaign_id']}: {left['reason']}")
+    has_departures = any(sensor["departure"] is not None for sensor in document["sensors"])
+    describe = _departure if has_departures else _trend
+    heading = "beside the array" if has_departures else "trend"
+    write_rows(("sensor", heading), ((sensor["sensor"], describe(sensor)) for sensor in document["sensors"]))
+    for omission in document["left_out_campaigns"]:
+        typer.echo(f"left out: campaign {omission['campaign_id']}: {omission['reason']}")
+    for omission in document["left_out_points"]:
+        typer.echo(f"left out: sensor {omission['sensor']} of campaign {omission['campaign_id']}: {omission['reason']}")
+    for omission in document["left_out_recordings"]:
+        typer.echo(
+            f"left out: recording {omission['recording']} of campaign {omission['campaign_id']}: {omission['reason']}"
+        )
 
 
-def _row(entry: Document) -> tuple[str, ...]:
-    excluded = f" − {entry['excluded']}" if entry["excluded"] else ""
-    recorded = moment(entry["recorded_at"])
-    if entry["recorded_at"] is None:
-        recorded = f"received {moment(entry['received_at'])}"
-    return entry["id"], entry["skin_id"], entry["name"], recorded, f"{entry['recordings']}{excluded}", state_of(entry)
+def _row(campaign: Document) -> tuple[str, ...]:
+    excluded = f" − {campaign['excluded']}" if campaign["excluded"] else ""
+    recorded = moment(campaign["recorded_at"])
+    if campaign["recorded_at"] is None:
+        recorded = f"received {moment(campaign['received_at'])}"
+    return (
+        campaign["id"],
+        campaign["skin_id"],
+        campaign["name"],
+        recorded,
+        f"{campaign['recordings']}{excluded}",
+        state_of(campaign),
+    )
 
 
 def _show(detail: Document, diagnoses: Sequence[Document]) -> None:
@@ -97,23 +106,26 @@ def _show(detail: Document, diagnoses: Sequence[Document]) -> None:
         ("recording", "kind", "sensor", "recorded (UTC)", "state"),
         (
             (
-                entry["id"],
-                entry["kind"],
-                entry["sensor"] or "-",
-                moment(entry["recorded_at"]),
-                "in use" if entry["excluded_at"] is None else f"excluded: {entry['exclude_reason']}",
+                recording["id"],
+                recording["kind"],
+                recording["sensor"] or "-",
+                moment(recording["recorded_at"]),
+                "in use" if recording["excluded_at"] is None else f"excluded: {recording['exclude_reason']}",
             )
-            for entry in detail["entries"]
+            for recording in detail["entries"]
         ),
     )
     if diagnoses:
         write_rows(
             ("diagnosis", "asked (UTC)", "state", "verdict"),
-            ((one["id"], moment(one["asked_at"]), one["state"], one["verdict"] or "-") for one in diagnoses),
+            (
+                (diagnosis["id"], moment(diagnosis["asked_at"]), diagnosis["state"], diagnosis["verdict"] or "-")
+                for diagnosis in diagnoses
+            ),
         )
-    for entry in detail["refused"]:
-        for error in entry["errors"]:
-            typer.echo(f"refused: {entry['id']} {error['field']}: {error['allowed']}")
+    for recording in detail["refused"]:
+        for error in recording["errors"]:
+            typer.echo(f"refused: {recording['id']} {error['field']}: {error['allowed']}")
     for note in detail["notes"]:
         typer.echo(note)
 

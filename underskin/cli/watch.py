@@ -1,4 +1,4 @@
-"""The command `watch`: what an instrument saves in a folder is sent to the service once it is complete."""
+"""The command `watch`: files that an instrument saves in a folder are sent to the service once they are complete."""
 
 import signal
 import sys
@@ -50,7 +50,7 @@ def watch(
     with Client(url, api_key=key, timeout=_TIMEOUT_S) as client:
         _introduce(client, folder, skin)
 
-        def kept(name: str, results: Sequence[Mapping[str, Any]]) -> None:
+        def on_stored(name: str, results: Sequence[Mapping[str, Any]]) -> None:
             for result in results:
                 for good, line in outcome(client, result):
                     _tell(good, f"{name}: {line}")
@@ -63,19 +63,19 @@ def watch(
             skin=skin,
             rig=rig,
             estimator=estimator,
-            kept=kept,
-            told=_tell,
+            on_stored=on_stored,
+            on_message=_tell,
         )
         while True:
             time.sleep(watcher.step())
 
 
 def _introduce(client: "Client", folder: Path, skin: str) -> None:
-    """Say what is watched; raises ServiceError where the service refuses the key."""
+    """Print what is watched; raises ServiceError where the service refuses the key."""
     new = ""
     try:
         client.skins.get(skin)
-    except Unreachable:  # told once there is something to send: a bench may be switched on before the server
+    except Unreachable:  # reported with the first file: a bench may be switched on before the server
         pass
     except ServiceError as error:
         if error.status in (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN):
@@ -89,7 +89,7 @@ def _tell(good: bool, words: str) -> None:
 
 
 def _end(*_: object) -> None:
-    """Whatever is under way is not in the journal, and is sent again at the next start."""
+    """Exit; a transfer in progress is not in the journal, and is repeated at the next start."""
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_IGN)  # `timeout` and systemd send it more than once
     sys.exit(0)

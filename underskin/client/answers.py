@@ -13,7 +13,7 @@ from underskin.units import Floats
 @dataclass(frozen=True)
 class ServiceAnswer:
     """Common to all answers in columns: the model, hash of the table (None where none was read), status per row, and
-    per row which limit it exceeds, empty where it is `ok`."""
+    per row the limit that it exceeds, empty where it is `ok`."""
 
     model: str
     table_sha256: str | None
@@ -23,7 +23,7 @@ class ServiceAnswer:
 
 @dataclass(frozen=True)
 class FindingAnswer:
-    """A value that looks wrong: its field, the first such row (None for a single value), in words, and its code."""
+    """A suspicious value: its field, the first such row (None for a single value), in words, and its code."""
 
     field: str
     index: int | None

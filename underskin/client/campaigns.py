@@ -1,12 +1,8 @@
-"""Campaigns of the service.
+"""Campaigns and skins through the client: `client.campaigns` and `client.skins`.
 
-An Idempotency-Key of files by their names and contents: what is sent twice is kept once. A file that says how much of
-it was read, for the progress of what is sent.
-
-Campaigns and skins through the client: `client.campaigns` and `client.skins`.
-
-Answers are the documents of the HTTP interface (docs/store.md, /openapi.json): their fields are attributes with types,
-and as a mapping each is the JSON object itself (`underskin.client.documents`).
+Answers are the documents of the HTTP interface (docs/store.md, /openapi.json): their fields are attributes with
+types, and as a mapping each is the JSON object itself (`underskin.client.documents`). An Idempotency-Key is computed
+from names and contents of files, so that files sent twice are stored once.
 """
 
 import hashlib
@@ -43,13 +39,13 @@ def content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
     digests = [(file.name, content_sha256(file)) for file in inputs]
     options: list[Any] = [terms.get("skin"), terms.get("all_or_nothing", False), terms.get("together")]
     options.append(terms.get("rig") is None)
-    # What came later, only where it is said: keys of earlier versions hold.
+    # Later options only where given, so that keys of earlier versions stay valid.
     options += [(name, terms[name]) for name in ("corrects", "reason", "estimator") if terms.get(name) is not None]
     return f"content {hashlib.sha256(repr([options, digests]).encode()).hexdigest()}"
 
 
 def label_of(file: Path) -> str:
-    """The name under which a file is sent; letters that its disk has in no encoding we know become question marks."""
+    """The name under which a file is sent; undecodable letters become question marks."""
     return file.name.encode("utf-8", "replace").decode("utf-8")
 
 
@@ -60,25 +56,26 @@ def content_sha256(file: Path) -> str:
 
 
 class CountedFile(io.FileIO):
-    """A file opened to be read; `progress` is called with the bytes of each read, and with less than 0 for a return."""
+    """A file opened for reading; `progress` is called with the bytes of each read, and with less than 0 for a seek
+    back."""
 
     def __init__(self, path: Path, progress: Callable[[int], object]) -> None:
         super().__init__(path)
         self._progress = progress
 
     def read(self, size: int | None = -1, /) -> Any:
-        """As any file."""
+        """As `FileIO.read`."""
         data = super().read(size)
         self._progress(len(data or b""))
         return data
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
-        """As any file: a request that is repeated begins anew."""
+        """As `FileIO.seek`: a repeated request starts at the beginning."""
         before = self.tell()
-        place = super().seek(offset, whence)
-        if whence == io.SEEK_SET and place != before:
-            self._progress(place - before)
-        return place
+        position = super().seek(offset, whence)
+        if whence == io.SEEK_SET and position != before:
+            self._progress(position - before)
+        return position
 
 
 ModelName = Literal["paper", "adopted"]
@@ -86,12 +83,12 @@ Progress = Callable[[int], object]  # of bytes
 _TRIES = 3
 _path, _skin = partial(path_of, "campaigns"), partial(path_of, "skins")
 _Answer = TypeVar("_Answer")
-_Entry = TypeVar("_Entry", bound=Document)
+_Item = TypeVar("_Item", bound=Document)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SentFile(CampaignResult):
-    """What became of one campaign of files that were sent."""
+    """The outcome of one campaign in files that were sent."""
 
     repeated: bool
     """Whether it had been stored before, under the same `idempotency_key`."""
@@ -127,15 +124,15 @@ class Campaigns:
         """
         document = to_dict(campaign) if isinstance(campaign, Campaign) else dict(campaign)
         content = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
-        said = {"corrects": corrects, "reason": reason, "estimator": estimator}
-        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **said)
+        options = {"corrects": corrects, "reason": reason, "estimator": estimator}
+        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **options)
         headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency_key or uuid4().hex}
 
         def send() -> CampaignResult:
             answer = self._session.json("POST", "/v1/campaigns", **query, headers=headers, content=content)
             return CampaignResult.of(answer)
 
-        return _again(send)
+        return _with_retries(send)
 
     def post_files(
         self,
@@ -151,33 +148,33 @@ class Campaigns:
         idempotency_key: str | None = None,
         progress: Progress = _uncounted,
     ) -> list[SentFile]:
-        """Send files as instruments write them; one entry a campaign. `rig` describes their channels.
+        """Send files as written by instruments; the answer has one item per campaign. `rig` describes their channels.
 
-        `together` joins the files, for instance one file for each press, into one campaign of that name. `estimator` is
-        how FRFs are estimated from time series, whatever the files or the rig say. `progress` is called with the bytes
-        of each part that was read to be sent, less than 0 where a request begins anew.
+        `together` joins the files, for instance one file for each press, into one campaign of that name. `estimator`
+        is how FRFs are estimated from time series, whatever the files or the rig say. `progress` is called with the
+        bytes of each part that was read to be sent, less than 0 where a request is repeated.
         """
         if not files:
             raise too_few("files", [], "must name at least one file")
         headers = {"Idempotency-Key": idempotency_key or uuid4().hex}
-        said = {"corrects": corrects, "reason": reason, "together": together, "estimator": estimator}
-        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **said)
+        options = {"corrects": corrects, "reason": reason, "together": together, "estimator": estimator}
+        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **options)
 
         def send() -> list[SentFile]:
             with ExitStack() as opened:
                 sources = [("file", Path(file), progress) for file in files]
                 sources += [] if rig is None else [("rig", Path(rig), _uncounted)]
                 parts = [
-                    (name, (label_of(path), opened.enter_context(CountedFile(path, read))))
-                    for name, path, read in sources
+                    (name, (label_of(path), opened.enter_context(CountedFile(path, on_read))))
+                    for name, path, on_read in sources
                 ]
                 answer, received = self._session.answered(
                     "POST", "/v1/campaigns", **query, headers=headers, files=parts
                 )
             repeated = "Idempotency-Replayed" in received
-            return [SentFile.of({**entry, "repeated": repeated}) for entry in answer["campaigns"]]
+            return [SentFile.of({**result, "repeated": repeated}) for result in answer["campaigns"]]
 
-        return _again(send)
+        return _with_retries(send)
 
     def all(
         self,
@@ -221,7 +218,7 @@ class Campaigns:
         return CampaignDetail.of(self._session.json("PATCH", _path(campaign_id), json=fields))
 
     def discard(self, campaign_id: str, reason: str) -> CampaignDetail:
-        """Put a trial that nothing builds on away: withdrawn and in no list; it can still be read."""
+        """Discard a trial that nothing builds on: withdrawn and in no list; it can still be read."""
         return CampaignDetail.of(self._session.json("POST", _path(campaign_id, "discard"), json={"reason": reason}))
 
     def changes(self, campaign_id: str) -> list[Change]:
@@ -253,7 +250,7 @@ class Skins:
         return SkinDetail.of(self._session.json("PATCH", _skin(skin_id), json=fields))
 
     def discard(self, skin_id: str, reason: str) -> SkinDetail:
-        """Put a skin without campaigns in use away: in no list until a campaign arrives for it."""
+        """Discard a skin without campaigns in use: in no list until a campaign arrives for it."""
         return SkinDetail.of(self._session.json("POST", _skin(skin_id, "discard"), json={"reason": reason}))
 
     def changes(self, skin_id: str) -> list[Change]:
@@ -278,8 +275,8 @@ class Skins:
         id. `without` as in `client.diagnoses.start`. The same request on campaigns that have not changed is answered
         with the diagnosis that there is.
         """
-        given = {"campaigns": None if campaigns is None else list(campaigns), "name": name, "without": list(without)}
-        return Asked.of(self._session.json("POST", _skin(skin_id, "diagnosis"), json=given))
+        body = {"campaigns": None if campaigns is None else list(campaigns), "name": name, "without": list(without)}
+        return Asked.of(self._session.json("POST", _skin(skin_id, "diagnosis"), json=body))
 
     def adopt(self, skin_id: str, diagnosis_id: str) -> ModelEntry:
         """Adopt the model of an explained diagnosis for the skin; requests with the model `adopted` use it."""
@@ -296,7 +293,7 @@ class Skins:
     def models(self, skin_id: str) -> list[ModelEntry]:
         """All models that the skin ever had, the latest adoption first."""
         answer = self._session.json("GET", _skin(skin_id, "model", "versions"))
-        return [ModelEntry.of(entry) for entry in answer["models"]]
+        return [ModelEntry.of(version) for version in answer["models"]]
 
     def export(self, skin_id: str, file: str | Path, progress: Progress = _uncounted) -> None:
         """Write everything stored of a skin into one HDF5 file; `progress` is called with the bytes of each chunk."""
@@ -317,12 +314,12 @@ class Skins:
             return Imported.of(self._session.json("POST", "/v1/skins/import", headers=headers, content=source))
 
 
-def query_of(**given: Any) -> dict[str, dict[str, Any]]:
-    """The given values as the query of an httpx request."""
-    return {"params": {name: value for name, value in given.items() if value is not None}}
+def query_of(**values: Any) -> dict[str, dict[str, Any]]:
+    """The values that are not None as the query of an httpx request."""
+    return {"params": {name: value for name, value in values.items() if value is not None}}
 
 
-def _again(send: Callable[[], _Answer]) -> _Answer:
+def _with_retries(send: Callable[[], _Answer]) -> _Answer:
     """Repeat a request, under its one Idempotency-Key, until an answer comes; three times at most."""
     for _ in range(_TRIES - 1):
         try:
@@ -332,8 +329,8 @@ def _again(send: Callable[[], _Answer]) -> _Answer:
     return send()
 
 
-def pages(kind: type[_Entry], session: Session, path: str, noun: str, /, **filters: str | None) -> Iterator[_Entry]:
-    """The entries of a list, page after page."""
+def pages(kind: type[_Item], session: Session, path: str, noun: str, /, **filters: str | None) -> Iterator[_Item]:
+    """The items of a list, page after page."""
     cursor: str | None = None
     while True:
         page = session.json("GET", path, **query_of(limit=200, cursor=cursor, **filters))

@@ -1,21 +1,14 @@
-"""Diagnoses, fleets and mechanisms of the service.
-
-Diagnoses through the client: `client.diagnoses`.
+"""Diagnoses, fleets and mechanisms through the client.
 
     started = client.diagnoses.start(campaign_id)
     report = client.diagnoses.wait(started.id, progress=print).report
 
+    started = client.fleets.diagnose(["palm-1", "palm-2", "palm-3"], "palms of batch 7")
+
+    client.mechanisms.keep_found(diagnosis_id, "warm_skin")
+    [mechanism.name for mechanism in client.mechanisms.all() if mechanism.own]
+
 Answers are the documents of the HTTP interface (docs/store.md, /openapi.json); see `underskin.client.documents`.
-
-Several skins of one make through the client: `client.fleets`.
-
-started = client.fleets.diagnose(["palm-1", "palm-2", "palm-3"], "palms of batch 7")
-report = client.diagnoses.wait(started.id).report
-
-The catalogue of mechanisms through the client: `client.mechanisms`.
-
-client.mechanisms.keep_found(diagnosis_id, "warm_skin")
-[entry.name for entry in client.mechanisms.all() if entry.own]
 """
 
 import time
@@ -90,7 +83,7 @@ class Diagnoses:
 
 
 class Fleets:
-    """Skins of one make, diagnosed together."""
+    """Skins of one batch, diagnosed together."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -106,14 +99,14 @@ class Fleets:
 
 
 class Mechanisms:
-    """What diagnoses know by name; the lab's own can be kept and discarded."""
+    """The catalogue of mechanisms; the lab's own can be kept and discarded."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
     def all(self) -> list[MechanismEntry]:
         """Every mechanism, in the order in which a model composes them."""
-        return [MechanismEntry.of(entry) for entry in self._session.json("GET", "/v1/mechanisms")["mechanisms"]]
+        return [MechanismEntry.of(mechanism) for mechanism in self._session.json("GET", "/v1/mechanisms")["mechanisms"]]
 
     def keep(self, document: str) -> MechanismEntry:
         """Keep a document (`mechanism/1`, YAML) as one of the lab's own; raises ServiceError (409) for a taken name."""
@@ -124,8 +117,8 @@ class Mechanisms:
 
     def keep_found(self, diagnosis_id: str, name: str, description: str | None = None) -> MechanismEntry:
         """Keep the law that a diagnosis found beside the catalogue; raises ServiceError (422) where it found none."""
-        asked = {"diagnosis_id": diagnosis_id, "name": name, "description": description}
-        return MechanismEntry.of(self._session.json("POST", "/v1/mechanisms", json=asked))
+        body = {"diagnosis_id": diagnosis_id, "name": name, "description": description}
+        return MechanismEntry.of(self._session.json("POST", "/v1/mechanisms", json=body))
 
     def discard(self, name: str) -> MechanismEntry:
         """Take one of the lab's own out of the catalogue; raises ServiceError (409) while a model in force needs it."""

@@ -85,12 +85,12 @@ class Session:
 
 
 def path_of(noun: str, identity: str, *more: str) -> str:
-    """The path of one campaign, skin or diagnosis, or of what is below it."""
+    """The path of a campaign, skin or diagnosis, or of a resource below it."""
     return "/".join(("/v1", noun, quote(identity, safe=""), *more))
 
 
 def _document(response: httpx.Response) -> dict[str, Any] | None:
-    """The JSON object of an answer; None where it is something else."""
+    """The JSON object of an answer; None for other content."""
     try:
         document = orjson.loads(response.content)
     except orjson.JSONDecodeError:

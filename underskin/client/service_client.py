@@ -4,11 +4,11 @@
         answer = client.sigma(a_over_h=[0.1, 0.3], rt_over_h=0.6)
         answer.sigma, answer.status
 
-Fields have the names and the lab units of the HTTP interface. A single number holds for all rows; arrays must be
-equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
-domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
-`client.skins` (`underskin.client.campaigns`); diagnoses: `client.diagnoses` (`underskin.client.diagnoses`); several
-skins together: `client.fleets` (`underskin.client.diagnoses`).
+Fields have the names and the lab units of the HTTP interface. A single number applies to all rows; arrays must be
+equally long. Answers have one element per row, or shape () where only single numbers were given; a row outside the
+model's domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins:
+`client.campaigns` and `client.skins` (`underskin.client.campaigns`); diagnoses, fleets and mechanisms:
+`client.diagnoses`, `client.fleets` and `client.mechanisms` (`underskin.client.diagnoses`).
 """
 
 from collections.abc import Mapping
@@ -45,9 +45,9 @@ class Client:
         *,
         npz: bool = False,
     ) -> None:
-        """`api_key` where the service asks for one; `timeout` in seconds, between bytes, and 10 s at most to connect.
+        """`api_key` where the service requires one; `timeout` [s] between bytes, and 10 s at most to connect.
 
-        `npz`: columns travel as NumPy's .npz in place of JSON, which is faster for many rows.
+        `npz`: send and receive columns as NumPy's .npz instead of JSON, which is faster for many rows.
         """
         self._session = Session(base_url, api_key, timeout)
         self._npz = npz
@@ -144,8 +144,8 @@ class Client:
         """The tables of the service that answers are computed from: σ, influence and contact."""
         document = self._request("GET", "/v1/tables")
         return tuple(
-            answers.TableEntry(**{**entry, "axes": tuple(answers.TableAxis(**axis) for axis in entry["axes"])})
-            for entry in document["tables"]
+            answers.TableEntry(**{**table, "axes": tuple(answers.TableAxis(**axis) for axis in table["axes"])})
+            for table in document["tables"]
         )
 
     def undo(self, change_id: str) -> Change:
@@ -162,21 +162,23 @@ class Client:
         return str(self._request("GET", "/ready")["table_sha256"])
 
     def _columns(self, noun: str, kind: type[_Answer], arguments: Mapping[str, Any]) -> _Answer:
-        """The answer to what a method was given: its arguments, beside which it has `self` and perhaps `adopted`."""
+        """The answer to a method's arguments, among which are `self` and perhaps `adopted`."""
         adopted = arguments.get("adopted")
-        given = {**arguments, **(adopted.fields() if adopted is not None else {})}
-        given = {name: value for name, value in given.items() if value is not None and name not in ("self", "adopted")}
-        arrays = {name: _array(value) for name, value in given.items() if name not in _SHARED}
-        others = {name: _shared(name, value) for name, value in given.items() if name in _SHARED}
+        values = {**arguments, **(adopted.fields() if adopted is not None else {})}
+        values = {
+            name: value for name, value in values.items() if value is not None and name not in ("self", "adopted")
+        }
+        arrays = {name: _array(value) for name, value in values.items() if name not in _SHARED}
+        others = {name: _shared(name, value) for name, value in values.items() if name in _SHARED}
         answer = self._answer_in_arrays if self._npz else partial(self._request, "POST")
         document = answer(f"/v1/{noun}", {**arrays, **others})
-        single = all(array.ndim == 0 for array in arrays.values()) and all(np.ndim(given[name]) < 2 for name in others)
+        single = all(array.ndim == 0 for array in arrays.values()) and all(np.ndim(values[name]) < 2 for name in others)
         return kind(**{field.name: _field(field.name, document, single) for field in fields(kind)})
 
     def _answer_in_arrays(self, path: str, sent: Mapping[str, Any]) -> dict[str, Any]:
-        """As `_request` answers, but with arrays for the columns."""
+        """As `_request`, with arrays for the columns."""
         arrays = self._session.arrays(path, sent)
-        document: dict[str, Any] = {name: one.item() if one.ndim == 0 else one for name, one in arrays.items()}
+        document: dict[str, Any] = {name: array.item() if array.ndim == 0 else array for name, array in arrays.items()}
         if "findings" in document:
             document["findings"] = orjson.loads(document["findings"])
         return document
@@ -198,14 +200,14 @@ def _array(value: Any) -> Floats:
 
 
 def _shared(name: str, value: Any) -> Any:
-    """A value that is not a column, as the interface has it."""
+    """A value that is not a column, in the form of the interface."""
     if isinstance(value, bool | str):
         return value
     return np.atleast_2d(_array(value)) if name in _LINES else _array(value)
 
 
 def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
-    """A field of the answer: an array, without its rows' axis where single numbers were given."""
+    """A field of the answer: an array, without its rows' axis where only single numbers were given."""
     value = document.get(name)
     if name == "limit":  # null where all rows are inside
         words = value if value is not None else [""] * len(document["status"])

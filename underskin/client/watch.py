@@ -1,14 +1,9 @@
-"""A folder watched for campaigns, which are sent to the service.
+"""A watched folder: its complete files are sent to the service once each, again after an outage, never after a refusal.
 
-Which files of a folder are complete: instruments write for a while, and leave temporary files beside.
-
-The journal of a watched folder: what became of each content that was sent, kept in the folder itself.
-
-`.underskin-watch.json` has a line for its schema, and one for each entry, which is appended; a last line that a power
-cut left unfinished is ignored. A file without an entry is sent again, which the service answers as before and keeps
-once, as long as name, rig and estimator are the same.
-
-Sending what is complete in a folder: once each, again after an outage, never again what was refused.
+Instruments write for a while and leave temporary files; a file is complete when it no longer changes. The journal,
+`.underskin-watch.json` in the folder, holds a line for its schema and one for each content that was sent or refused,
+appended; an unfinished last line after a power cut is ignored. A file without an entry is sent again, which the
+service answers as before and stores once, as long as name, rig and estimator are the same.
 """
 
 import fcntl
@@ -38,13 +33,13 @@ _RETRIES, _LONGER = (
     4,
 )  # of a file whose refusal may pass, and how many times as long the wait is from one to the next
 _TEMPORARY = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".lock", "~")
-_BESIDE = (".tdms_index",)  # LabVIEW's index of a file, which holds nothing of its own
+_INDEX_FILES = (".tdms_index",)  # LabVIEW's index of a file, without data
 
 
 @dataclass
-class _Seen:
-    """A file as it was: size, time of change, since when (monotonic, s), whether a reader opens it as it is, how often
-    it was postponed, and until when."""
+class _FileState:
+    """The last observed state of a file: size, time of change, since when (monotonic, s), whether a reader opens it,
+    how often it was postponed, and until when."""
 
     size: int
     changed_ns: int
@@ -56,76 +51,76 @@ class _Seen:
 
 
 class WatchedFolder:
-    """The files of a folder and of the folders in it; hidden, temporary and empty ones are left out.
+    """The files of a folder and its subfolders; hidden, temporary and empty ones are left out.
 
-    A file is complete when its size and its time have not changed for `settle_s` and a reader of its format opens it;
-    one that none opens is complete after a further while, for the service to say what is wrong with it.
+    A file is complete when its size and its time have not changed for `settle_s` and a reader of its format opens
+    it; one that no reader opens is complete after a further while, so that the service can report its error.
     """
 
     def __init__(self, path: Path, settle_s: float) -> None:
         self.path = path
         self._settle_s = settle_s
-        self._seen: dict[Path, _Seen] = {}
-        self.unreadable: dict[Path, OSError] = {}  # what `settled` could not look at, and left out
+        self._states: dict[Path, _FileState] = {}
+        self.unreadable: dict[Path, OSError] = {}  # skipped by `settled`
 
     def settled(self) -> list[Path]:
-        """Files that do not change any more and are not done, the oldest first; OSError where the folder is gone."""
+        """Files that no longer change and are not done, the oldest first; OSError where the folder is gone."""
         now = time.monotonic()
-        seen = {}
+        states = {}
         self.unreadable = {}
         for path, status in self._files():
-            known = self._seen.get(path)
-            if known is None or (known.size, known.changed_ns) != (status.st_size, status.st_mtime_ns):
-                known = _Seen(status.st_size, status.st_mtime_ns, now)
-            seen[path] = known
-        self._seen = seen
+            state = self._states.get(path)
+            if state is None or (state.size, state.changed_ns) != (status.st_size, status.st_mtime_ns):
+                state = _FileState(status.st_size, status.st_mtime_ns, now)
+            states[path] = state
+        self._states = states
         settled = [
             path
-            for path, one in seen.items()
-            if not one.done and now - one.since >= self._settle_s and now >= one.not_before
+            for path, state in states.items()
+            if not state.done and now - state.since >= self._settle_s and now >= state.not_before
         ]
-        return sorted(settled, key=lambda path: seen[path].changed_ns)
+        return sorted(settled, key=lambda path: states[path].changed_ns)
 
     def is_complete(self, path: Path) -> bool:
         """Whether a settled file is complete."""
-        seen = self._seen[path]
-        if seen.opens is None:
-            seen.opens = _opens(path)
-        return seen.opens or time.monotonic() - seen.since >= (1 + _PATIENCE) * self._settle_s
+        state = self._states[path]
+        if state.opens is None:
+            state.opens = _opens(path)
+        return state.opens or time.monotonic() - state.since >= (1 + _PATIENCE) * self._settle_s
 
     def is_unchanged(self, path: Path) -> bool:
-        """Whether a file still is as it was when it was found settled."""
+        """Whether a file is as it was when it settled."""
         try:
             status = path.stat()
         except OSError:
             return False
-        seen = self._seen[path]
-        return (status.st_size, status.st_mtime_ns) == (seen.size, seen.changed_ns)
+        state = self._states[path]
+        return (status.st_size, status.st_mtime_ns) == (state.size, state.changed_ns)
 
     def done(self, path: Path) -> None:
-        """A file is of no more interest until it changes."""
-        self._seen[path].done = True
+        """Ignore a file until it changes."""
+        self._states[path].done = True
 
     def postpone(self, path: Path) -> None:
-        """Take a file for one that has just changed."""
-        self._seen[path].since = time.monotonic()
+        """Treat a file as just changed."""
+        self._states[path].since = time.monotonic()
 
     def retry_later(self, path: Path) -> float | None:
-        """Leave a file for a while, longer each time; the while (s), or None after the last time: the file is done."""
-        seen = self._seen[path]
-        if seen.retries == _RETRIES:
+        """Leave a file for a while, longer each time; the delay (s), or None after the last retry: the file is done."""
+        state = self._states[path]
+        if state.retries == _RETRIES:
             self.done(path)
             return None
-        wait_s = self._settle_s * _PATIENCE * float(_LONGER**seen.retries)
-        seen.retries += 1
-        seen.not_before = time.monotonic() + wait_s
+        wait_s = self._settle_s * _PATIENCE * float(_LONGER**state.retries)
+        state.retries += 1
+        state.not_before = time.monotonic() + wait_s
         return wait_s
 
     def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
         for folder, folders, names in os.walk(self.path, onerror=self._leave_out):
             folders[:] = [name for name in folders if not name.startswith(".")]
             for name in names:
-                if name.startswith(".") or name.lower().endswith((*_TEMPORARY, *_BESIDE)):
+                if name.startswith(".") or name.lower().endswith((*_TEMPORARY, *_INDEX_FILES)):
                     continue
                 path = Path(folder, name)
                 try:
@@ -139,7 +134,7 @@ class WatchedFolder:
                     yield path, status
 
     def _leave_out(self, error: OSError) -> None:
-        """Go on without a file or folder; raises the error where it is of the watched folder itself."""
+        """Skip a file or folder; raises the error where it is the watched folder itself."""
         path = Path(error.filename)
         if path == self.path:
             raise error
@@ -163,9 +158,9 @@ _HEADING = json.dumps({"schema": _SCHEMA}) + "\n"
 
 
 @dataclass(frozen=True)
-class Entry:
-    """What became of a content (its SHA-256) at a service, for a skin: the campaigns that it is kept as, none where it
-    was refused. `terms` is a digest of what else was said of it: another rig may make sense of what was refused."""
+class JournalEntry:
+    """The outcome of a content (its SHA-256) at a service, for a skin: the ids of its campaigns, none where it was
+    refused. `terms` is a digest of rig and estimator, with which a refused content may become valid."""
 
     sha256: str
     file: str
@@ -177,13 +172,13 @@ class Entry:
 
     @property
     def is_sent(self) -> bool:
-        """Whether the service keeps it."""
+        """Whether the service stores it."""
         return bool(self.campaigns)
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where contents go, and what is said of them, as `Entry` has it."""
+    """The service and skin that contents are sent to, and the digest `terms` (see `JournalEntry`)."""
 
     url: str
     skin: str
@@ -210,18 +205,18 @@ class Journal:
         """Let another process watch the folder."""
         self._lock.close()
 
-    def known(self, target: Target, sha256: str) -> Entry | None:
-        """What became of a content: sent for this skin, or refused on these terms."""
-        for entry in reversed(self._entries):
-            same = (entry.sha256, entry.url, entry.skin) == (sha256, target.url, target.skin)
-            if same and (entry.is_sent or entry.terms == target.terms):
-                return entry
+    def find(self, target: Target, sha256: str) -> JournalEntry | None:
+        """The entry of a content: sent for this skin, or refused on these terms; None without one."""
+        for record in reversed(self._entries):
+            same = (record.sha256, record.url, record.skin) == (sha256, target.url, target.skin)
+            if same and (record.is_sent or record.terms == target.terms):
+                return record
         return None
 
     def add(self, target: Target, sha256: str, file: str, campaigns: Sequence[str]) -> None:
-        """Keep what became of a content; it is on the disk afterwards. Raises UnderskinError."""
+        """Record the outcome of a content; it is on the disk afterwards. Raises UnderskinError."""
         at = datetime.now(UTC).isoformat(timespec="seconds")
-        self._entries.append(Entry(sha256, file, target.url, target.skin, target.terms, list(campaigns), at))
+        self._entries.append(JournalEntry(sha256, file, target.url, target.skin, target.terms, list(campaigns), at))
         try:
             if self._has_whole_lines and self._path.exists():
                 with self._path.open("a", encoding="utf-8") as journal:
@@ -244,31 +239,31 @@ class Journal:
         finally:
             os.close(folder)
 
-    def _read(self) -> list[Entry]:
+    def _read(self) -> list[JournalEntry]:
         try:
             text = self._path.read_text(encoding="utf-8")
             if text.startswith(_HEADING):
                 *lines, unfinished = text.removeprefix(_HEADING).split("\n")
                 self._has_whole_lines = not unfinished
-                return [Entry(**json.loads(line)) for line in lines]
+                return [JournalEntry(**json.loads(line)) for line in lines]
             document: Any = json.loads(text)
             if document["schema"] != _FIRST_SCHEMA:
                 raise ValueError(f"it is {document['schema']}, not {_SCHEMA}")
-            return [Entry(**entry) for entry in document["entries"]]
+            return [JournalEntry(**record) for record in document["entries"]]
         except FileNotFoundError:
             return []
         except (OSError, ValueError, KeyError, TypeError) as error:
             self.close()
-            again = "move it away; what was sent is sent again then, and kept once"
-            raise UnderskinError(f"the journal {self._path} cannot be read: {error}; {again}") from error
+            advice = "move it away; what was sent is sent again then, and kept once"
+            raise UnderskinError(f"the journal {self._path} cannot be read: {error}; {advice}") from error
 
 
-def _line(entry: Entry) -> str:
-    return json.dumps(asdict(entry)) + "\n"  # in ASCII: a name may hold letters that have no encoding
+def _line(record: JournalEntry) -> str:
+    return json.dumps(asdict(record)) + "\n"  # in ASCII: a name may hold letters that have no encoding
 
 
 def _write(journal: TextIO, lines: Iterable[str]) -> None:
-    """Write lines, onto the disk."""
+    """Write lines, and flush them to the disk."""
     journal.writelines(lines)
     journal.flush()
     os.fsync(journal.fileno())
@@ -276,7 +271,7 @@ def _write(journal: TextIO, lines: Iterable[str]) -> None:
 
 LOOK_S = 1.0  # between two looks at the folder
 _LONGEST_WAIT_S = 60.0  # between two tries of an outage
-# Answers that are about what was sent; any other failure is the service's, the network's or the key's, and may pass.
+# Refusals of the file; any other failure is of the service, the network or the key, and may be temporary.
 _OF_THE_FILE = frozenset(
     {
         HTTPStatus.BAD_REQUEST,
@@ -292,8 +287,8 @@ Results = Sequence[Mapping[str, Any]]
 class Watcher:
     """Sends the complete files of a folder to a service, for a skin.
 
-    `kept` is called with the file's name and the results once they are in the journal, `told` with what else happens:
-    whether it is well, and the words. All methods raise UnderskinError where the journal cannot be written.
+    `on_stored` is called with the file's name and the results once they are in the journal, `on_message` with other
+    events: whether all is well, and the text. All methods raise UnderskinError where the journal cannot be written.
     """
 
     def __init__(
@@ -306,17 +301,17 @@ class Watcher:
         skin: str,
         rig: Path | None,
         estimator: Estimator | None,
-        kept: Callable[[str, Results], object],
-        told: Callable[[bool, str], object],
+        on_stored: Callable[[str, Results], object],
+        on_message: Callable[[bool, str], object],
     ) -> None:
         self._client, self._folder, self._journal = client, folder, journal
         self._url, self._skin, self._rig, self._estimator = url, skin, rig, estimator
-        self._kept, self._told = kept, told
+        self._on_stored, self._on_message = on_stored, on_message
         self._outage_s = 0.0  # to wait before the next try; 0 while all is well
-        self._unopened: set[Path] = set()  # of which was told that they cannot be opened or looked at
+        self._unopened: set[Path] = set()  # reported as unreadable
 
     def step(self) -> float:
-        """Send what is complete; the seconds to wait until the next step."""
+        """Send complete files; returns the seconds to wait until the next step."""
         try:
             target = self._target()
             settled = self._folder.settled()
@@ -335,10 +330,10 @@ class Watcher:
         name = str(path.relative_to(self._folder.path))
         try:
             sha256 = content_sha256(path)
-            known = self._journal.known(target, sha256)
-            if known is not None:
-                if known.file != name:
-                    self._told(True, f"{name}: has the content of {known.file}, and is not sent")
+            record = self._journal.find(target, sha256)
+            if record is not None:
+                if record.file != name:
+                    self._on_message(True, f"{name}: has the content of {record.file}, and is not sent")
                 self._folder.done(path)
             elif self._folder.is_complete(path):
                 self._send(path, name, target, sha256)
@@ -376,23 +371,25 @@ class Watcher:
             self._journal.add(target, sha256, name, [result["id"] for result in results if result["id"] is not None])
             self._folder.done(path)
         if results:
-            self._kept(name, results)
+            self._on_stored(name, results)
         elif unchanged:
-            self._told(False, f"{name}: {refusal}; it is left, and sent again once it has changed")
+            self._on_message(False, f"{name}: {refusal}; it is left, and sent again once it has changed")
 
     def _retry_later(self, path: Path, name: str, error: ServiceError) -> None:
-        """Leave a file that may be taken another time; it is not in the journal, so that a restart sends it again."""
+        """Leave a file that may be accepted later; it is not in the journal, so a restart sends it again."""
         self._goes_on()
         wait_s = self._folder.retry_later(path)
-        left = "it is left, and sent again once it has changed or at the next start"
-        self._told(False, f"{name}: {error}; {left if wait_s is None else f'it is sent again in {wait_s:.0f} s'}")
+        instruction = "it is left, and sent again once it has changed or at the next start"
+        self._on_message(
+            False, f"{name}: {error}; {instruction if wait_s is None else f'it is sent again in {wait_s:.0f} s'}"
+        )
 
     def _cannot_be(self, what: str, path: Path, error: OSError) -> None:
-        """Tell once of a file or folder that cannot be read or opened."""
+        """Report once that a file or folder cannot be read or opened."""
         if path not in self._unopened:
             self._unopened.add(path)
             name = path.relative_to(self._folder.path)
-            self._told(False, f"{name}: cannot be {what}: {error.strerror}; it is tried again")
+            self._on_message(False, f"{name}: cannot be {what}: {error.strerror}; it is tried again")
 
     def _target(self) -> Target:
         rig = None if self._rig is None else content_sha256(self._rig)
@@ -400,21 +397,22 @@ class Watcher:
         return Target(self._url, self._skin, terms)
 
     def _outage(self, error: Exception) -> float:
-        """Wait longer from try to try; told at the first one."""
+        """The wait, longer from try to try; reported at the first."""
         if not self._outage_s:
-            self._told(False, f"{error}; it is tried again until that is over")
+            self._on_message(False, f"{error}; it is tried again until that is over")
         self._outage_s = min(2 * self._outage_s, _LONGEST_WAIT_S) or LOOK_S
         return self._outage_s
 
     def _goes_on(self) -> None:
         if self._outage_s:
-            self._told(True, "sending goes on")
+            self._on_message(True, "sending goes on")
         self._outage_s = 0.0
 
 
 def _may_pass(error: ServiceError) -> bool:
-    """Whether a refusal of a file may be another one next time: by a proxy, for its size, or since reading it took
-    longer or more memory than a busy server had."""
+    """Whether a refusal may be temporary: by a proxy, for size, or for time or memory of a busy server."""
     if error.is_foreign or error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE:
         return True
-    return any(setting in entry["allowed"] for entry in error.problem["errors"] for setting in (SECONDS, MEMORY_MB))
+    return any(
+        setting in error_entry["allowed"] for error_entry in error.problem["errors"] for setting in (SECONDS, MEMORY_MB)
+    )

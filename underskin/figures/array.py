@@ -1,6 +1,5 @@
 """Figures of an array: FRF against preload per indenter (Seminara 2018, figure 15), and the response of each sensor
-(figure 16).
-"""
+(figure 16)."""
 
 from collections.abc import Sequence
 from html import escape
@@ -89,25 +88,25 @@ def response_per_sensor(
             y0=low_end, y1=high_end, fillcolor=COLOURS[5], opacity=0.22, line_width=0, annotation_text="array, 95 %"
         )
     plain = np.array([not reason for reason in reasons])
-    for name, own, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):
-        if not own.any():
+    for name, mask, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):
+        if not mask.any():
             continue
-        rows = np.flatnonzero(own).tolist()
+        rows = np.flatnonzero(mask).tolist()
         figure.add_scatter(
             x=[label(sensors[row]) for row in rows],
-            y=d33[own],
+            y=d33[mask],
             ids=[sensors[row] for row in rows],
             error_y={
                 "type": "data",
                 "symmetric": False,
-                "array": (high - d33)[own],
-                "arrayminus": (d33 - low)[own],
+                "array": (high - d33)[mask],
+                "arrayminus": (d33 - low)[mask],
                 "thickness": 1,
             },
             mode="markers",
             name=name,
             text=[_with_reason(sensors[row], reasons[row]) for row in rows],
-            customdata=np.column_stack([low, high])[own],
+            customdata=np.column_stack([low, high])[mask],
             hovertemplate=_HOVER_INTERVAL,
             marker={
                 "color": COLOURS[style],

@@ -1,4 +1,4 @@
-"""The discs of a map of an array: how wide they are, and the ring around the one that is chosen."""
+"""The discs of an array map: their radius, and the ring around the chosen one."""
 
 from typing import Any
 
@@ -9,13 +9,13 @@ from underskin.figures.style import INK
 from underskin.units import Floats
 
 SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so that none overlap at any size
-_SEEN = 1 / 80  # of the map's longer side: a smaller radius cannot be seen
+_LEAST_SHARE = 1 / 80  # of the map's longer side: a smaller radius cannot be seen
 AROUND = 1.17  # times it, the ring around the chosen one, which touches no neighbour's disc
-_ALONE_MM = 1.0  # radius where there is no other
+_SINGLE_RADIUS_MM = 1.0  # radius where there is no other
 
 
 def disc_size(x_mm: ArrayLike, y_mm: ArrayLike, sensor_radius_mm: float | None) -> str:
-    """A sentence: of which size the discs of such a map are, beside the sensors themselves."""
+    """A sentence on the size of the discs relative to the sensors."""
     if sensor_radius_mm is None:
         return "Discs do not have the sensors' size, which is not declared."
     drawn = radius_of(np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float), sensor_radius_mm)
@@ -25,20 +25,21 @@ def disc_size(x_mm: ArrayLike, y_mm: ArrayLike, sensor_radius_mm: float | None) 
 
 
 def smallest_distance(x: Floats, y: Floats) -> float:
-    """The smallest distance of two sensors in different places [mm]; of a single one that at which its disc ends."""
-    apart = np.hypot(x[:, None] - x, y[:, None] - y)
-    apart = apart[apart > 0]
-    return float(apart.min()) if len(apart) else _ALONE_MM / SHARE
+    """The smallest distance between sensors at different positions [mm]; for a single sensor a default."""
+    distance = np.hypot(x[:, None] - x, y[:, None] - y)
+    distance = distance[distance > 0]
+    return float(distance.min()) if len(distance) else _SINGLE_RADIUS_MM / SHARE
 
 
 def radius_of(x: Floats, y: Floats, sensor_radius_mm: float | None) -> float:
-    """Of all discs [mm]: the sensors', unless it is unknown, too small to be seen, or discs would overlap."""
+    """The radius of all discs [mm]: the sensors', unless it is unknown, too small to be seen, or discs would
+    overlap."""
     widest = SHARE * smallest_distance(x, y)
     side = max(float(np.ptp(x)), float(np.ptp(y)))
-    if sensor_radius_mm is None or sensor_radius_mm < _SEEN * side:
+    if sensor_radius_mm is None or sensor_radius_mm < _LEAST_SHARE * side:
         return widest
-    alone = side == 0
-    return sensor_radius_mm if alone else min(sensor_radius_mm, widest / SHARE / 2)
+    is_single = side == 0
+    return sensor_radius_mm if is_single else min(sensor_radius_mm, widest / SHARE / 2)
 
 
 def ring(x: float, y: float, radius: float) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The map of an array: a disc for each sensor where it lies, coloured by d33 or another quantity, with its id."""
+"""The map of an array: a disc at each sensor's position, coloured by d33 or another quantity, with its id."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from underskin.inversion.array_course import differ_from_others, differ_from_zer
 from underskin.units import Floats, Mask
 
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id
-_APART = {"color": COLOURS[1], "width": 3}  # the ring around one that stands out
+_OUTLIER = {"color": COLOURS[1], "width": 3}  # the ring around an outlier
 _ABSENT = {"color": "#5b6670", "width": 2}  # the edge of one that was not measured with the others
 _EDGE = {"color": "#5b6670", "width": 1}  # of the others
 _PALE, _RINGED = ("absent", "unknown"), ("absent", "unknown", "stands out")  # without a colour of a value; with a ring
@@ -26,22 +26,22 @@ _FROM_ZERO = ("zero", "bound")
 _SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
 _MOST_WITH_ID, _LONGEST_ID = 100, 6
-_MIXED = 0.01  # of the largest size, from which on the other sign is told apart by colour
-# Colours end at so many times what so many of the sensors that differ do not exceed: one far beyond would pale them.
+_MIXED = 0.01  # of the largest size, from which on colours show the other sign
+# Colours end at _FAR times the _MOST quantile of the sensors that differ, so that one outlier does not fade the rest.
 _FAR, _MOST = 3.0, 0.9
 _DARK = 0.55  # luminance below which an id is written in white
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a map shows of each sensor.
+    """The quantity that a map shows of each sensor.
 
-    `against`: `others` greys what does not differ from the others beyond chance, and the colours reach at least as far
-    as chance does; `zero` the same from 0, with 0 in the middle of the colours; `bound` greys what is 0 within its
-    uncertainty, which is no standard one but a bound, with 0 in the middle where signs are mixed; `nothing` colours
-    from 0 upwards, or between `ends`, which several maps may have in common. `differing`: which sensors differ, where
-    a test of its own has told, as that of a trend does. `intervals`: each sensor's own of 95 %; without them 1.96
-    uncertainties to each side are told.
+    `against`: `others` greys sensors that do not differ from the others beyond chance, and the colours reach at
+    least as far as chance does; `zero` the same from 0, with 0 in the middle of the colours; `bound` greys values
+    that are 0 within their uncertainty, here a bound and not a standard uncertainty, with 0 in the middle where
+    signs are mixed; `nothing` colours from 0 upwards, or between `ends`, which several maps may share. `differing`:
+    which sensors differ, where a separate test decides, such as that of a trend. `intervals`: the 95 % interval of
+    each sensor; without them 1.96 uncertainties to each side.
     """
 
     name: str
@@ -68,9 +68,9 @@ def array_map(
     absent: Sequence[str] = (),
 ) -> go.Figure:
     """Map of the sensors; `uncertainties` are standard ones, `reasons` says why a sensor stands out, empty otherwise,
-    `chosen` is ringed. Discs have the sensors' radius where it is given and can be seen, as `disc_size` says. `absent`
-    says of a sensor that was not measured with the others since when its value stands, which is compared with none:
-    its disc is hollow.
+    `chosen` is ringed. Discs have the sensors' radius where it is given and large enough (see `disc_size`). `absent`
+    says of a sensor that was not measured in this campaign from when its value is; it is not compared, and its disc is
+    hollow.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
@@ -81,34 +81,34 @@ def array_map(
     stated, value = value, np.where(away, np.nan, value)
     coloured = _coloured(value, uncertainty, quantity)
     scale, low, high = _scale(value, uncertainty, quantity)
-    place = np.clip((value - low) / ((high - low) or 1.0), 0.0, 1.0)
+    fraction = np.clip((value - low) / ((high - low) or 1.0), 0.0, 1.0)
     colours = [
-        sample_colorscale(scale, [float(place[row])])[0] if coloured[row] else _ALIKE if known else _UNKNOWN
-        for row, known in enumerate(np.isfinite(value).tolist())
+        sample_colorscale(scale, [float(fraction[row])])[0] if coloured[row] else _ALIKE if is_known else _UNKNOWN
+        for row, is_known in enumerate(np.isfinite(value).tolist())
     ]
     plain = np.array([not reason for reason in reasons])
-    radius, apart = radius_of(x, y, sensor_radius_mm), smallest_distance(x, y)
-    inside = radius >= _WITH_ROOM * apart
+    radius, distance = radius_of(x, y, sensor_radius_mm), smallest_distance(x, y)
+    inside = radius >= _WITH_ROOM * distance
     figure, below, unknown = go.Figure(), [], plain & ~away & ~np.isfinite(value)
-    for name, own in (
+    for name, mask in (
         ("differs", coloured & plain),
         ("alike", ~coloured & plain & ~away & ~unknown),
         ("unknown", unknown),
         ("absent", plain & away),
         ("stands out", ~plain),
     ):
-        if own.any():
-            rows, meta = np.flatnonzero(own).tolist(), "alike" if name in _PALE else name
+        if mask.any():
+            rows, meta = np.flatnonzero(mask).tolist(), "alike" if name in _PALE else name
             figure.add_scatter(
-                x=x[own].tolist(),
-                y=y[own].tolist(),
+                x=x[mask].tolist(),
+                y=y[mask].tolist(),
                 ids=[sensors[row] for row in rows],
                 mode="markers+text" if len(sensors) <= _MOST_WITH_ID and inside else "markers",
                 name=_names(quantity)[name],
                 text=[_id(sensors[row]) for row in rows],
                 textfont={"size": 12 if len(sensors) <= 16 else 9, "color": [_ink(colours[row]) for row in rows]},
                 customdata=[
-                    _told(
+                    _hover_text(
                         sensors[row], notes[row], stated[row], _interval(row, stated, uncertainty, quantity), quantity
                     )
                     for row in rows
@@ -117,7 +117,7 @@ def array_map(
                 # In the middle of its disc, in the disc's colour: it carries the colours' scale and the legend.
                 marker={
                     "size": 6,
-                    "color": value[own] if name == "differs" else [colours[row] for row in rows],
+                    "color": value[mask] if name == "differs" else [colours[row] for row in rows],
                     **({"colorscale": scale, "cmin": low, "cmax": high} if name == "differs" else {}),
                     **({"colorbar": _bar(quantity)} if name == "differs" else {}),
                     "line": {"width": 0},
@@ -127,34 +127,34 @@ def array_map(
             )
             if not inside and len(sensors) <= _MOST_WITH_ID:
                 edges = np.array([AROUND * radius if sensors[row] == chosen else radius for row in rows])
-                below.append({**_below([sensors[row] for row in rows], x[own], y[own] - edges), "meta": meta})
+                below.append({**_below([sensors[row] for row in rows], x[mask], y[mask] - edges), "meta": meta})
     figure.add_traces(
         [go.Scatter(**ids, textfont={"size": 11 if len(sensors) <= 16 else 9, "color": INK}) for ids in below]
     )
     # In the legend as their discs are ringed.
-    for name, shown, border in (
+    for name, ringed_mask, border in (
         ("unknown", unknown, _EDGE),
         ("absent", away & plain, _ABSENT),
-        ("stands out", ~plain, _APART),
+        ("stands out", ~plain, _OUTLIER),
     ):
-        if shown.any():
+        if ringed_mask.any():
             ringed = {"symbol": "circle-open", "size": 10, "color": border["color"], "line": border}
             figure.add_scatter(x=[None], y=[None], mode="markers", marker=ringed, name=_names(quantity)[name])
     discs = []
     for row, name in enumerate(sensors):
-        own_line = {"color": INK, "width": 4} if name == chosen else _APART if reasons[row] else None
+        emphasis = {"color": INK, "width": 4} if name == chosen else _OUTLIER if reasons[row] else None
         disc = {"x0": x[row] - radius, "x1": x[row] + radius, "y0": y[row] - radius, "y1": y[row] + radius}
-        line = own_line or ({**_ABSENT, "dash": "dot"} if away[row] else _EDGE)
+        line = emphasis or ({**_ABSENT, "dash": "dot"} if away[row] else _EDGE)
         discs.append(
             {"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", "name": "sensor", **disc}
         )
-    if chosen in sensors:  # on the ground too, since a disc may have the colour of its own ring
+    if chosen in sensors:  # below the disc too, which may have the colour of its ring
         discs.append(ring(x[sensors.index(chosen)], y[sensors.index(chosen)], radius))
     figure.update_layout(shapes=discs, showlegend=sum(trace.hoverinfo != "skip" for trace in figure.data) > 1)
     figure.update_layout(meta={"alike": _ALIKE, "unknown": _UNKNOWN})  # for a page, which has others in the dark
-    for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
-        edge = 1.3 * max(radius, SHARE * apart)
-        update(range=[float(along.min()) - edge, float(along.max()) + edge])
+    for update, coordinates in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
+        edge = 1.3 * max(radius, SHARE * distance)
+        update(range=[float(coordinates.min()) - edge, float(coordinates.max()) + edge])
     figure.update_xaxes(title="x [mm]", constrain="domain", showgrid=False, zeroline=False)
     figure.update_yaxes(
         title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False
@@ -162,21 +162,21 @@ def array_map(
     return styled(figure, f"{quantity.name} over the array")
 
 
-def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity = D33) -> str:
+def significance_note(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity = D33) -> str:
     """A sentence: how many sensors differ beyond chance, and what grey means; empty where nothing is compared."""
     value, uncertainty = np.asarray(values, dtype=float), np.asarray(uncertainties, dtype=float)
-    count, known = int(_coloured(value, uncertainty, quantity).sum()), int(np.isfinite(value).sum())
-    if quantity.against == "nothing" or known < 2:
+    count, measured = int(_coloured(value, uncertainty, quantity).sum()), int(np.isfinite(value).sum())
+    if quantity.against == "nothing" or measured < 2:
         return ""
     what = "the others" if quantity.against == "others" else "0"
     if count == 0:
         return f"Grey: no sensor's differs from {what} beyond chance (5 % over the whole array)."
-    told = f"{count} of {known} differ from {what} beyond chance (5 % over the whole array)"
-    told += "." if count == known else "; the rest is grey."
+    sentence = f"{count} of {measured} differ from {what} beyond chance (5 % over the whole array)"
+    sentence += "." if count == measured else "; the rest is grey."
     _, low, high = _scale(value, uncertainty, quantity)
     beyond = int(((value < low) | (value > high)).sum())
     has = "has" if beyond == 1 else "have"
-    return f"{told} {beyond} beyond the scale {has} the colour of its end." if beyond else told
+    return f"{sentence} {beyond} beyond the scale {has} the colour of its end." if beyond else sentence
 
 
 def _names(quantity: Quantity) -> dict[str, str]:
@@ -187,7 +187,7 @@ def _names(quantity: Quantity) -> dict[str, str]:
     }
     return {
         "differs": quantity.name,
-        "alike": alike.get(quantity.against, ""),  # where nothing is compared, every known value has a colour
+        "alike": alike.get(quantity.against, ""),  # without comparison every known value is coloured
         "unknown": f"no {quantity.name} known",
         "absent": "not in this campaign",
         "stands out": "stands out",
@@ -205,32 +205,32 @@ def _coloured(value: Floats, uncertainty: Floats, quantity: Quantity) -> Mask:
 
 
 def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str, float, float]:
-    """The colours' scale, and the values at its ends: as far as the values go, but for a few far beyond the rest, and
-    at least as far as chance does."""
-    known = value[np.isfinite(value)]
+    """The colour scale and the values at its ends: the range of the values without a few far beyond the rest, and at
+    least that of chance."""
+    finite = value[np.isfinite(value)]
     if quantity.ends is not None:
         return _SCALE, *quantity.ends
-    if len(known) == 0:
+    if len(finite) == 0:
         return _SCALE, 0.0, 1.0
     if quantity.against == "nothing":
-        return _SCALE, 0.0, float(known.max()) or 1.0
-    if quantity.against == "bound" and not _mixed(known):
-        low, high = min(0.0, float(known.min())), max(0.0, float(known.max()))
+        return _SCALE, 0.0, float(finite.max()) or 1.0
+    if quantity.against == "bound" and not _mixed(finite):
+        low, high = min(0.0, float(finite.min())), max(0.0, float(finite.max()))
         return _SCALE, low, high if high > low else 1.0
-    middle = 0.0 if quantity.against in _FROM_ZERO else float(np.median(known))
-    sure = uncertainty[np.isfinite(uncertainty)]
-    by_chance = threshold(len(known)) * float(np.median(sure)) if len(sure) else 0.0
-    sizes = np.abs(known - middle)
+    middle = 0.0 if quantity.against in _FROM_ZERO else float(np.median(finite))
+    finite_uncertainty = uncertainty[np.isfinite(uncertainty)]
+    by_chance = threshold(len(finite)) * float(np.median(finite_uncertainty)) if len(finite_uncertainty) else 0.0
+    sizes = np.abs(finite - middle)
     coloured = np.abs(value - middle)[_coloured(value, uncertainty, quantity) & np.isfinite(value)]
     most = _FAR * float(np.quantile(coloured, _MOST)) if len(coloured) else np.inf
     reach = max(min(float(sizes.max()), most), by_chance) or 1.0
     return "PuOr_r" if quantity.against in _FROM_ZERO else _SCALE, middle - reach, middle + reach
 
 
-def _mixed(known: Floats) -> bool:
-    """Whether values lie on both sides of 0 so far that colours should tell them apart."""
-    least, most = sorted((abs(float(known.min())), abs(float(known.max()))))
-    return bool(known.min() < 0 < known.max()) and least > _MIXED * most
+def _mixed(values: Floats) -> bool:
+    """Whether values lie on both sides of 0 so far that colours should show the sign."""
+    least, most = sorted((abs(float(values.min())), abs(float(values.max()))))
+    return bool(values.min() < 0 < values.max()) and least > _MIXED * most
 
 
 def _below(sensors: Sequence[str], x: Floats, y: Floats) -> dict[str, Any]:
@@ -256,7 +256,7 @@ def _id(name: str) -> str:
 
 
 def _interval(row: int, value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[float, float] | None:
-    """Of 95 %, or within the bounds; None where it is not known."""
+    """The 95 % interval, or the bounds; None where unknown."""
     if quantity.against == "nothing" or not np.isfinite(uncertainty[row]):
         return None
     if quantity.intervals is not None:
@@ -266,8 +266,8 @@ def _interval(row: int, value: Floats, uncertainty: Floats, quantity: Quantity) 
     return value[row] - half, value[row] + half
 
 
-def _told(name: str, reason: str, value: float, interval: tuple[float, float] | None, quantity: Quantity) -> str:
-    """What is said of a sensor under the pointer."""
+def _hover_text(name: str, reason: str, value: float, interval: tuple[float, float] | None, quantity: Quantity) -> str:
+    """The text under the pointer."""
     text = f"{label(name)}: {escape(reason, quote=False)}" if reason else label(name)
     if not np.isfinite(value):
         return f"{text}<br>{quantity.name} not known"
@@ -277,7 +277,7 @@ def _told(name: str, reason: str, value: float, interval: tuple[float, float] | 
 
 
 def _ink(colour: str) -> str:
-    """In which an id can be read on a colour."""
+    """The text colour that is readable on a disc's colour."""
     if colour.startswith("#"):
         return INK
     red, green, blue = (float(part) / 255 for part in colour.removeprefix("rgb(").removesuffix(")").split(","))

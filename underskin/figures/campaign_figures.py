@@ -67,9 +67,9 @@ def model_frf(campaign: Campaign, inversion: Inversion) -> Floats:
     assert campaign.skin.sensor_radius_mm is not None
     assert campaign.skin.thickness_mm is not None
     rho = campaign.skin.sensor_radius_mm / campaign.skin.thickness_mm
-    known = rows.inside
-    count = np.bincount(rows.condition, known)
+    inside = rows.inside
+    count = np.bincount(rows.condition, inside)
     with np.errstate(invalid="ignore"):
-        sigma = np.bincount(rows.condition, np.where(known, rows.sigma, 0.0)) / count
+        sigma = np.bincount(rows.condition, np.where(inside, rows.sigma, 0.0)) / count
     d33 = np.nan if inversion.campaign_d33 is None else float(inversion.campaign_d33.value)
     return d33 * gain(sigma[rows.condition], rho)

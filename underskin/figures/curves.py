@@ -1,5 +1,4 @@
-"""Curves of force against displacement, and Young's modulus as each has it: indentation of the skin, compression of its
-elastomer."""
+"""Force-displacement curves, and Young's modulus of each: indentation of the skin, compression of its elastomer."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, as_columns, label, one_of_many, styled
+from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, as_columns, label, line_style, styled
 from underskin.units import Floats, readable_unit
 
 _MOST_SAMPLES = 400  # of one curve
@@ -26,11 +25,10 @@ class ForceCurve:
 
 
 def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
-    """Each recording's curve, in units in which the numbers read well; thinned evenly if it has more samples than a
-    figure shows."""
+    """The curve of each recording, in readable units; thinned evenly to the number of samples that a figure shows."""
     figure = go.Figure()
-    length, per_mm = _readable("displacement_mm", [one.displacement_mm for one in curves])
-    force, per_n = _readable("force_n", [one.force_n for one in curves])
+    length, per_mm = _readable("displacement_mm", [curve.displacement_mm for curve in curves])
+    force, per_n = _readable("force_n", [curve.force_n for curve in curves])
     groups: list[str] = []
     for curve in curves:
         group = curve.of or curve.name
@@ -44,7 +42,7 @@ def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
             name=label(group),
             legendgroup=label(group) if curve.of else None,
             showlegend=is_new,
-            **one_of_many(groups.index(group) if curve.of else len(groups) - 1, 1.4),
+            **line_style(groups.index(group) if curve.of else len(groups) - 1, 1.4),
             hovertemplate=f"{label(curve.name)}<br>%{{x:.4g}} {length}: %{{y:.4g}} {force}<extra></extra>",
         )
     figure.update_xaxes(title=f"displacement [{length}]")
@@ -59,15 +57,15 @@ def curve_moduli(
     modulus, uncertainty = as_columns(names, modulus_mpa=modulus_mpa, uncertainty_mpa=uncertainty_mpa)
     figure = go.Figure()
     for number, group in enumerate(dict.fromkeys(which)):
-        own = [place for place, one in enumerate(which) if one == group]
+        members = [index for index, which_group in enumerate(which) if which_group == group]
         figure.add_scatter(
-            x=[place + 1 for place in own],
-            y=modulus[own],
-            error_y={"array": SDS_OF_95 * uncertainty[own]},
+            x=[index + 1 for index in members],
+            y=modulus[members],
+            error_y={"array": SDS_OF_95 * uncertainty[members]},
             mode="markers",
             name=label(group),
             marker={"color": COLOURS[number], "symbol": MARKERS[number], "size": 9},
-            text=[label(names[place]) for place in own],
+            text=[label(names[index]) for index in members],
             hovertemplate="%{text}<br>%{y:.4g} MPa<extra></extra>",
         )
     figure.update_xaxes(title="curve", tickformat="d")
@@ -76,5 +74,5 @@ def curve_moduli(
 
 
 def _readable(field: str, columns: Sequence[Floats]) -> tuple[str, float]:
-    """The unit in which all read well, and how many make the lab's."""
-    return readable_unit(field, max((float(np.nanmax(np.abs(one), initial=0.0)) for one in columns), default=0.0))
+    """The unit in which all values are readable, and its number per lab unit."""
+    return readable_unit(field, max((float(np.nanmax(np.abs(column), initial=0.0)) for column in columns), default=0.0))

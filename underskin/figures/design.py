@@ -17,16 +17,16 @@ _SENSORS = 2  # drawn to each side of the middle one
 
 @dataclass(frozen=True)
 class Pinned:
-    """Another design, and what it is called, to be seen beside the one that is drawn."""
+    """Another design and its name, for comparison with the drawn one."""
 
     name: str
     design: Design
 
 
-def design_overview(design: Design, beside: Pinned | None) -> go.Figure:
-    """σ and γ over each of a/h, rT/h and L, the others as designed; `beside`: a point for another design."""
+def design_overview(design: Design, pinned: Pinned | None) -> go.Figure:
+    """σ and γ over each of a/h, rT/h and L, the others as designed; `pinned`: another design, drawn as a point."""
     figure = make_subplots(1, 3, shared_yaxes=True, horizontal_spacing=0.03)
-    marks = [] if beside is None else [(beside, "diamond-open", COLOURS[6])]
+    marks = [] if pinned is None else [(pinned, "diamond-open", COLOURS[6])]
     marks.append((Pinned("this design", design), "circle", COLOURS[0]))
     for column, sweep in enumerate(design.sweeps, start=1):
         first = column == 1
@@ -51,9 +51,9 @@ def design_overview(design: Design, beside: Pinned | None) -> go.Figure:
     return styled(figure, "What reaches a sensor", 380)
 
 
-def array_response(design: Design, pitch_mm: float, beside: Pinned | None = None) -> go.Figure:
-    """Response of each sensor of a row over the contact's position along it, relative to a contact above a sensor; of
-    `beside` the middle sensor's."""
+def array_response(design: Design, pitch_mm: float, pinned: Pinned | None = None) -> go.Figure:
+    """Response of each sensor of a row over the contact's position along it, relative to a contact above a sensor;
+    of the `pinned` design the middle sensor's."""
     figure = go.Figure()
     places, mirrored = _both_sides(design)
     half_width = (_SENSORS + 0.5) * pitch_mm
@@ -65,13 +65,13 @@ def array_response(design: Design, pitch_mm: float, beside: Pinned | None = None
             line={"color": COLOURS[number + _SENSORS], "width": 1.8},
             showlegend=False, hovertemplate="contact at %{x:.3g} mm<br>sensor reads %{y:.3g} %<extra></extra>",
         )  # fmt: skip
-    if beside is not None:
-        other, reading = _both_sides(beside.design)
+    if pinned is not None:
+        other, reading = _both_sides(pinned.design)
         near = np.abs(other) <= half_width
         figure.add_scatter(
-            x=other[near], y=reading[near], mode="lines", name=beside.name,
+            x=other[near], y=reading[near], mode="lines", name=pinned.name,
             line={"color": "#6b7680", "dash": BOUND, "width": 2.5},
-            hovertemplate=f"{beside.name}<br>contact at %{{x:.3g}} mm<br>sensor reads %{{y:.3g}} %<extra></extra>",
+            hovertemplate=f"{pinned.name}<br>contact at %{{x:.3g}} mm<br>sensor reads %{{y:.3g}} %<extra></extra>",
         )  # fmt: skip
     half = 1e3 * design.resolution.width / 2
     if np.isfinite(half):
@@ -86,7 +86,7 @@ def array_response(design: Design, pitch_mm: float, beside: Pinned | None = None
 
 
 def _both_sides(design: Design) -> tuple[Floats, Floats]:
-    """Places of the contact along the row [mm] and the reading of the sensor at 0 [%]."""
+    """Positions of the contact along the row [mm] and the reading of the sensor at 0 [%]."""
     offset = np.asarray(to_lab("x_mm", design.offset))
     percent = 100 * design.response / design.response[0]
     return np.concatenate([-offset[:0:-1], offset]), np.concatenate([percent[:0:-1], percent])

@@ -11,15 +11,15 @@ from underskin.figures.style import COLOURS, INK, MARKERS, styled
 from underskin.units import Floats, Mask
 
 # Translucent, so that they recede on white paper and on a dark ground.
-_UNRESOLVED, _KEPT_OUT = "rgba(127,137,147,0.18)", "rgba(127,137,147,0.6)"
-_LEAST_SPAN = 0.05  # of the largest pitch: what differs by less looks alike
+_UNRESOLVED, _INFEASIBLE = "rgba(127,137,147,0.18)", "rgba(127,137,147,0.6)"
+_LEAST_SPAN = 0.05  # of the largest pitch: the least range of the colours
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)
 _BAR = {"title": {"text": "largest pitch [mm]", "side": "top"}, "orientation": "h", "y": -0.5, "thickness": 14}
 
 
 @dataclass(frozen=True)
 class Offered:
-    """A design that is offered [mm], and what it is best in."""
+    """A proposed design [mm], and the criterion in which it is best."""
 
     name: str
     thickness_mm: float
@@ -39,45 +39,45 @@ def design_region(
     Parameters
     ----------
     thickness_mm, sensor_radius_mm
-        (n,) and (m,), even in the logarithm [mm].
+        (n,) and (m,), equally spaced in the logarithm [mm].
     largest_pitch_mm, frf_pc_per_n, feasible
-        (m, n) the largest pitch that resolves what is asked [mm], charge over force [pC/N], and which pairs meet all
+        (m, n) the largest pitch with the required resolution [mm], charge over force [pC/N], and which pairs meet all
         limits; NaN where there is none.
     offered
-        Designs that are marked.
+        Designs to be marked.
     """
     figure = go.Figure()
     resolved = np.isfinite(largest_pitch_mm)
-    for name, own, colour in (
+    for name, mask, colour in (
         ("cannot resolve it", ~resolved, _UNRESOLVED),
-        ("resolves it, another limit is missed", resolved & ~feasible, _KEPT_OUT),
+        ("resolves it, another limit is missed", resolved & ~feasible, _INFEASIBLE),
         ("meets the demand", feasible, None),
     ):
         scale = _pitches(largest_pitch_mm[feasible]) if colour is None else _plain(colour)
         figure.add_heatmap(
-            x=thickness_mm, y=sensor_radius_mm, z=np.where(own, np.nan_to_num(largest_pitch_mm), np.nan), name=name,
+            x=thickness_mm, y=sensor_radius_mm, z=np.where(mask, np.nan_to_num(largest_pitch_mm), np.nan), name=name,
             xgap=2, ygap=2, customdata=frf_pc_per_n, hoverongaps=False, showlegend=colour is not None, **scale,
             hovertemplate=f"h %{{x:.3g}} mm, rT %{{y:.3g}} mm<br>{name}<br>"
             "pitch up to %{z:.3g} mm, %{customdata:.3g} pC/N<extra></extra>",
         )  # fmt: skip
-    for number, one in enumerate(offered):
+    for number, design in enumerate(offered):
         figure.add_scatter(
-            x=[one.thickness_mm], y=[one.sensor_radius_mm], mode="markers", name=one.name,
+            x=[design.thickness_mm], y=[design.sensor_radius_mm], mode="markers", name=design.name,
             marker={"symbol": MARKERS[number], "size": 13, "color": COLOURS[1], "line": {"width": 2, "color": INK}},
-            hovertemplate=f"{one.name}<br>h %{{x:.3g}} mm, rT %{{y:.3g}} mm<extra></extra>",
+            hovertemplate=f"{design.name}<br>h %{{x:.3g}} mm, rT %{{y:.3g}} mm<extra></extra>",
         )  # fmt: skip
     for update, title in ((figure.update_xaxes, "thickness h [mm]"), (figure.update_yaxes, "sensor radius rT [mm]")):
         update(title=title, type="log", tickvals=_TICKS, ticktext=[f"{tick:g}" for tick in _TICKS], zeroline=False)
     return styled(figure, "Which skins resolve it", 520).update_layout(margin={"l": 70, "r": 20, "t": 90, "b": 150})
 
 
-def _pitches(shown: Floats) -> dict[str, Any]:
-    """From the smallest to the largest, unless these are nearly the same."""
-    high = float(np.max(shown, initial=0.0)) or 1.0
-    low = min(float(np.min(shown, initial=high)), (1 - _LEAST_SPAN) * high)
+def _pitches(pitches: Floats) -> dict[str, Any]:
+    """A scale from the smallest to the largest, unless these are nearly equal."""
+    high = float(np.max(pitches, initial=0.0)) or 1.0
+    low = min(float(np.min(pitches, initial=high)), (1 - _LEAST_SPAN) * high)
     return {"colorscale": "Cividis", "zmin": low, "zmax": high, "colorbar": _BAR}
 
 
 def _plain(colour: str) -> dict[str, Any]:
-    """One colour, whatever the number."""
+    """One colour for all values."""
     return {"colorscale": [[0, colour], [1, colour]], "showscale": False}

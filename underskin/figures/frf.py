@@ -9,7 +9,7 @@ from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.page_styles import WHOLE_NUMBERS, decade_ticks, is_logarithmic
-from underskin.figures.style import ZONE, label, marked, one_of_many, styled
+from underskin.figures.style import ZONE, label, line_style, marked, styled
 from underskin.recordings.frf.flat_zone import FrfLines, FrfSpread
 from underskin.units import Floats
 
@@ -50,13 +50,15 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
 def frf_recordings(
     recordings: Sequence[FrfLines], zone_hz: tuple[float, float] | None, conditions: Sequence[Condition] = ()
 ) -> go.Figure:
-    """Each recording's lines; of many their names are under the pointer alone. `conditions`: each one's, by which its
-    lines look as in `frf_overview`; without them each recording has a look of its own."""
+    """The lines of each recording; for many recordings names are in hover texts only. `conditions`: one per
+    recording, which sets its style as in `frf_overview`; without them each recording has its own style."""
     traces: list[PlotlyTrace] = []
-    looks = [_look(one, conditions)[1] for one in conditions] or [one_of_many(n, 1.2) for n in range(len(recordings))]
-    for number, (entry, look) in enumerate(zip(recordings, looks, strict=True)):
-        parts = (entry.magnitude_pc_per_n, entry.phase_deg, entry.coherence)
-        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, look)
+    looks = [_look(condition, conditions)[1] for condition in conditions] or [
+        line_style(n, 1.2) for n in range(len(recordings))
+    ]
+    for number, (recording, look) in enumerate(zip(recordings, looks, strict=True)):
+        parts = (recording.magnitude_pc_per_n, recording.phase_deg, recording.coherence)
+        traces += _lines(label(recording.name), str(number), recording.frequency_hz, parts, look)
     figure = _finished(traces, zone_hz, "FRF of each recording")
     return figure.update_layout(showlegend=len(recordings) <= _MOST_IN_LEGEND)
 
@@ -119,7 +121,7 @@ def _magnitude_axis(traces: Sequence[PlotlyTrace]) -> dict[str, Any]:
 
 
 def _values(traces: Sequence[PlotlyTrace], axis: str) -> Floats:
-    """All that lies along an axis."""
+    """All values along an axis."""
     return np.concatenate([np.zeros(0), *(trace["y"] for trace in traces if trace.get("yaxis") == axis)])
 
 
@@ -128,10 +130,10 @@ def _condition(spread: FrfSpread) -> Condition:
 
 
 def _look(condition: Condition, conditions: Sequence[Condition]) -> tuple[str, dict[str, Any]]:
-    """Colour by preload, from dark to bright, and the whole look: with marks by indenter, but for the smallest."""
+    """Colour by preload, from dark to bright, and the line style: with markers by indenter, except for the smallest."""
     radii, preloads = (sorted(set(values)) for values in zip(*conditions, strict=True))
-    place = _BRIGHTEST * preloads.index(condition[1]) / max(len(preloads) - 1, 1)
-    colour = sample_colorscale("Viridis", [place])[0]
+    shade = _BRIGHTEST * preloads.index(condition[1]) / max(len(preloads) - 1, 1)
+    colour = sample_colorscale("Viridis", [shade])[0]
     number = radii.index(condition[0])
     marks = marked(number - 1) if number else {"mode": "lines"}
     return colour, {"line": {"color": colour, "width": 1.5}, **marks}

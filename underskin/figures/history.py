@@ -12,10 +12,10 @@ from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, label, styled
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
 _MOST_POINTS = 600  # of a history that shows each sensor
-_MOST_APART = 60  # points of a line, whose intervals can be told apart
+_MOST_WITH_CAPS = 60  # points of a line, up to which error bars have caps
 _MOST_FAINT = 6000  # of a history that shows their median and spread
-_LINE = 0.06  # of the span of all values: what the name of a point takes up
-_MOST_BESIDE = 3  # names beside a point
+_LINE_HEIGHT = 0.06  # of the span of all values: height of a label
+_MOST_NAMES = 3  # names in one label
 _CHOSEN = COLOURS[2]
 _DAY, _DAY_MS = timedelta(days=1), 86_400_000
 _CALENDAR = datetime.min.replace(tzinfo=UTC) + _DAY, datetime.max.replace(tzinfo=UTC) - _DAY
@@ -33,110 +33,114 @@ class SensorPoints:
 
 
 def is_summarised(sensors: int, points: int) -> bool:
-    """Whether so many sensors with so many points in all are drawn as their median and spread."""
+    """Whether this many sensors and points are drawn as their median and spread."""
     return sensors > MOST_NAMED or (points > _MOST_POINTS and sensors > 1)
 
 
 def d33_history(sensors: Sequence[SensorPoints], chosen: str | None = None) -> go.Figure:
-    """A line for each sensor, with 95 % intervals, or for the one that is `chosen`; of many sensors their median, the
-    range of 90 % of them as a band, by name those that stand apart, and the chosen one's line."""
-    times = [time for entry in sensors for time in entry.times]
-    own = [(number, entry) for number, entry in enumerate(sensors) if chosen in (None, entry.sensor)]
+    """A line for each sensor, with 95 % intervals, or for the one that is `chosen`. Many sensors are drawn as their
+    median, the range of 90 % of them as a band, outliers by name, and the chosen one's line."""
+    times = [time for series in sensors for time in series.times]
+    drawn = [(number, series) for number, series in enumerate(sensors) if chosen in (None, series.sensor)]
     if is_summarised(len(sensors), len(times)):
-        figure = go.Figure(_most(sensors))
-        figure.add_traces([_one(COLOURS.index(_CHOSEN), entry) for _, entry in own if chosen is not None])
+        figure = go.Figure(_summary_traces(sensors))
+        figure.add_traces([_sensor_line(COLOURS.index(_CHOSEN), series) for _, series in drawn if chosen is not None])
         return _finished(figure, f"d33 of {len(sensors)} sensors over time", times, legend=False)
-    figure = go.Figure([_one(number, entry) for number, entry in own])
-    return _finished(figure, "d33 of each sensor over time", times, legend=len(own) > 1)
+    figure = go.Figure([_sensor_line(number, series) for number, series in drawn])
+    return _finished(figure, "d33 of each sensor over time", times, legend=len(drawn) > 1)
 
 
-def _one(number: int, entry: SensorPoints) -> go.Scatter:
-    bars = [SDS_OF_95 * value for value in entry.d33_uncertainty_pc_per_n]
+def _sensor_line(number: int, series: SensorPoints) -> go.Scatter:
+    bars = [SDS_OF_95 * value for value in series.d33_uncertainty_pc_per_n]
     colour = LINE_COLOURS[number % len(LINE_COLOURS)]
-    dense = len(entry.times) > _MOST_APART
+    dense = len(series.times) > _MOST_WITH_CAPS
     return go.Scatter(
-        x=list(entry.times),
-        y=list(entry.d33_pc_per_n),
-        customdata=[entry.sensor] * len(entry.times),
+        x=list(series.times),
+        y=list(series.d33_pc_per_n),
+        customdata=[series.sensor] * len(series.times),
         error_y={"type": "data", "array": bars, "thickness": 1, **(_faint(colour) if dense else {"width": 3})},
         mode="lines+markers",
-        name=label(entry.sensor),
+        name=label(series.sensor),
         line={"color": colour, "width": 1.5},
         marker={"symbol": MARKERS[(number + number // len(LINE_COLOURS)) % len(MARKERS)], "size": 4 if dense else 8},
-        hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
-        f"± %{{error_y.array:.2g}} pC/N (95 %)<br>{label(entry.trend)}<extra></extra>",
+        hovertemplate=f"{label(series.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
+        f"± %{{error_y.array:.2g}} pC/N (95 %)<br>{label(series.trend)}<extra></extra>",
     )
 
 
 def _faint(colour: str) -> dict[str, str | int]:
-    """Error bars of points that lie close to each other: without ends, and with what they cross seen through them."""
-    red, green, blue = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
+    """Error bars of dense points: without caps, translucent."""
+    red, green, blue = (int(colour[start : start + 2], 16) for start in (1, 3, 5))
     return {"width": 0, "color": f"rgba({red},{green},{blue},0.25)"}
 
 
-def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
-    """The band and the median of all sensors at each time, the points of those that stand apart, all points, faint, and
-    a line that is empty until one of them is pointed at."""
+def _summary_traces(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
+    """The band and the median of all sensors at each time, the outliers, all points, faint, and an empty line for
+    the sensor under the pointer."""
     at: dict[str, list[tuple[str, float, float]]] = {}
-    for entry in sensors:
+    for series in sensors:
         for time, value, uncertainty in zip(
-            entry.times, entry.d33_pc_per_n, entry.d33_uncertainty_pc_per_n, strict=True
+            series.times, series.d33_pc_per_n, series.d33_uncertainty_pc_per_n, strict=True
         ):
-            at.setdefault(time, []).append((entry.sensor, value, uncertainty))
+            at.setdefault(time, []).append((series.sensor, value, uncertainty))
     times = sorted(at)
-    found = [many_sensors(*(np.array([row[part] for row in at[time]]) for part in (1, 2))) for time in times]
-    apart = [(time, *at[time][place]) for time, one in zip(times, found, strict=True) for place in one.apart]
+    summaries = [many_sensors(*(np.array([row[part] for row in at[time]]) for part in (1, 2))) for time in times]
+    outliers = [
+        (time, *at[time][index]) for time, summary in zip(times, summaries, strict=True) for index in summary.apart
+    ]
     band = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
     return [
-        go.Scatter(x=times, y=[one.high for one in found], name="90 % of the sensors", **band),
+        go.Scatter(x=times, y=[summary.high for summary in summaries], name="90 % of the sensors", **band),
         go.Scatter(
-            x=times, y=[one.low for one in found], name="90 % of the sensors", fill="tonexty",
+            x=times, y=[summary.low for summary in summaries], name="90 % of the sensors", fill="tonexty",
             fillcolor="rgba(0,114,178,0.15)", **band,
         ),
         go.Scatter(
-            x=times, y=[one.median for one in found], mode="lines+markers", name="median of the sensors",
+            x=times, y=[summary.median for summary in summaries], mode="lines+markers", name="median of the sensors",
             line={"color": COLOURS[0], "width": 1.5}, marker={"size": 6},
             hovertemplate="%{x|%d %b %Y %H:%M} UTC<br>median d33 %{y:.5g} pC/N<extra></extra>",
         ),
         go.Scatter(
-            x=[time for time, *_ in apart],
-            y=[value for _, _, value, _ in apart],
-            customdata=[row[1] for row in apart],
-            error_y={"type": "data", "array": [SDS_OF_95 * row[3] for row in apart], "thickness": 1, "width": 3},
+            x=[time for time, *_ in outliers],
+            y=[value for _, _, value, _ in outliers],
+            customdata=[row[1] for row in outliers],
+            error_y={"type": "data", "array": [SDS_OF_95 * row[3] for row in outliers], "thickness": 1, "width": 3},
             mode="markers+text",
             name="stands apart",
-            text=_names(apart, float(np.ptp([value for rows in at.values() for _, value, _ in rows]))),
-            textposition=["middle right" if time == times[0] else "middle left" for time, *_ in apart],
-            hovertext=[label(sensor) for _, sensor, *_ in apart],
+            text=_names(outliers, float(np.ptp([value for rows in at.values() for _, value, _ in rows]))),
+            textposition=["middle right" if time == times[0] else "middle left" for time, *_ in outliers],
+            hovertext=[label(sensor) for _, sensor, *_ in outliers],
             marker={"color": COLOURS[1], "symbol": "square", "size": 8},
             hovertemplate="%{hovertext}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.5g} pC/N<extra></extra>",
         ),
-        *_each(sensors),
+        *_all_points(sensors),
     ]  # fmt: skip
 
 
-def _names(apart: Sequence[tuple[str, str, float, float]], span: float) -> list[str]:
-    """What is written beside each point that stands apart: of points of one time that lie too close to each other for
-    a line each the first has the names of all, the others have none. `span`: of all values."""
-    written = [""] * len(apart)
-    close: list[int] = []
-    for place in sorted(range(len(apart)), key=lambda each: (apart[each][0], apart[each][2])):
-        before = apart[close[-1]] if close else None
-        if before is None or before[0] != apart[place][0] or apart[place][2] - before[2] > _LINE * span:
-            close = []
-        close.append(place)
-        names = [label(apart[one][1]) for one in sorted(close, key=lambda one: apart[one][1])[:_MOST_BESIDE]]
-        more = len(close) - len(names)
-        written[close[0]] = ", ".join(names) + (f" and {more} more" if more else "")
+def _names(outliers: Sequence[tuple[str, str, float, float]], span: float) -> list[str]:
+    """The label of each outlier. Outliers of one time that are too close for a line each share one label at the first.
+    `span`: range of all values."""
+    written = [""] * len(outliers)
+    cluster: list[int] = []
+    for index in sorted(range(len(outliers)), key=lambda index: (outliers[index][0], outliers[index][2])):
+        before = outliers[cluster[-1]] if cluster else None
+        if before is None or before[0] != outliers[index][0] or outliers[index][2] - before[2] > _LINE_HEIGHT * span:
+            cluster = []
+        cluster.append(index)
+        names = [
+            label(outliers[index][1]) for index in sorted(cluster, key=lambda index: outliers[index][1])[:_MOST_NAMES]
+        ]
+        more = len(cluster) - len(names)
+        written[cluster[0]] = ", ".join(names) + (f" and {more} more" if more else "")
     return written
 
 
-def _each(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
-    """All points, faint, with their sensors, by which a page draws the line of the one that is pointed at."""
+def _all_points(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
+    """All points, faint, with their sensors: a page draws the line of the one under the pointer."""
     points = [
-        (time, value, entry.sensor)
-        for entry in sensors
-        for time, value in zip(entry.times, entry.d33_pc_per_n, strict=True)
+        (time, value, series.sensor)
+        for series in sensors
+        for time, value in zip(series.times, series.d33_pc_per_n, strict=True)
     ]
     if len(points) > _MOST_FAINT:
         return []

@@ -1,4 +1,4 @@
-"""What a mechanism does to the FRF of a reference rig, or to a force curve, at three strengths, by its own law.
+"""The effect of a mechanism on the FRF of a reference rig, or on a force curve, at three strengths.
 
 The reference rig: h 2.5 mm, rT 1.5 mm, E 2 MPa, d33 at the centre of its prior; a sphere of 4 mm above a sensor,
 preload 1 N, dynamic force 0.3 N, held for 60 s after 10,000 load cycles; its neighbours are 4 mm away. Curves: that
@@ -46,7 +46,7 @@ class LawEffect:
 
     @property
     def changes(self) -> tuple[str, ...]:
-        """Of an FRF where it is largest, 30 Hz where it is the same everywhere; of a curve at its largest force."""
+        """For an FRF at its largest change, at 30 Hz where that is uniform; for a curve at its largest force."""
         return tuple(self._change(*pair) for pair in zip(*(panel.curves for panel in self.panels), strict=True))
 
     def _change(self, first: Floats, second: Floats) -> str:
@@ -62,38 +62,40 @@ class LawEffect:
 
 
 def _signed(value: float) -> str:
-    """To two digits; what is nothing but rounding is 0."""
+    """To two significant digits; rounding errors are 0."""
     return f"{float(f'{value:.2g}'):+g}".replace("-", "−") if abs(value) > 1e-6 else "0"
 
 
 def law_effect(name: str, table: SigmaTable) -> LawEffect:
-    """What a mechanism of the catalogue does to the reference rig.
+    """The effect of a mechanism of the catalogue on the reference rig.
 
     Raises
     ------
     Unsupported
-        Where the rig has not what the mechanism follows, such as a temperature.
+        Where the rig lacks what the mechanism reads, such as a temperature.
     """
     mechanism = CATALOGUE[name]
     return _of_frf(mechanism, table) if "frf" in mechanism.kinds else _of_curve(mechanism, table)
 
 
 def lacking(mechanism: Mechanism) -> str | None:
-    """What the reference rig has not that the mechanism follows, in words; None where it can be drawn."""
+    """What the reference rig lacks for the mechanism, in words; None where it can be drawn."""
     kind = mechanism.kinds[0]
     return mechanism.unsupported(reference_recordings() if kind == "frf" else reference_campaign(kind), kind)
 
 
 def strengths(parameters: Sequence[Parameter]) -> list[list[float]]:
-    """Fit coordinates of the parameters at each of three strengths; once where there is none to change."""
-    if not any(_is_strength(entry) for entry in parameters):
-        return [[usual(entry) for entry in parameters]]
+    """Fit coordinates of the parameters at each of three strengths; once without a strength parameter."""
+    if not any(_is_strength(parameter) for parameter in parameters):
+        return [[usual(parameter) for parameter in parameters]]
     for factors in (STRENGTHS, _WEAKER):
-        rows = [[_at(entry, factor) for entry in parameters] for factor in factors]
+        rows = [[_scaled(parameter, factor) for parameter in parameters] for factor in factors]
         pairs = [pair for row in rows for pair in zip(parameters, row, strict=True)]
-        if all(entry.bounds[0] <= at <= entry.bounds[1] for entry, at in pairs):
+        if all(parameter.bounds[0] <= at <= parameter.bounds[1] for parameter, at in pairs):
             break
-    return [[float(np.clip(at, *entry.bounds)) for entry, at in zip(parameters, row, strict=True)] for row in rows]
+    return [
+        [float(np.clip(at, *parameter.bounds)) for parameter, at in zip(parameters, row, strict=True)] for row in rows
+    ]
 
 
 def reference_recordings() -> Campaign:
@@ -123,25 +125,31 @@ def _of_frf(mechanism: Mechanism, table: SigmaTable) -> LawEffect:
     campaign = reference_recordings()
     base, with_it = compose([], campaign, table), compose([mechanism.name], campaign, table)
     last = base.recording == len(campaign.recordings) - 1
-    nuisances = [entry.start for entry in base.parameters]
-    own = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
-    rows = strengths(own)
+    nuisances = [parameter.start for parameter in base.parameters]
+    parameters = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
+    rows = strengths(parameters)
     without = base.predict(np.array(nuisances)).value[last]
-    found = [_excursion(with_it, own, np.array([*row, *nuisances]), last) for row in rows]
+    results = [_excursion(with_it, parameters, np.array([*row, *nuisances]), last) for row in rows]
     magnitude, phase = (
-        EffectPanel(title, of(without), tuple(of(one) for one in found))
+        EffectPanel(title, of(without), tuple(of(result) for result in results))
         for title, of in (("magnitude, pC/N", _magnitude), ("phase, degrees", _phase))
     )
-    return LawEffect("frequency, Hz", _FREQUENCY, True, tuple(_in_words(own, row) for row in rows), (magnitude, phase))
+    return LawEffect(
+        "frequency, Hz", _FREQUENCY, True, tuple(_in_words(parameters, row) for row in rows), (magnitude, phase)
+    )
 
 
-def _excursion(model: Model, own: Sequence[Parameter], fit: Floats, rows: Array) -> Array:
-    """The FRF [C/N]; of what acts on the scatter alone, one standard deviation of it away."""
+def _excursion(model: Model, parameters: Sequence[Parameter], fit: Floats, rows: Array) -> Array:
+    """The FRF [C/N]; for a mechanism that acts on the scatter only, one standard deviation away."""
     prediction = model.predict(fit)
     value = prediction.value[rows]
-    if any(entry.acts_on == "line_variance" for entry in own):
+    if any(parameter.acts_on == "line_variance" for parameter in parameters):
         return np.asarray(value + np.sqrt(prediction.pickup_variance[rows] / 2) * (1 + 1j))
-    spread = [entry.from_fit(at) for entry, at in zip(own, fit, strict=False) if entry.acts_on == "gain_spread"]
+    spread = [
+        parameter.from_fit(at)
+        for parameter, at in zip(parameters, fit, strict=False)
+        if parameter.acts_on == "gain_spread"
+    ]
     return np.asarray(value * np.exp(sum(spread)))
 
 
@@ -158,46 +166,48 @@ def _of_curve(mechanism: Mechanism, table: SigmaTable) -> LawEffect:
     campaign = reference_campaign(kind)
     campaign = replace(campaign, recordings=campaign.recordings[1:])
     base, with_it = compose([], campaign, table, kind), compose([mechanism.name], campaign, table, kind)
-    nuisances = [entry.start for entry in base.parameters]
-    own = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
-    rows = strengths(own)
+    nuisances = [parameter.start for parameter in base.parameters]
+    parameters = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
+    rows = strengths(parameters)
     without = np.asarray(base.predict(np.array(nuisances)).value)
-    found = [np.asarray(with_it.predict(np.array([*row, *nuisances])).value) for row in rows]
+    results = [np.asarray(with_it.predict(np.array([*row, *nuisances])).value) for row in rows]
     recording = campaign.recordings[0]
     assert not isinstance(recording, FrfRecording)
-    way = recording.displacement_mm
+    travel = recording.displacement_mm
     panels = (
-        EffectPanel("force, N", without, tuple(found)),
-        EffectPanel("change of force, N", np.zeros_like(without), tuple(one - without for one in found)),
+        EffectPanel("force, N", without, tuple(results)),
+        EffectPanel("change of force, N", np.zeros_like(without), tuple(result - without for result in results)),
     )
-    return LawEffect("displacement, mm", way, False, tuple(_in_words(own, row) for row in rows), panels)
+    return LawEffect("displacement, mm", travel, False, tuple(_in_words(parameters, row) for row in rows), panels)
 
 
-def _is_strength(entry: Parameter) -> bool:
-    return entry.limit is not None
+def _is_strength(parameter: Parameter) -> bool:
+    return parameter.limit is not None
 
 
-def usual(entry: Parameter) -> float:
-    """The fit coordinate at which figures have it."""
-    return entry.typical if entry.shown is None else entry.to_fit(entry.shown)
+def usual(parameter: Parameter) -> float:
+    """The fit coordinate used in figures."""
+    return parameter.typical if parameter.shown is None else parameter.to_fit(parameter.shown)
 
 
-def _at(entry: Parameter, factor: float) -> float:
-    """So many times as far from where it does nothing; the shape of a law stays."""
-    middle = usual(entry)
-    if not _is_strength(entry):
+def _scaled(parameter: Parameter, factor: float) -> float:
+    """`factor` times the distance from the limit; shape parameters are unchanged."""
+    middle = usual(parameter)
+    if not _is_strength(parameter):
         return middle
-    limit = None if entry.moves_covariance else entry.fit_limit
+    limit = None if parameter.moves_covariance else parameter.fit_limit
     if limit is not None:
         return limit + factor * (middle - limit)
-    return middle + float(np.log(factor)) * (-1 if entry.limit == np.inf else 1)
+    return middle + float(np.log(factor)) * (-1 if parameter.limit == np.inf else 1)
 
 
 def _in_words(parameters: Sequence[Parameter], row: Sequence[float]) -> str:
     """The strengths with their units."""
-    told = [
-        f"{entry.name.replace('_', ' ')} {float(f'{entry.from_fit(at):.2g}'):g} {entry.unit}".removesuffix(" -")
-        for entry, at in zip(parameters, row, strict=True)
-        if _is_strength(entry)
+    words = [
+        f"{parameter.name.replace('_', ' ')} {float(f'{parameter.from_fit(at):.2g}'):g} {parameter.unit}".removesuffix(
+            " -"
+        )
+        for parameter, at in zip(parameters, row, strict=True)
+        if _is_strength(parameter)
     ]
-    return ", ".join(told) or "with it"
+    return ", ".join(words) or "with it"

@@ -1,8 +1,8 @@
-"""Which mechanisms act alike on FRFs of the reference campaign, so that they are mistaken for each other.
+"""Mechanisms that act alike on FRFs of the reference campaign, and so are confused with each other.
 
-Each mechanism at its usual strength changes the relative response of every line. What d33, and the modulus and the
-thickness within their priors, can take up of it is taken out, at 1 % noise on each line; the cosine between what is
-left of two mechanisms says how alike they are: 1 where these recordings cannot tell them apart.
+Each mechanism at its usual strength changes the relative response of every line. The part that d33, and the modulus
+and the thickness within their priors, can absorb is projected out, at 1 % noise on each line; the cosine between the
+remainders of two mechanisms measures their similarity: 1 where these recordings cannot distinguish them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,8 +21,8 @@ _NOISE = 0.01  # of each line, relative
 
 @dataclass(frozen=True)
 class Twin:
-    """Another mechanism and how alike it acts (0 to 1); axes of a campaign, and kinds of recordings, on which one of
-    the two shows alone."""
+    """Another mechanism and its similarity (0 to 1); axes of a campaign, and kinds of recordings, on which only one
+    of the two shows."""
 
     name: str
     alike: float
@@ -31,15 +31,17 @@ class Twin:
 
 
 def law_twins(table: SigmaTable) -> Mapping[str, tuple[Twin, ...]]:
-    """Of each mechanism of FRFs that changes their mean all the others, the most alike first."""
+    """For each mechanism of FRFs that changes their mean all the others, the most similar first."""
     campaign = reference_campaign("frf")
     base = compose([], campaign, table)
-    start = [entry.start for entry in base.parameters]
+    start = [parameter.start for parameter in base.parameters]
     prediction = base.predict(np.array(start))
     nuisances = np.array([_relative(slope, prediction.value) for slope in prediction.slopes])
-    priors = np.diag([entry.prior.sd**-2 if isinstance(entry.prior, Normal) else 0.0 for entry in base.parameters])
-    taken_up = np.linalg.inv(nuisances @ nuisances.T + priors) @ nuisances
-    left: dict[str, Floats] = {}
+    priors = np.diag(
+        [parameter.prior.sd**-2 if isinstance(parameter.prior, Normal) else 0.0 for parameter in base.parameters]
+    )
+    projection = np.linalg.inv(nuisances @ nuisances.T + priors) @ nuisances
+    directions: dict[str, Floats] = {}
     for name, mechanism in CATALOGUE.items():
         if "frf" not in mechanism.kinds or not mechanism.moves_predictions:
             continue
@@ -47,14 +49,14 @@ def law_twins(table: SigmaTable) -> Mapping[str, tuple[Twin, ...]]:
             model = compose([name], campaign, table)
         except Unsupported:
             continue
-        own = model.parameters[: len(model.parameters) - len(base.parameters)]
-        if any(entry.moves_covariance for entry in own):
+        parameters = model.parameters[: len(model.parameters) - len(base.parameters)]
+        if any(parameter.moves_covariance for parameter in parameters):
             continue
-        fit = np.array([*(usual(entry) for entry in own), *start])
+        fit = np.array([*(usual(parameter) for parameter in parameters), *start])
         change = _relative(model.predict(fit).value - prediction.value, prediction.value)
-        change = change - nuisances.T @ (taken_up @ change)
-        left[name] = change / np.linalg.norm(change)
-    return {name: _alike(name, left) for name in left}
+        change = change - nuisances.T @ (projection @ change)
+        directions[name] = change / np.linalg.norm(change)
+    return {name: _ranked_twins(name, directions) for name in directions}
 
 
 def _relative(change: Array, response: Array) -> Floats:
@@ -63,22 +65,22 @@ def _relative(change: Array, response: Array) -> Floats:
     return np.concatenate([relative.real, relative.imag])
 
 
-def _alike(name: str, left: Mapping[str, Floats]) -> tuple[Twin, ...]:
-    own = CATALOGUE[name]
+def _ranked_twins(name: str, directions: Mapping[str, Floats]) -> tuple[Twin, ...]:
+    mechanism = CATALOGUE[name]
     twins = []
-    for other in left:
+    for other in directions:
         if other != name:
             rival = CATALOGUE[other]
-            alone = _in_one(_axes(own), _axes(rival)), _in_one(own.kinds, rival.kinds)
-            twins.append(Twin(other, float(abs(left[name] @ left[other])), *alone))
+            distinguishing = _in_only_one(_axes(mechanism), _axes(rival)), _in_only_one(mechanism.kinds, rival.kinds)
+            twins.append(Twin(other, float(abs(directions[name] @ directions[other])), *distinguishing))
     return tuple(sorted(twins, key=lambda twin: -twin.alike))
 
 
 def _axes(mechanism: Mechanism) -> tuple[str, ...]:
-    """Axes on which it shows; a lab's own law of lines names those that it reads, and turns the phase too."""
+    """Axes on which it shows; a lab's own law of lines names those that it reads, and changes the phase too."""
     return (*mechanism.axes, "phase") if mechanism.stage is Stage.LINES else mechanism.axes
 
 
-def _in_one(own: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
-    """What stands in one of two lists alone, in their order."""
-    return tuple(entry for entry in dict.fromkeys((*own, *others)) if (entry in own) != (entry in others))
+def _in_only_one(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
+    """Names in only one of two lists, in their order."""
+    return tuple(name for name in dict.fromkeys((*first, *second)) if (name in first) != (name in second))

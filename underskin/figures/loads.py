@@ -13,7 +13,7 @@ from underskin.figures.style import COLOURS, styled
 from underskin.units import Floats
 
 _ROOM = 0.06  # of the map, between a load and its edge
-_TENSION = 0.01  # of the largest compression, below which it is not told apart by colour
+_TENSION = 0.01  # of the largest compression, below which colours do not show tension
 _CHARGE = Quantity("charge", "pC", "bound")
 
 
@@ -26,8 +26,8 @@ def loaded_array(
     loads_mm: Sequence[tuple[float, float]],
     sensor_radius_mm: float | None = None,
 ) -> go.Figure:
-    """Each sensor coloured by its charge, grey where that is 0 within its error, in its size where `sensor_radius_mm`
-    tells it, with the loads where they have positions.
+    """Each sensor coloured by its charge, grey where that is 0 within its error, at its true size where
+    `sensor_radius_mm` is given, with the loads that have positions.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
@@ -44,11 +44,11 @@ def loaded_array(
             hovertemplate="%{text}: x %{x:.4g} mm, y %{y:.4g} mm<extra></extra>",
             marker={"symbol": "x-thin", "size": 14, "line": {"width": 3, "color": "#D55E00"}},
         )
-        for axis, along in ((figure.layout.xaxis, 0), (figure.layout.yaxis, 1)):
-            places = [place[along] for place in loads_mm]
+        for axis, coordinate in ((figure.layout.xaxis, 0), (figure.layout.yaxis, 1)):
+            positions = [position[coordinate] for position in loads_mm]
             low, high = axis.range
-            room = _ROOM * (max(high, *places) - min(low, *places))
-            axis.range = [min(low, min(places) - room), max(high, max(places) + room)]
+            room = _ROOM * (max(high, *positions) - min(low, *positions))
+            axis.range = [min(low, min(positions) - room), max(high, max(positions) + room)]
     return styled(figure, "Charge on the array")
 
 
@@ -70,7 +70,7 @@ def pressure_on_array(
             hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>%{z:.5g} MPa<extra></extra>",
         )
     )
-    outlines = [_circle(place, sensor_radius_mm) for place in sensors_mm]
+    outlines = [_circle(position, sensor_radius_mm) for position in sensors_mm]
     figure.add_scatter(
         x=np.concatenate([x for x, _ in outlines]),
         y=np.concatenate([y for _, y in outlines]),
@@ -112,10 +112,12 @@ def stress_on_base(
             hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>compression %{z:.4g} MPa<extra></extra>",
         )
     )
-    contacts = [_circle(place, radius) for place, radius in zip(contacts_mm, stress.contact_radius_mm, strict=True)]
+    contacts = [
+        _circle(position, radius) for position, radius in zip(contacts_mm, stress.contact_radius_mm, strict=True)
+    ]
     for name, outlines, line in (
         ("contact", contacts, {"color": COLOURS[3], "width": 2, "dash": BOUND}),
-        ("sensor", [_circle(place, sensor_radius_mm) for place in sensors_mm], {"color": COLOURS[1], "width": 2}),
+        ("sensor", [_circle(position, sensor_radius_mm) for position in sensors_mm], {"color": COLOURS[1], "width": 2}),
     ):
         figure.add_scatter(
             x=np.concatenate([x for x, _ in outlines]),
@@ -125,14 +127,16 @@ def stress_on_base(
             hoverinfo="skip",
             line=line,
         )
-    for update, along in ((figure.update_xaxes, stress.x_mm), (figure.update_yaxes, stress.y_mm)):
-        update(range=[float(along[0]), float(along[-1])], constrain="domain", showgrid=False, zeroline=False)
+    for update, coordinates in ((figure.update_xaxes, stress.x_mm), (figure.update_yaxes, stress.y_mm)):
+        update(
+            range=[float(coordinates[0]), float(coordinates[-1])], constrain="domain", showgrid=False, zeroline=False
+        )
     figure.update_xaxes(title="x [mm]")
     figure.update_yaxes(title="y [mm]", scaleanchor="x", scaleratio=1)
     return styled(figure, "Stress on the base")
 
 
 def _circle(centre: tuple[float, float], radius: float) -> tuple[Floats, Floats]:
-    """Its outline, ended by a gap."""
+    """The outline of a circle, followed by a gap."""
     angle = np.append(np.linspace(0, 2 * np.pi, 33), np.nan)
     return centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)

@@ -1,5 +1,5 @@
-"""The stress in the layer under a sphere: a section through its depth and the base from above, and both as frames of a
-load that grows."""
+"""The stress in the layer under a sphere: a section through its depth and the base from above, and frames for a growing
+load."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -55,14 +55,14 @@ def stress_on_base(field: StressField, row: int) -> go.Figure:
 
 
 def frames(field: StressField, row: int) -> dict[str, Sequence[dict[str, Any]]]:
-    """What changes in the traces of `section` and `base`, in their order, where the force is that of `row`."""
+    """The changes in the traces of `section` and `base`, in their order, for the force of `row`."""
     heat, contact, sphere = _section(field, row)
     on_base, edge = _base(field, row)
     return {"section": [{"z": heat["z"]}, contact, sphere], "base": [{"z": on_base["z"]}, edge]}
 
 
 def _section(field: StressField, row: int) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """The compression, the contact and the sphere; what is symmetric, mirrored."""
+    """The compression, the contact and the sphere, mirrored about the axis."""
     r = to_lab("r_mm", field.r)
     drawn = r <= _half_width(field) * (1 + 1e-9)
     x, stress = r[drawn], to_lab("sigma_zz_mpa", -field.sigma_zz[row][:, drawn])
@@ -94,8 +94,8 @@ def _largest(field: StressField, depth: int) -> float:
 
 
 def _heatmap(heat: dict[str, Any], largest: float, power: float) -> go.Heatmap:
-    """Compression in colours; with a power of 2 they go with its square root, so that what is below a small contact
-    can be seen."""
+    """Compression in colours; with a power of 2 they follow its square root, so that stress below a small contact is
+    visible."""
     shade = np.linspace(0.0, 1.0, _STEPS + 1)
     colours = sample_colorscale("Cividis", shade.tolist())
     return go.Heatmap(
@@ -132,13 +132,13 @@ def _circle(radius: float) -> dict[str, Any]:
 
 
 def _equal(figure: go.Figure) -> go.Figure:
-    """A millimetre is as long along both axes; below them the colours' scale."""
+    """Equal scales of both axes, and the colour bar below."""
     figure.update_layout(margin={"l": 60, "r": 10, "b": 115})
     return figure.update_yaxes(scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False)
 
 
 def _rounded(values: Floats) -> Any:
-    """To so many digits of the largest, as lists."""
+    """Lists, rounded to a number of digits of the largest value."""
     largest = float(np.abs(values).max())
     digits = _DIGITS - 1 - int(np.floor(np.log10(largest))) if largest > 0 else 0
     return (0.0 + np.round(values, digits)).tolist()

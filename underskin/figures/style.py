@@ -1,5 +1,5 @@
-"""Common style of all figures: the colours of Okabe and Ito, Cividis and Viridis, which colour-blind readers can tell
-apart."""
+"""Common style of all figures: the colours of Okabe and Ito, Cividis and Viridis, distinguishable by colour-blind
+readers."""
 
 from collections.abc import Sequence
 from html import escape
@@ -16,9 +16,9 @@ from underskin.units import Floats
 COLOURS = LINE_COLOURS[:7]
 MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
 INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
-SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations: what every error bar shows
+SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations, of every error bar
 _LONGEST_LABEL = 60
-_MARKS = 8  # at most, along a line that its colour alone does not tell apart
+_MARKS = 8  # at most, along a line whose colour is not unique
 PLAIN = {"exponentformat": "none"}  # else ticks had prefixes beside the unit of their axis: 10μ of N
 _AXIS = {
     "gridcolor": GRID,
@@ -58,8 +58,8 @@ def styled(figure: go.Figure, title: str, height: int = 420) -> go.Figure:
     return figure.update_layout(template=_TEMPLATE, title=title, height=height)
 
 
-def one_of_many(number: int, width: float) -> dict[str, Any]:
-    """How one of many lines is drawn: with marks along it where the colours are used up."""
+def line_style(number: int, width: float) -> dict[str, Any]:
+    """The style of one of many lines: with markers where the colours are used up."""
     line = {"color": COLOURS[number % len(COLOURS)], "width": width}
     if number < len(COLOURS):
         return {"mode": "lines", "line": line}

@@ -1,4 +1,4 @@
-"""Raw channels, one above the other."""
+"""Raw channels in panels, one above the other."""
 
 from collections.abc import Sequence
 
@@ -13,14 +13,14 @@ from underskin.units import Floats, Indices
 _MOST_POINTS = 700  # of one channel
 _ROW = 130  # pixels
 _EDGES = 110
-_LEFT = 110  # pixels, for ticks such as -1.25e-7 beside a title of two lines
+_LEFT_MARGIN = 110  # pixels, for ticks such as -1.25e-7 beside a title of two lines
 _LONGEST = 18  # letters of a name beside its axis
 
 
 def raw_traces(traces: Sequence[Channel], sample_rate_hz: float | None) -> go.Figure:
-    """Each channel of real numbers over time, or over the sample number; of many samples the extremes are drawn."""
+    """Each real channel over time, or over the sample number; long channels are drawn by their extremes."""
     figure = make_subplots(len(traces), 1, shared_xaxes=True, vertical_spacing=0.12 / len(traces))
-    place = "sample %{x}" if sample_rate_hz is None else "%{x:.6g} s"
+    abscissa = "sample %{x}" if sample_rate_hz is None else "%{x:.6g} s"
     for row, trace in enumerate(traces, start=1):
         values = trace.values.real
         chosen = _extremes(values)
@@ -32,7 +32,7 @@ def raw_traces(traces: Sequence[Channel], sample_rate_hz: float | None) -> go.Fi
             mode="lines",
             name=name,
             line={"color": COLOURS[(row - 1) % len(COLOURS)], "width": 1},
-            hovertemplate=f"{name}<br>{place}: %{{y:.5g}} {label(trace.unit)}<extra></extra>",
+            hovertemplate=f"{name}<br>{abscissa}: %{{y:.5g}} {label(trace.unit)}<extra></extra>",
             showlegend=False,
             row=row,
             col=1,
@@ -41,16 +41,16 @@ def raw_traces(traces: Sequence[Channel], sample_rate_hz: float | None) -> go.Fi
         short = label(bare if len(bare) <= _LONGEST else bare[: _LONGEST - 1] + "…")
         figure.update_yaxes(title=f"{short}<br>[{label(trace.unit) or '?'}]", tickformat="~g", row=row, col=1)
     figure.update_xaxes(title="sample" if sample_rate_hz is None else "time [s]", row=len(traces), col=1)
-    figure.update_layout(margin={"l": _LEFT})
+    figure.update_layout(margin={"l": _LEFT_MARGIN})
     return styled(figure, "As it came", _EDGES + _ROW * len(traces))
 
 
 def _extremes(values: Floats) -> Indices:
-    """Which samples to draw: all, or the lowest and the highest of each of as many bins as a figure resolves."""
+    """Indices of the samples to draw: all, or the lowest and the highest of each bin."""
     count = len(values)
     if count <= _MOST_POINTS:
         return np.arange(count)
     size = -(-2 * count // _MOST_POINTS)
-    whole = values[: count // size * size].reshape(-1, size)
-    start = np.arange(len(whole)) * size
-    return np.unique(np.concatenate([start + whole.argmin(axis=1), start + whole.argmax(axis=1), [count - 1]]))
+    bins = values[: count // size * size].reshape(-1, size)
+    start = np.arange(len(bins)) * size
+    return np.unique(np.concatenate([start + bins.argmin(axis=1), start + bins.argmax(axis=1), [count - 1]]))

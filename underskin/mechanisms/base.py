@@ -1,7 +1,7 @@
-"""What a mechanism is: a law that the base model leaves out, and where in the model it acts.
+"""The interface of a mechanism: a law that the base model leaves out, and the stage of the model at which it acts.
 
-A mechanism is one file: a class that states its texts and traits as attributes and overrides the hooks of the stages at
-which it acts. It keeps no state. Values inside hooks are SI, parameters are in their units.
+A mechanism is one file: a class that states its texts and traits as attributes and overrides the hooks of the stages
+at which it acts. It keeps no state. Values inside hooks are SI, parameters are in their units.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ NEEDED_FIELDS = ("dwell_s", "dynamic_force_n", "load_cycles", "sensor")  # of a 
 
 
 class Stage(Enum):
-    """Where in a model a mechanism acts, in the order of composition; the value is its name in a sentence."""
+    """Where in a model a mechanism acts, in the order of composition; the value names the stage in a sentence."""
 
     DECLARED = "declared values"  # on_declared, on_curve
     MATERIAL = "material"  # on_material, on_curve
@@ -51,13 +51,13 @@ class Stage(Enum):
     CURVE = "curves"  # on_curve
 
     @property
-    def place(self) -> int:
-        """Its place in the order of composition."""
+    def position(self) -> int:
+        """Its index in the order of composition."""
         return list(Stage).index(self)
 
 
 class Unsupported(UnderskinError):
-    """A campaign that cannot support a mechanism. Attributes: `mechanism`, `reason` (what is lacking, in words)."""
+    """A campaign cannot support a mechanism. Attributes: `mechanism`, `reason` (what is lacking, in words)."""
 
     def __init__(self, mechanism: str, reason: str) -> None:
         self.mechanism = mechanism
@@ -69,11 +69,11 @@ Values = Mapping[str, Differentiated]  # of one mechanism's parameters, by name,
 
 
 class Mechanism:
-    """A law that the base model leaves out. Subclasses override what they need; every hook's default does nothing.
+    """A law that the base model leaves out. Subclasses override hooks; the default of every hook does nothing.
 
     Texts: `plain` (what happens and how it shows, one sentence without a formula), `law` (the equation),
     `assumptions`, `source` (a publication), `needs` (what the campaign must hold).
-    Traits: `stage` and `order` (its place among the mechanisms of that stage, smallest first) give the order of
+    Traits: `stage` and `order` (rank among the mechanisms of that stage, smallest first) give the order of
     composition; `kinds` of recordings that it acts on; `axes` of the campaign on which the effect shows.
     """
 
@@ -88,7 +88,7 @@ class Mechanism:
     axes: ClassVar[tuple[str, ...]]
     needs: str = "nothing beyond the recordings themselves"
     parameters_stated: tuple[Parameter, ...] = ()  # those that are the same for all campaigns and kinds
-    # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they tell contacts apart.
+    # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they distinguish contacts.
     needs_fields: ClassVar[tuple[str, ...]] = ()
     reads_fields: ClassVar[tuple[str, ...]] = ()  # the same, but it can be predicted without them
     # What a model prepares for it: the contacts' stiffness, the neighbours' charge, room for an offset [m] and for a
@@ -98,72 +98,74 @@ class Mechanism:
     tells_recordings_apart: ClassVar[bool] = False  # its lines differ between recordings of one and the same contact
     largest_offset: ClassVar[float] = 0.0
     largest_stretch: ClassVar[float] = 1.0
-    moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
-    moves_contact_points: ClassVar[bool] = False  # of indentations: contact begins elsewhere than the base model has it
-    begins_at_guesses: ClassVar[bool] = False  # fits begin there alone, not at quantiles of its priors
+    moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance only
+    moves_contact_points: ClassVar[bool] = False  # of indentations: contact begins at another travel
+    begins_at_guesses: ClassVar[bool] = False  # fits begin only at its guesses, not at quantiles of its priors
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
-    extrapolates_modulus: ClassVar[bool] = False  # the modulus at no strain is what its law makes of larger ones
+    extrapolates_modulus: ClassVar[bool] = False  # its law extrapolates the modulus to zero strain
     # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
     figure: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        """Texts may be written over several lines."""
+        """Join texts that are written over several lines."""
         for name in TEXTS:
             if isinstance(text := vars(cls).get(name), str):
                 setattr(cls, name, " ".join(text.split()))
 
     @property
     def needs_lines(self) -> bool:
-        """Whether it acts on single lines, so that a recording's lines cannot be replaced by their mean."""
+        """Whether it acts on single lines, so that the lines of a recording cannot be replaced by their mean."""
         return self.stage in (Stage.LINES, Stage.ADDED_CHARGE)
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """Its parameters for recordings of one kind; bounds may depend on the campaign."""
+        """The parameters for recordings of one kind; bounds may depend on the campaign."""
         return self.parameters_stated
 
-    def parameters_beside(
+    def parameters_with(
         self, others: Collection[Mechanism], conditions: Conditions, kind: Kind
     ) -> tuple[Parameter, ...]:
-        """Its parameters in a model that these other mechanisms are in too, which may show more of it."""
+        """The parameters in a model that also holds these other mechanisms, which may make more of them
+        identifiable."""
         return self.parameters(conditions, kind)
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """Values of its parameters, in their order and units, that measured recordings suggest: where fits begin."""
+        """Starting values of the parameters for fits, in their order and units, estimated from measured recordings."""
         return ()
 
-    def common(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
-        """What values of its parameters on recordings of one kind mean for those of another: fit coordinates there, by
-        the parameter's name."""
-        stated = {entry.name: entry for entry in self.parameters_stated}
+    def shared_parameters(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
+        """Fit coordinates for recordings of another kind, by parameter name, that follow from the values for this
+        kind."""
+        stated = {parameter.name: parameter for parameter in self.parameters_stated}
         return {
             name: log(value) if name in stated and stated[name].scale == "log" else value
             for name, value in values.items()
         }
 
     def told(self, values: Mapping[str, float]) -> str:
-        """What values of its parameters mean together, as a sentence; empty where they speak for themselves."""
+        """A sentence on what values of the parameters mean together; empty where each value is clear by itself."""
         return ""
 
-    def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
-        """Values of its parameters found on one campaign, as those that it has on another.
+    def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
+        """Parameter values for another campaign that follow from the values found on the first.
 
-        Raises InvalidInput where they say too little for that campaign.
+        Raises InvalidInput where they do not determine the prediction for that campaign.
         """
         return values
 
     def hidden_in_modulus(self, conditions: Conditions) -> Sequence[float]:
-        """Logarithms of by how much too large an apparent modulus may be by it, equally probable, where the recordings
-        cannot tell it from the modulus; none where they can."""
+        """Equally probable log factors by which the mechanism may raise the apparent modulus of curves, where
+        recordings cannot separate it from the modulus; empty where they can."""
         return ()
 
     def bind(self, conditions: Conditions, table: SigmaTable) -> Mechanism:
-        """The mechanism for the recordings of one campaign and their parts; itself where it needs no campaign."""
+        """The mechanism bound to the recordings of one campaign and their subsets; itself where it needs no
+        campaign."""
         return self
 
     def follows_from_declared(self, conditions: Conditions, kind: Kind) -> bool:
-        """Whether it is no guess but what declared facts say, without a free parameter: then it stands beside its
-        absence with equal prior odds inside every hypothesis."""
+        """Whether it follows from declared facts without a free parameter: each hypothesis then holds it with prior
+        odds of 1."""
         return False
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
@@ -176,10 +178,11 @@ class Mechanism:
         """Change the declared modulus and thickness."""
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
-        """Change what each contact is made of: modulus, Poisson ratio, glue, adhesion, half space or layer."""
+        """Change the material and interface of each contact: modulus, Poisson ratio, glue, adhesion, half space or
+        layer."""
 
     def offset(self, values: Values) -> tuple[Differentiated, Differentiated] | None:
-        """What is added to the contact's position, x and y [m]."""
+        """The offset that is added to the contact's position, x and y [m]."""
         return None
 
     def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array] | None:
@@ -187,7 +190,7 @@ class Mechanism:
         return None
 
     def mobility(self, values: Values) -> Differentiated:
-        """The share of that σ in what is measured."""
+        """The fraction of that σ in the measured response."""
         raise NotImplementedError
 
     def on_d33(self, mean_stress: Differentiated, values: Values) -> Differentiated | None:
@@ -199,7 +202,7 @@ class Mechanism:
         return None
 
     def neighbour_fraction(self, values: Values) -> Differentiated | None:
-        """The share of its neighbours' charge that a sensor shows."""
+        """The fraction of the neighbours' charge that a sensor's channel shows."""
         return None
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated | None:
@@ -207,8 +210,8 @@ class Mechanism:
         return None
 
     def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup | None:
-        """Charge from elsewhere that is random on each row, and on which rows."""
+        """Charge from other sources, random on each row, and the rows that it affects."""
         return None
 
     def on_curve(self, curve: Curve, values: Values) -> None:
-        """Change what governs an indentation or compression."""
+        """Change the material, contact or stage of an indentation or compression."""

@@ -1,6 +1,6 @@
-"""What every mechanism must keep to: texts, traits, parameters with unit, bounds and prior, a law with finite values.
+"""The contract of a mechanism: texts, traits, parameters with unit, bounds and prior, and a law with finite values.
 
-The mechanisms of this package are held to it by a test, those of other packages when they are loaded.
+A test checks the mechanisms of this package against it; those of other packages are checked when they are loaded.
 """
 
 import re
@@ -40,18 +40,18 @@ HOOKS = {  # by the stage that calls them
 }
 T = TypeVar("T")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_NUISANCES = (*(entry.name for entry in (D33, YOUNGS_MODULUS, THICKNESS, STRAIN_SHARE)), "contact_point")
+_NUISANCES = (*(parameter.name for parameter in (D33, YOUNGS_MODULUS, THICKNESS, STRAIN_SHARE)), "contact_point")
 
 
 def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
-    """Whether a mechanism can be composed with the others.
+    """Check that a mechanism keeps the contract and can be composed with the others.
 
     Parameters
     ----------
     mechanism
         The mechanism to check.
     others
-        Those whose names, and whose parameters' names, are taken.
+        Mechanisms whose names, and whose parameters' names, are taken.
 
     Raises
     ------
@@ -61,26 +61,30 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
     _check_traits(mechanism)
     if mechanism.name in {other.name for other in others}:
         raise not_unique("name", mechanism.name, "is taken by another mechanism")
-    taken = {entry.name: other.name for other in others for kind in other.kinds for entry in _parameters(other, kind)}
-    taken |= dict.fromkeys(_NUISANCES, "the base model")
-    spreads = [other.name for other in others for entry in _parameters(other, "frf") if entry.acts_on == "gain_spread"]
+    owners = {
+        parameter.name: other.name for other in others for kind in other.kinds for parameter in _parameters(other, kind)
+    }
+    owners |= dict.fromkeys(_NUISANCES, "the base model")
+    spreads = [
+        other.name for other in others for parameter in _parameters(other, "frf") if parameter.acts_on == "gain_spread"
+    ]
     for kind in mechanism.kinds:
         parameters: Any = _parameters(mechanism, kind)
         _require("parameters", parameters, isinstance(parameters, tuple), "must be a tuple of Parameter")
-        for place, entry in enumerate(parameters):
-            _check_parameter(mechanism, entry)
-            _check_relative(entry, parameters)
-            if entry.name in {other.name for other in parameters[:place]}:
-                raise not_unique(_field(entry, "name"), entry.name, "must be that of one parameter")
-            if entry.name in taken:
-                raise not_unique(_field(entry, "name"), entry.name, f"is taken by {taken[entry.name]}")
-            if entry.acts_on == "gain_spread" and spreads:
-                raise not_unique(_field(entry, "acts_on"), entry.acts_on, f"is taken by {spreads[0]}")
+        for index, parameter in enumerate(parameters):
+            _check_parameter(mechanism, parameter)
+            _check_relative(parameter, parameters)
+            if parameter.name in {other.name for other in parameters[:index]}:
+                raise not_unique(_field(parameter, "name"), parameter.name, "must be that of one parameter")
+            if parameter.name in owners:
+                raise not_unique(_field(parameter, "name"), parameter.name, f"is taken by {owners[parameter.name]}")
+            if parameter.acts_on == "gain_spread" and spreads:
+                raise not_unique(_field(parameter, "acts_on"), parameter.acts_on, f"is taken by {spreads[0]}")
     check_numbers(mechanism)
 
 
 def check_numbers(mechanism: Mechanism) -> None:
-    """Whether a law gives finite numbers on a synthetic campaign of each kind that supports it.
+    """Check that a law gives finite numbers on a synthetic campaign of each kind that supports it.
 
     Raises InvalidInput where it does not.
     """
@@ -104,98 +108,112 @@ def _check_traits(mechanism: Mechanism) -> None:
         ("reads_fields", base.NEEDED_FIELDS, False),
     ):
         values: Any = getattr(mechanism, field, None)
-        good = isinstance(values, tuple) and set(values) <= set(allowed) and (values or not needed)
-        _require(field, values, good, f"must be a tuple of {', '.join(allowed)}")
+        is_valid = isinstance(values, tuple) and set(values) <= set(allowed) and (values or not needed)
+        _require(field, values, is_valid, f"must be a tuple of {', '.join(allowed)}")
     _check_hooks(mechanism)
 
 
 def _check_hooks(mechanism: Mechanism) -> None:
-    """Hooks are called at their stage: what reads the stage relies on it."""
-    own = [name for name in HOOKS if getattr(type(mechanism), name) is not getattr(Mechanism, name)]
-    for name in own:
+    """A hook is called at its stage only, so the stage must match the overridden hooks."""
+    overridden = [name for name in HOOKS if getattr(type(mechanism), name) is not getattr(Mechanism, name)]
+    for name in overridden:
         stages = ", ".join(stage.name for stage in HOOKS[name])
         # A mechanism of FRFs at any stage may act on curves as well
-        good = mechanism.stage in HOOKS[name] or (name == "on_curve" and "frf" in mechanism.kinds)
-        _require("stage", mechanism.stage.name, good, f"must be {stages}, since {name} is overridden")
-    if not own and mechanism.moves_predictions:
+        is_valid = mechanism.stage in HOOKS[name] or (name == "on_curve" and "frf" in mechanism.kinds)
+        _require("stage", mechanism.stage.name, is_valid, f"must be {stages}, since {name} is overridden")
+    if not overridden and mechanism.moves_predictions:
         raise required("law", f"must be in one of the hooks {', '.join(HOOKS)}; none is overridden")
     curves = bool({"indentation", "compression"} & set(mechanism.kinds))
     allowed = "must hold indentation or compression where on_curve is overridden, and only there"
-    _require("kinds", mechanism.kinds, curves == ("on_curve" in own), allowed)
-    moves = any(name != "pickup" for name in own)
+    _require("kinds", mechanism.kinds, curves == ("on_curve" in overridden), allowed)
+    moves = any(name != "pickup" for name in overridden)
     _require("moves_predictions", mechanism.moves_predictions, mechanism.moves_predictions is moves, f"must be {moves}")
 
 
-def _check_parameter(mechanism: Mechanism, entry: Any) -> None:
-    _require("parameters", entry, isinstance(entry, Parameter), "must be a tuple of Parameter")
+def _check_parameter(mechanism: Mechanism, parameter: Any) -> None:
+    _require("parameters", parameter, isinstance(parameter, Parameter), "must be a tuple of Parameter")
 
-    def require(field: str, good: object, allowed: str) -> None:
-        _require(_field(entry, field), getattr(entry, field), good, allowed)
+    def require(field: str, is_valid: object, allowed: str) -> None:
+        _require(_field(parameter, field), getattr(parameter, field), is_valid, allowed)
 
-    require("name", isinstance(entry.name, str) and _NAME.fullmatch(entry.name), "must be lower case letters and _")
-    require("unit", entry.unit in base.UNITS, f"must be one of {', '.join(base.UNITS)}")
-    require("scale", entry.scale in ("linear", "log"), "must be linear or log")
+    require(
+        "name", isinstance(parameter.name, str) and _NAME.fullmatch(parameter.name), "must be lower case letters and _"
+    )
+    require("unit", parameter.unit in base.UNITS, f"must be one of {', '.join(base.UNITS)}")
+    require("scale", parameter.scale in ("linear", "log"), "must be linear or log")
     for field in ("low", "high"):
-        number = _is_finite(getattr(entry, field)) and (entry.scale == "linear" or getattr(entry, field) > 0)
-        require(field, number, "must be a finite number" + ("" if entry.scale == "linear" else " above 0"))
-    require("high", entry.low < entry.high, f"must be above low, {entry.low!r}")
-    require("limit", entry.limit is None or isinstance(entry.limit, int | float), "must be a number or None")
-    require("reason", isinstance(entry.reason, str) and entry.reason.strip(), "must be a text")
+        number = _is_finite(getattr(parameter, field)) and (
+            parameter.scale == "linear" or getattr(parameter, field) > 0
+        )
+        require(field, number, "must be a finite number" + ("" if parameter.scale == "linear" else " above 0"))
+    require("high", parameter.low < parameter.high, f"must be above low, {parameter.low!r}")
+    require("limit", parameter.limit is None or isinstance(parameter.limit, int | float), "must be a number or None")
+    require("reason", isinstance(parameter.reason, str) and parameter.reason.strip(), "must be a text")
     require(
         "prior",
-        isinstance(entry.prior, Normal | Uniform),
+        isinstance(parameter.prior, Normal | Uniform),
         "must be Normal(mean, sd), HeavyTailed(mean, sd) or Uniform()",
     )
-    if isinstance(entry.prior, Normal):
-        good = _is_finite(entry.prior.mean) and _is_finite(entry.prior.sd) and entry.prior.sd > 0
+    if isinstance(parameter.prior, Normal):
+        is_valid = _is_finite(parameter.prior.mean) and _is_finite(parameter.prior.sd) and parameter.prior.sd > 0
         with np.errstate(divide="ignore"):
-            require("prior", good and np.isfinite(entry.log_prior(entry.start)), "must have mass within the bounds")
-    heavy = entry.moves_covariance and isinstance(entry.prior, HeavyTailed)
+            require(
+                "prior",
+                is_valid and np.isfinite(parameter.log_prior(parameter.start)),
+                "must have mass within the bounds",
+            )
+    heavy = parameter.moves_covariance and isinstance(parameter.prior, HeavyTailed)
     require("prior", not heavy, "must be Normal(mean, sd) or Uniform() where it does not act on the mean")
     allowed = ("line_variance",) if mechanism.stage is Stage.ADDED_CHARGE else ("mean", "gain_spread")
-    require("acts_on", entry.acts_on in allowed, f"must be {' or '.join(allowed)}")
-    require("acts_on", entry.moves_covariance != mechanism.moves_predictions, "must fit moves_predictions")
-    require("scale", entry.scale == "log" or not entry.moves_covariance, "must be log: it does not act on the mean")
+    require("acts_on", parameter.acts_on in allowed, f"must be {' or '.join(allowed)}")
+    require("acts_on", parameter.moves_covariance != mechanism.moves_predictions, "must fit moves_predictions")
+    require(
+        "scale", parameter.scale == "log" or not parameter.moves_covariance, "must be log: it does not act on the mean"
+    )
 
 
-def _check_relative(entry: Parameter, parameters: Sequence[Parameter]) -> None:
-    """A multiple is one of another parameter, positive, that is a value itself."""
-    units = {other.name for other in parameters if other.scale == "log" and other.relative_to is None} - {entry.name}
-    good = entry.relative_to is None or (entry.relative_to in units and entry.scale == "log")
+def _check_relative(parameter: Parameter, parameters: Sequence[Parameter]) -> None:
+    """`relative_to` must name another log parameter of the mechanism that is itself relative to none."""
+    units = {other.name for other in parameters if other.scale == "log" and other.relative_to is None} - {
+        parameter.name
+    }
+    is_valid = parameter.relative_to is None or (parameter.relative_to in units and parameter.scale == "log")
     allowed = "must be None, or of a log parameter another log parameter of this mechanism that is relative to none"
-    _require(_field(entry, "relative_to"), entry.relative_to, good, allowed)
+    _require(_field(parameter, "relative_to"), parameter.relative_to, is_valid, allowed)
 
 
 def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
-    """The prediction and its derivatives are finite at the priors' centres and at every bound."""
+    """The prediction and its derivatives must be finite at the centres of the priors and at every bound."""
     campaign = reference_campaign(kind)
-    if _called(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
+    if _result_of(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
         return
     field = f"law ({kind})"
-    model = _called(field, lambda: _model(mechanism, campaign, kind))
+    model = _result_of(field, lambda: _model(mechanism, campaign, kind))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
-    for fit, place in points:
+    for fit, label in points:
         with np.errstate(all="ignore"):
-            answer = _called(f"{field} at {place}", partial(model.predict, fit))
+            answer = _result_of(f"{field} at {label}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
-            raise not_finite(f"{field} at {place}", None, "gives numbers that are not finite")
+            raise not_finite(f"{field} at {label}", None, "gives numbers that are not finite")
     if isinstance(model, FrfModel):
         _check_several_points(model, np.array([fit for fit, _ in points]), field)
 
 
 def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
-    """Several points at once give what each gives alone: a diagnosis evaluates them together."""
+    """Evaluated at several points at once, as in a diagnosis, a law must give the values of single points."""
     with np.errstate(all="ignore"):
-        together = _called(f"{field} at several points", lambda: model.respond(fits))
-        alone = joined([_called(field, partial(model.respond, fit[None])) for fit in fits])
-    real = np.isrealobj(together.level.value)
+        batch = _result_of(f"{field} at several points", lambda: model.respond(fits))
+        singles = joined([_result_of(field, partial(model.respond, fit[None])) for fit in fits])
+    real = np.isrealobj(batch.level.value)
     _require(f"{field}, level", None, real, "must be real: a complex factor belongs in on_lines")
     allowed = "must be what each point gives alone: hooks must treat the last axis as rows and keep those before it"
-    for one, other in ((together.level, alone.level), (together.lines, alone.lines)):
-        if one is not None and other is not None:
-            same = one.value.shape == other.value.shape and np.allclose(one.value, other.value, 1e-9, 0, equal_nan=True)
+    for batch_part, single_part in ((batch.level, singles.level), (batch.lines, singles.lines)):
+        if batch_part is not None and single_part is not None:
+            same = batch_part.value.shape == single_part.value.shape and np.allclose(
+                batch_part.value, single_part.value, 1e-9, 0, equal_nan=True
+            )
             _require(f"{field} at several points", None, same, allowed)
 
 
@@ -205,35 +223,35 @@ def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | I
     return (IndentationModel if kind == "indentation" else CompressionModel)([mechanism], campaign)
 
 
-def _points(own: Sequence[Parameter], nuisances: Sequence[Parameter]) -> Iterator[tuple[Floats, str]]:
-    """Fit coordinates and what they are called: the centre, and each parameter at either bound."""
-    centre = np.array([entry.start for entry in (*own, *nuisances)])
+def _points(parameters: Sequence[Parameter], nuisances: Sequence[Parameter]) -> Iterator[tuple[Floats, str]]:
+    """Points of fit coordinates with a label for messages: the centre, then each parameter at either bound."""
+    centre = np.array([parameter.start for parameter in (*parameters, *nuisances)])
     yield centre, "the priors' centres"
-    for place, entry in enumerate(own):
-        for end, value in zip(entry.bounds, (entry.low, entry.high), strict=True):
+    for index, parameter in enumerate(parameters):
+        for end, value in zip(parameter.bounds, (parameter.low, parameter.high), strict=True):
             moved = centre.copy()
-            moved[place] = end
-            yield moved, f"{entry.name} = {value:g} {entry.unit}"
+            moved[index] = end
+            yield moved, f"{parameter.name} = {value:g} {parameter.unit}"
 
 
 def _parameters(mechanism: Mechanism, kind: Kind) -> tuple[Parameter, ...]:
-    return _called("parameters", lambda: mechanism.parameters(reference_campaign(kind), kind))
+    return _result_of("parameters", lambda: mechanism.parameters(reference_campaign(kind), kind))
 
 
-def _called(field: str, function: Callable[[], T]) -> T:
-    """What another package's code answers; what it raises becomes the refusal of a field."""
+def _result_of(field: str, function: Callable[[], T]) -> T:
+    """The result of another package's code; an exception becomes InvalidInput for the field."""
     try:
         return function()
     except Exception as error:
         raise InvalidInput(field, None, described(error)) from error
 
 
-def _field(entry: Parameter, name: str) -> str:
-    return f"parameters[{entry.name}].{name}"
+def _field(parameter: Parameter, name: str) -> str:
+    return f"parameters[{parameter.name}].{name}"
 
 
-def _require(field: str, value: Any, good: object, allowed: str) -> None:
-    if not good:
+def _require(field: str, value: Any, is_valid: object, allowed: str) -> None:
+    if not is_valid:
         raise InvalidInput(field, value, allowed)
 
 

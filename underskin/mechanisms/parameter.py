@@ -32,11 +32,11 @@ class Normal:
         return -0.5 * float(np.log(2 * np.pi)) - float(np.log(self.sd))
 
     def below(self, fit: float) -> float:
-        """The probability of what is below."""
+        """The cumulative probability up to a fit coordinate."""
         return float(ndtr((fit - self.mean) / self.sd))
 
     def at(self, probability: float) -> float:
-        """The value below which it has that probability."""
+        """The quantile of a probability."""
         return float(self.mean + self.sd * ndtri(probability))
 
 
@@ -44,8 +44,8 @@ class Normal:
 class HeavyTailed(Normal):
     """Student's t distribution with three degrees of freedom on the fit coordinate, `sd` its scale.
 
-    For strengths of which the usual ones are known: much like a normal one near the mean, but more than three scales
-    from it is twenty times as likely, since rigs differ by more than who knows some of them expects.
+    For strengths of which typical values are known: close to normal near the mean, but a value more than three
+    scales from it is twenty times as likely, since rigs differ by more than published values suggest.
     """
 
     freedom: ClassVar[float] = 3.0
@@ -63,11 +63,11 @@ class HeavyTailed(Normal):
         return float(shape - np.log(self.sd))
 
     def below(self, fit: float) -> float:
-        """The probability of what is below."""
+        """The cumulative probability up to a fit coordinate."""
         return float(stdtr(self.freedom, (fit - self.mean) / self.sd))
 
     def at(self, probability: float) -> float:
-        """The value below which it has that probability."""
+        """The quantile of a probability."""
         return float(self.mean + self.sd * stdtrit(self.freedom, probability))
 
 
@@ -83,19 +83,19 @@ Prior = Normal | Uniform
 class Parameter:
     """A number that a fit may change. Its fit coordinate is the value (`linear`) or its natural logarithm (`log`).
 
-    `low`, `high` and `limit` are values in `unit`; the prior lives on the fit coordinate, truncated to the bounds and
-    normalised there. `limit` is the value at which the base model is recovered (it may lie outside the bounds: 0 or ∞
-    of a logarithm), None where no finite or infinite value does that. `shown` is the value at which the mechanism's
-    figure has it, None for a typical strength. The response is `proportional` to a parameter such as d33. A parameter
-    that does not act on the mean is positive and has the scale `log`.
+    `low`, `high` and `limit` are values in `unit`; the prior is a density on the fit coordinate, truncated to the
+    bounds and normalised there. `limit` is the value at which the base model is recovered (it may lie outside the
+    bounds: 0 or ∞ of a logarithm), None where no value does that. `shown` is the value used in the mechanism's figure,
+    None for a typical strength. The response is `proportional` to a parameter such as d33. A parameter that does not
+    act on the mean is positive and has the scale `log`.
 
     A parameter `relative_to` another one of its mechanism is fitted as a multiple of it: `low`, `high`, `limit` and
     the prior are of the multiple, while laws and reports have the product, in `unit`.
 
-    A bound in `closed` is no end of a search: nothing lies beyond it (a fraction of 1, a law of its own), so that a
-    value there is a result. So is one at `limit`.
+    A bound in `closed` is physical, not an end of the search (a fraction of 1, a special case of the law), so that a
+    value there is a result. So is a value at `limit`.
 
-    `starts` are values, within the bounds, at which fits begin, where not at quantiles of the prior; of a parameter
+    `starts` are values, within the bounds, at which fits begin instead of quantiles of the prior; of a parameter
     `relative_to` another one, multiples.
     """
 
@@ -148,7 +148,7 @@ class Parameter:
         return self.to_fit(self.limit)
 
     def ends_search(self, fit: float) -> Literal["low", "high"] | None:
-        """The end of the search that a fit coordinate lies at; None within it, and at the limit or a closed bound."""
+        """The bound at which a fit coordinate lies; None inside, and at the limit or a closed bound."""
         low, high = self.bounds
         at_low = fit - low < high - fit
         beyond = self.low if at_low else self.high
@@ -157,7 +157,7 @@ class Parameter:
         return "low" if at_low else "high"
 
     def up_to(self, high: float) -> Parameter:
-        """The same with a lower upper bound."""
+        """The same parameter with a lower upper bound."""
         return replace(self, high=min(self.high, max(high, 2 * self.low)))
 
     def to_fit(self, value: float) -> float:

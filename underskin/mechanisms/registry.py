@@ -1,9 +1,9 @@
-"""All mechanisms by name, in the order in which a model composes them: this package's, those of others, the lab's own.
+"""All mechanisms by name, in order of composition: of this package, of other packages, and of the lab.
 
 A mechanism of this package is a module of `underskin.mechanisms.laws`; one of another package is named by an entry
-point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one; the lab's own are files
-(`mechanism/1`) in the folder that `UNDERSKIN_MECHANISMS` names. Files there that cannot be used are left out and
-named; no diagnosis is made without them.
+point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance; the lab's are files
+(`mechanism/1`) in the folder that `UNDERSKIN_MECHANISMS` names. Unusable files there are listed as refused, and
+prevent any diagnosis.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def current_name(name: str) -> str:
 class Catalogue(Mapping[str, Mechanism]):
     """The mechanisms by name, in order of composition. Those of other packages are loaded at the first access.
 
-    Every access raises ExtensionError where a mechanism of another package cannot be used. Files of the lab's folder
-    that cannot be used are in `refused`.
+    Every access raises ExtensionError where a mechanism of another package cannot be used. `refused` holds the
+    errors of unusable files in the lab's folder.
     """
 
     def __init__(self) -> None:
@@ -55,22 +55,25 @@ class Catalogue(Mapping[str, Mechanism]):
         return len(self.load().mechanisms)
 
     def load(self) -> _Loaded:
-        """What is loaded, now where it was not; raises ExtensionError where one of another package cannot be used."""
+        """The loaded catalogue, loading it if necessary; raises ExtensionError for an unusable mechanism of another
+        package."""
         if self._loaded is None:
             self._loaded = _load()
         return self._loaded
 
     def reload(self) -> None:
-        """Load the mechanisms of other packages and the lab's own again, as they are now; until then others stay."""
+        """Load the mechanisms of other packages and of the lab again; the former ones stay in use until that is
+        done."""
         self._loaded = _load()
 
     @property
     def refused(self) -> Sequence[FileError]:
-        """Why files of the lab's folder cannot be used."""
+        """The errors of unusable files in the lab's folder."""
         return self.load().refused
 
-    def require_whole(self) -> None:
-        """Raises FileError where a file of the lab's folder cannot be used: a diagnosis without it would be another."""
+    def require_complete(self) -> None:
+        """Raise FileError where a file of the lab's folder cannot be used: without it a diagnosis would be another
+        one."""
         for error in self.refused:
             raise FileError(error.file, error.place, error.reason, code=error.code)
 
@@ -84,15 +87,15 @@ CATALOGUE = Catalogue()
 
 
 class ActiveCatalogue(Mapping[str, Mechanism]):
-    """What one diagnosis composes its models of: the catalogue less what is left out, and laws bound to its recordings.
+    """The mechanisms of one diagnosis: the catalogue without those left out, then laws bound to its recordings.
 
-    Those are added as a screening finds them, and come last.
+    Bound laws are added as a screening finds them.
     """
 
     def __init__(self, without: Collection[str] = ()) -> None:
-        """Raises InvalidInput where `without` names something that is not in the catalogue, and FileError where a file
-        of the lab's folder cannot be used."""
-        CATALOGUE.require_whole()
+        """Raises InvalidInput where `without` is not in the catalogue, FileError where a file of the lab cannot be
+        used."""
+        CATALOGUE.require_complete()
         without = [current_name(name) for name in without]
         for name in without:
             if name not in CATALOGUE:
@@ -113,22 +116,22 @@ class ActiveCatalogue(Mapping[str, Mechanism]):
 
     @property
     def named(self) -> Mapping[str, Mechanism]:
-        """Those of the catalogue."""
+        """The mechanisms of the catalogue."""
         return self._named
 
     def bind(self, conditions: Conditions, table: SigmaTable, kind: Kind) -> None:
-        """Bind the lab's own mechanisms to the recordings of this diagnosis, which are of one kind."""
+        """Bind the lab's mechanisms to the recordings of this diagnosis, which are of one kind."""
         for name, mechanism in self._named.items():
             if kind in mechanism.kinds:
                 self._named[name] = mechanism.bind(conditions, table)
 
     def replace(self, mechanism: Mechanism) -> None:
-        """Another form of one of the catalogue, where that is not left out."""
+        """Use another form of a mechanism of the catalogue, unless it is left out."""
         if mechanism.name in self._named:
             self._named[mechanism.name] = mechanism
 
     def add(self, law: Mechanism) -> None:
-        """One more, bound to the recordings of this diagnosis."""
+        """Add a law that is bound to the recordings of this diagnosis."""
         self._bound[law.name] = law
 
 
@@ -163,7 +166,7 @@ def _load() -> _Loaded:
 
 
 def _add_declared(mechanisms: list[Mechanism], packages: dict[str, str]) -> list[FileError]:
-    """Add those of the lab's folder, each with its file; the errors of those that cannot be used."""
+    """Add the mechanisms of the lab's folder with their file names; return the errors of unusable ones."""
     from underskin.mechanisms.declared.folder import in_folder  # the models, which few callers need
 
     folder = in_folder()
@@ -200,4 +203,4 @@ def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechan
 
 
 def _in_order(mechanisms: Iterator[Mechanism] | list[Mechanism]) -> tuple[Mechanism, ...]:
-    return tuple(sorted(mechanisms, key=lambda entry: (entry.stage.place, entry.order, entry.name)))
+    return tuple(sorted(mechanisms, key=lambda mechanism: (mechanism.stage.position, mechanism.order, mechanism.name)))

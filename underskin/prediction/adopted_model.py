@@ -19,7 +19,7 @@ from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE, current_name
-from underskin.mechanisms.unlisted.grammar import OF_ONE_CAMPAIGN, Grammar, bound_to
+from underskin.mechanisms.unlisted.grammar import CAMPAIGN_SPECIFIC_AXES, Grammar, bound_to
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.prediction import plausibility
 from underskin.prediction.forward_model import needed_fields, require_fields
@@ -110,7 +110,7 @@ class AdoptedModel:
         require_fields(self.mechanisms, conditions, "the adopted model")
         known: dict[str, float] = {}
         for mechanism in mechanisms:
-            known |= mechanism.values_on(self.parameters[mechanism.name], conditions)
+            known |= mechanism.transfer(self.parameters[mechanism.name], conditions)
         inside = np.ones(len(frf_of(conditions)), dtype=bool)
         if self.law is not None:
             law, inside = bound_to(self.law, conditions, table, tuple(CATALOGUE.values()))
@@ -200,7 +200,7 @@ def not_adopted(report: Mapping[str, Any]) -> str | None:
     ):
         return None
     law = report.get("unnamed")
-    if law is None or report["d33"] is None or law["axis"] in OF_ONE_CAMPAIGN:
+    if law is None or report["d33"] is None or law["axis"] in CAMPAIGN_SPECIFIC_AXES:
         return NOT_ADOPTED[report["verdict"]]
     return None
 

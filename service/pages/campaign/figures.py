@@ -66,7 +66,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
     """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
     from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, significance_note
 
     if answer["band"] is None:
         return []
@@ -99,7 +99,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
             "map",
             array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, sensor, radius),
             f"Each sensor where it lies, coloured by its d33. {disc_size(x_mm, y_mm, radius)} "
-            f"{told_apart(d33, uncertainty)} {CLICK}",
+            f"{significance_note(d33, uncertainty)} {CLICK}",
             f"{place}/d33.csv{chosen}",
         ),
     ]

@@ -181,7 +181,7 @@ def drawn_maps(
 ) -> list[Drawn]:
     """The maps of both in the same colours, and that of the difference; none where no sensor's d33 is known."""
     from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, significance_note
 
     if not rows or not all(answer["sensors"] for answer in answers):
         return []
@@ -199,7 +199,7 @@ def drawn_maps(
         radius = row.about["skin"].get("sensor_radius_mm")
         figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, None, radius)
         figure.update_layout(title=f"d33, {name}")
-        told = told_apart(d33, uncertainty, quantity)
+        told = significance_note(d33, uncertainty, quantity)
         about = f"{row.name}, skin {row.skin_id}; colours as on the other map. {disc_size(x_mm, y_mm, radius)} {told}"
         maps.append(drawn(f"map-{name}", figure, about))
     places = {sensor["id"]: sensor for row in both for sensor in row.about["skin"]["sensors"]}
@@ -214,8 +214,7 @@ def drawn_maps(
     radius = both[1].about["skin"].get("sensor_radius_mm")
     figure = array_map(names, x_mm, y_mm, gap, uncertainty, [""] * len(names), quantity, None, radius)
     figure.update_layout(title="Difference of d33")
-    about = (
-        f"The second's d33 less the first's, 0 in the middle of the colours. {told_apart(gap, uncertainty, quantity)}"
-    )
+    about = "The second's d33 less the first's, 0 in the middle of the colours. "
+    about += significance_note(gap, uncertainty, quantity)
     place = f"/compare/difference.csv?first={both[0].id}&second={both[1].id}"
     return [*maps, drawn("map-difference", figure, about, place)]

@@ -59,7 +59,7 @@ def shown_array(
 
 def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None) -> Drawn:
     from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, significance_note
 
     names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
         rows, "sensor", *_D33, "x_mm", "y_mm", "reasons"
@@ -69,7 +69,7 @@ def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None
     figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, sensor, radius)
     about = (
         f"Each sensor where it lies, coloured by its d33 by the paper's model. {disc_size(x_mm, y_mm, radius)} "
-        f"{told_apart(d33, uncertainty)} {CLICK}"
+        f"{significance_note(d33, uncertainty)} {CLICK}"
     )
     return drawn("map", figure, about, f"/campaigns/{quote(campaign.id, safe='')}/d33.csv")
 

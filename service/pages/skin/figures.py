@@ -82,7 +82,7 @@ def drawn_map(
 ) -> Drawn:
     """The sensors of `map_rows` where they lie, one of them chosen; `row` is the campaign that answered."""
     from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, significance_note
 
     value, uncertainty, name, unit, against = _QUANTITIES[show]
     # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
@@ -103,7 +103,7 @@ def drawn_map(
     measured = sum(not row["absent"] for row in rows)
     about += f"It tells of {measured} of the {len(rows)} sensors. " if measured < len(rows) else ""
     about += "The hollow ones stand at their last value, with its date under the pointer. " if any(absent) else ""
-    about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(compared, uncertainties, quantity)} "
+    about += f"{disc_size(x_mm, y_mm, radius)} {significance_note(compared, uncertainties, quantity)} "
     about += _alone(rows) + _without_trend(rows) if show == "trend" else ""
     return drawn("map", figure, about + CLICK, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
 

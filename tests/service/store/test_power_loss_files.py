@@ -106,5 +106,5 @@ def test_journal_watched_folder_said_kept(disk: Disk) -> None:
         adding.wait()
         disk.cut(partly)
         journal = Journal(folder)
-        assert all(journal.known(TARGET, line.decode().strip()) for line in said if line.endswith(b"\n"))
+        assert all(journal.find(TARGET, line.decode().strip()) for line in said if line.endswith(b"\n"))
         journal.close()

@@ -25,7 +25,7 @@ from underskin.diagnosis.selection.unlisted_search import law_of
 from underskin.diagnosis.validation import cross_validation
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.unlisted.axes import Axis
-from underskin.mechanisms.unlisted.expressions import CurveLaw, course, expression, wave
+from underskin.mechanisms.unlisted.expressions import CurveLaw, change_along, expression, wave
 from underskin.mechanisms.unlisted.forms import EVERYWHERE
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
@@ -100,7 +100,7 @@ class LeadingLaw:
 
     def change(self, x: Floats, values: Mapping[str, float] | None = None) -> Floats:
         """The change at values x of the axis, with these parameters or the fitted ones; see `largest`."""
-        change = course(self.law, self.values if values is None else values, x)
+        change = change_along(self.law, self.values if values is None else values, x)
         if change.ndim == 2:
             return np.hypot(*change.T)
         if np.iscomplexobj(change):

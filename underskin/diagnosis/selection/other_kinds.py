@@ -252,7 +252,7 @@ def _quantities(
             entry.name: Differentiated(np.array([entry.from_fit(fit[index])]), _unit(entry, fit, index, len(fit)))
             for index, entry in zip(range(place.start, place.stop), parameters[place], strict=True)
         }
-        for key, quantity in lines.mechanisms[name].common(lines.kind, seeds).items():
+        for key, quantity in lines.mechanisms[name].shared_parameters(lines.kind, seeds).items():
             quantities.append((name, key))
             values.append(float(quantity.value[0]))
             rows.append(quantity.slopes[:, 0])

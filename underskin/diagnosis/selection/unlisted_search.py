@@ -175,7 +175,7 @@ class Screening:
         key = law.axis, law.shape
         if key not in self._features:
             grid = law.shape.points
-            values = grid_values(law.shape.bending, grid)
+            values = grid_values(law.shape.shape_parameters, grid)
             each = [
                 np.broadcast_to(one.value if isinstance(one, Differentiated) else one, (len(grid), len(self._ids)))
                 for one in law.shape.features(law.axis.of(self._ids), values)
@@ -256,8 +256,8 @@ class CurveScreening:
             depth_mm=max(depths),
             force_n=float(np.abs(self._lines.value.real).max()),
             time_s=max(float(np.ptp(own)) for own in times.values()),
-            begins={name: float(own[0]) for name, own in times.items()},
-            turns={name: float(own[turns[name]]) for name, own in times.items()} if back else {},
+            start_times={name: float(own[0]) for name, own in times.items()},
+            turn_times={name: float(own[turns[name]]) for name, own in times.items()} if back else {},
         )
         self.laws = curve_laws(extent, timed=all(one.time_s is not None for one in curves))
 
@@ -300,7 +300,7 @@ class CurveScreening:
     @staticmethod
     def _changes(law: CurveLaw, samples: Samples, force: Floats, stiffness: Floats) -> Floats:
         """What each feature changes in the force by an amplitude of its prior's deviation (grid, features, samples)."""
-        values = {name: of_samples(value) for name, value in grid_values(law.shape.bending, law.grid).items()}
+        values = {name: of_samples(value) for name, value in grid_values(law.shape.shape_parameters, law.grid).items()}
         unit = {"force": np.ones_like(force), "position": stiffness}.get(law.description.acts_on, force)
         each = []
         for feature, deviation in zip(
@@ -429,7 +429,7 @@ def _admit(problem: FittingProblem, score: Score) -> None:
     """Let models hold the law, and fits begin where the screening found it."""
     law = score.law
     law.log_share = score.log_share
-    law.found = (*law.found, score.guess, *score.others)
+    law.screened_fits = (*law.screened_fits, score.guess, *score.others)
     problem.lines.mechanisms.add(law)
 
 

@@ -1,8 +1,4 @@
-"""The document that declares a mechanism.
-
-The parameters of a declared mechanism: bounds and priors, refused by field where no fit could use them.
-
-The document of a declared mechanism (`mechanism/1`, YAML): read with its lines, refused by line and reason.
+"""The document of a declared mechanism (`mechanism/1`, YAML), read with its lines; errors name line and reason.
 
     schema: mechanism/1
     name: warm_skin
@@ -14,12 +10,12 @@ The document of a declared mechanism (`mechanism/1`, YAML): read with its lines,
       softening: {unit: 1/°C, low: 0, high: 0.1, prior: {mean: 0.01, sd: 0.01}, limit: 0}
     source: Our own measurements.
 
-`law` is a factor on gain, modulus, thickness or contact_radius, a complex factor on frequency_response, newtons added
-to the force; for position it is a list of two, the millimetres added to x and y. Over displacement_mm (the depth),
-force_n and time_s (since a recording began) it is a law of indentation curves, of each sample: a factor on gain (of
-the cell) or modulus, newtons added to the force that is read, millimetres added to the travel (position). `prior` is
+`law` is a factor on gain, modulus, thickness or contact_radius, a complex factor on frequency_response, newtons
+added to the force; for position it is a list of two, the millimetres added to x and y. Over displacement_mm (the
+depth), force_n and time_s (since a recording began) it is a law of indentation curves, of each sample: a factor on
+gain (of the cell) or modulus, newtons added to the reading, millimetres added to the travel (position). `prior` is
 normal on the value, or on its natural logarithm where `scale` is log (then `mean` is a value and `sd` one of the
-logarithm), or left out: uniform.
+logarithm); without it the prior is uniform. Bounds and priors that no fit could use are rejected by field.
 """
 
 import re
@@ -55,18 +51,18 @@ _MOST = 6
 _LONGEST_UNIT = 12
 _MAGNITUDES = (1e-30, 1e30)  # in SI the charge of an electron is 1.6e-19 C, and a mole has 6e23 particles
 _LEAST_MASS = 0.01  # of a normal prior, within the bounds
-_NARROWEST = 1e-6  # sd of a prior, or distance of the bounds, relative: what is known better is a constant
+_NARROWEST = 1e-6  # sd of a prior, or distance of the bounds, relative: a better known quantity is a constant
 
 
-def require_fields(document: Mapping[Any, Any], known: tuple[str, ...], prefix: str) -> None:
-    """Raises InvalidInput at the first field that is not known."""
+def require_fields(document: Mapping[Any, Any], allowed: tuple[str, ...], prefix: str) -> None:
+    """Raise InvalidInput at the first field that is not allowed."""
     for name in document:
-        if name not in known:
-            raise InvalidInput(f"{prefix}{named(name)}", None, f"is no field; known: {', '.join(known)}")
+        if name not in allowed:
+            raise InvalidInput(f"{prefix}{named(name)}", None, f"is no field; known: {', '.join(allowed)}")
 
 
 def text(document: Mapping[str, Any], name: str, longest: int, field: str) -> str:
-    """A printable text of up to `longest` characters, its white space made single spaces."""
+    """A printable text of up to `longest` characters, its white space reduced to single spaces."""
     value = document.get(name)
     words = " ".join(value.split()) if isinstance(value, str) else ""
     if not words or len(words) > longest:
@@ -78,34 +74,34 @@ def text(document: Mapping[str, Any], name: str, longest: int, field: str) -> st
 
 
 def parameters(value: Any, mechanism: str) -> dict[str, Parameter]:
-    """Those of a document, by name; raises InvalidInput that names the field."""
+    """The parameters of a document by name; raises InvalidInput that names the field."""
     if not isinstance(value, Mapping) or not 0 < len(value) <= _MOST:
         raise InvalidInput("parameters", None, f"must be 1 to {_MOST} parameters by name")
-    return {name: _parameter(name, entry, mechanism) for name, entry in value.items()}
+    return {name: _parameter(name, declaration, mechanism) for name, declaration in value.items()}
 
 
-def _parameter(name: Any, entry: Any, mechanism: str) -> Parameter:
+def _parameter(name: Any, declaration: Any, mechanism: str) -> Parameter:
     field = f"parameters.{named(name)}"
-    if not isinstance(name, str) or not NAME.fullmatch(name) or not isinstance(entry, Mapping):
+    if not isinstance(name, str) or not NAME.fullmatch(name) or not isinstance(declaration, Mapping):
         raise InvalidInput(field, None, "must be a name with unit, low and high")
-    require_fields(entry, _PARAMETER_FIELDS, f"{field}.")
-    unit = text({"unit": "-", **entry}, "unit", _LONGEST_UNIT, f"{field}.unit")
-    scale = entry.get("scale", "linear")
+    require_fields(declaration, _PARAMETER_FIELDS, f"{field}.")
+    unit = text({"unit": "-", **declaration}, "unit", _LONGEST_UNIT, f"{field}.unit")
+    scale = declaration.get("scale", "linear")
     if scale not in ("linear", "log"):
         raise InvalidInput(f"{field}.scale", shown(scale), "must be linear or log")
-    low, high = (_number(entry, key, field) for key in ("low", "high"))
+    low, high = (_number(declaration, key, field) for key in ("low", "high"))
     if not low < high or (scale == "log" and low <= 0):
         raise InvalidInput(f"{field}.high", high, f"must be above low, {low:g}, and both above 0 on a log scale")
     if high - low < _NARROWEST * max(abs(low), abs(high)):
         raise InvalidInput(f"{field}.high", high, f"must be above low, {low:g}, by more than {_NARROWEST:g} of it")
-    limit = None if entry.get("limit") is None else _number(entry, "limit", field)
-    prior = _prior(entry.get("prior"), scale, field)
+    limit = None if declaration.get("limit") is None else _number(declaration, "limit", field)
+    prior = _prior(declaration.get("prior"), scale, field)
     default = {"reason": f"declared by the lab for {mechanism}"}
-    reason = text({**default, **entry}, "reason", LONGEST_TEXT, f"{field}.reason")
-    made = Parameter(name, unit, low, high, prior, scale, limit, reason)
+    reason = text({**default, **declaration}, "reason", LONGEST_TEXT, f"{field}.reason")
+    parameter = Parameter(name, unit, low, high, prior, scale, limit, reason)
     if isinstance(prior, Normal):
-        _require_within(entry["prior"], prior, made, field)
-    return made
+        _require_within(declaration["prior"], prior, parameter, field)
+    return parameter
 
 
 def _prior(value: Any, scale: str, field: str) -> Prior:
@@ -119,11 +115,13 @@ def _prior(value: Any, scale: str, field: str) -> Prior:
     return Normal(float(np.log(mean)) if scale == "log" else mean, sd)
 
 
-def _require_within(stated: Mapping[str, Any], prior: Normal, made: Parameter, field: str) -> None:
-    """Whether a normal prior is one of values between the bounds: its density is normalised there."""
-    if not made.low <= stated["mean"] <= made.high:
-        raise InvalidInput(f"{field}.prior.mean", stated["mean"], f"must lie within {made.low:g} to {made.high:g}")
-    low, high = made.bounds
+def _require_within(stated: Mapping[str, Any], prior: Normal, parameter: Parameter, field: str) -> None:
+    """Check that a normal prior has its mass within the bounds: its density is normalised there."""
+    if not parameter.low <= stated["mean"] <= parameter.high:
+        raise InvalidInput(
+            f"{field}.prior.mean", stated["mean"], f"must lie within {parameter.low:g} to {parameter.high:g}"
+        )
+    low, high = parameter.bounds
     mass = prior.below(high) - prior.below(low)
     if mass < _LEAST_MASS:
         allowed = f"must leave {_LEAST_MASS:.0%} of the prior within low to high; leave the prior out for a uniform one"
@@ -134,12 +132,12 @@ def _require_within(stated: Mapping[str, Any], prior: Normal, made: Parameter, f
 
 
 def _number(document: Mapping[str, Any], name: str, field: str) -> float:
-    place = f"{field}.{name}"
+    path = f"{field}.{name}"
     value = document.get(name)
-    number = validation.number(place, value if isinstance(value, int | float) else None)
+    number = validation.number(path, value if isinstance(value, int | float) else None)
     least, largest = _MAGNITUDES
     if number != 0 and not least <= abs(number) <= largest:
-        raise out_of_range(place, number, f"must be 0, or {least:g} to {largest:g} in magnitude")
+        raise out_of_range(path, number, f"must be 0, or {least:g} to {largest:g} in magnitude")
     return number
 
 
@@ -148,25 +146,25 @@ LARGEST_BYTES = 100_000
 _READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 _FIELDS = ("schema", "name", "description", "acts_on", "axes", "law", "parameters", "source")
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-_PLACES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, where a law is looked at
-_FAR_PLACES = np.concatenate([[0.0], np.geomspace(1e-3, 1e9, 61), -np.geomspace(1e-3, 1e9, 61)])  # up to load cycles
+_AXIS_VALUES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, at which a law is checked
+_FAR_VALUES = np.concatenate([[0.0], np.geomspace(1e-3, 1e9, 61), -np.geomspace(1e-3, 1e9, 61)])  # up to load cycles
 _NEUTRAL = 1e-6
-_ADDED = ("force", "position")  # what a law adds to, where the others are factors
-# Least change of a law that each parameter can make: a thousandth of what any data show; an AFM shows 1e-12 N.
+_ADDED = ("force", "position")  # quantities that a law adds to; the others are factors
+# Least change of a law that each parameter can make: a thousandth of what data resolve; an AFM resolves 1e-12 N.
 _NOTICED_FACTOR, _NOTICED_ADDED = 1e-9, 1e-15
-_APART = 5  # places from one axis to the next
-_QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, where that is looked for
+_AXIS_SHIFT = 5  # of indices from one axis to the next
+_QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, for that test
 
 
-def parse(data: bytes, file: str, *, apart: bool = False) -> DeclaredMechanism:
+def parse(data: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredMechanism:
     """The mechanism of a document; raises FileError that names the file, the line and the reason.
 
-    `apart`: YAML is parsed in a process of its own, under the limits of reading a file.
+    `in_sandbox`: parse YAML in a process of its own, under the limits for reading a file.
     """
     if len(data) > LARGEST_BYTES:
         raise FileError(file, "", f"a mechanism may have up to {LARGEST_BYTES} bytes")
     try:
-        document, lines = _read(data, apart=apart)
+        document, lines = _read(data, in_sandbox=in_sandbox)
     except FileError as error:
         raise FileError(file, error.place, error.reason, code=error.code) from None
     try:
@@ -179,8 +177,8 @@ def parse(data: bytes, file: str, *, apart: bool = False) -> DeclaredMechanism:
         ) from None
 
 
-def _read(data: bytes, *, apart: bool) -> tuple[Any, Mapping[str, int]]:
-    """What a file holds, as YAML or as JSON, which states no lines."""
+def _read(data: bytes, *, in_sandbox: bool) -> tuple[Any, Mapping[str, int]]:
+    """The content of a file and the lines of its fields: YAML, or JSON, which has no lines."""
     if data.lstrip()[:1] == b"{":
         try:
             return json_file.document(data, ""), {}
@@ -189,18 +187,18 @@ def _read(data: bytes, *, apart: bool) -> tuple[Any, Mapping[str, int]]:
     with tempfile.TemporaryFile() as stream:
         stream.write(data)
         stream.seek(0)
-        held = call_apart(_READ_YAML, stream, "", what="a mechanism") if apart else plain_yaml.document(stream)
-    return held["document"], held["lines"]
+        content = call_apart(_READ_YAML, stream, "", what="a mechanism") if in_sandbox else plain_yaml.document(stream)
+    return content["document"], content["lines"]
 
 
 def _line(lines: Mapping[str, int], field: str) -> int | None:
-    """The line on which a field of the document stands, or else the nearest one above it."""
+    """The line of a field in the document, or of the nearest field above it."""
     if not lines:
         return None
-    path = re.split(r"[,\s]", field)[0]
-    while path and path not in lines:
-        path = path.rpartition(".")[0]
-    return lines.get(path, 1)
+    field_path = re.split(r"[,\s]", field)[0]
+    while field_path and field_path not in lines:
+        field_path = field_path.rpartition(".")[0]
+    return lines.get(field_path, 1)
 
 
 def from_dict(document: Any) -> DeclaredMechanism:
@@ -229,16 +227,18 @@ def from_dict(document: Any) -> DeclaredMechanism:
     return kind(name, description, acts_on, axes, laws, tuple(declared.values()), source)
 
 
-def _laws(value: Any, known: set[str], count: int) -> tuple[Expression, ...]:
+def _laws(value: Any, names: set[str], count: int) -> tuple[Expression, ...]:
     texts = list(value) if isinstance(value, list) else [value]
     if len(texts) != count:
         raise InvalidInput("law", None, "must be one expression, of a position of FRFs a list of two: x and y")
-    return tuple(read(text, "law", known) for text in texts)
+    return tuple(read(text, "law", names) for text in texts)
 
 
 def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
-    good = isinstance(value, list) and value and all(isinstance(name, str) and _AXIS.fullmatch(name) for name in value)
-    if not good:
+    is_valid = (
+        isinstance(value, list) and value and all(isinstance(name, str) and _AXIS.fullmatch(name) for name in value)
+    )
+    if not is_valid:
         raise InvalidInput(
             "axes", shown(value), "must be a list of fields, of axes such as order, or of columns of conditions"
         )
@@ -257,39 +257,43 @@ def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
 
 
 def _defined(law: Expression, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
-    """Whether a law of curves is a real number wherever a curve goes, from 0 on, with usual parameters."""
-    found = _evaluated(law, axes, {name: entry.from_fit(entry.quantile(0.5)) for name, entry in parameters.items()})
-    if np.iscomplexobj(found):
+    """Check that a law of curves is real and finite over its range, from 0 on, with typical parameters."""
+    values = _evaluated(
+        law, axes, {name: parameter.from_fit(parameter.quantile(0.5)) for name, parameter in parameters.items()}
+    )
+    if np.iscomplexobj(values):
         raise InvalidInput("law", law.text, "must be real for a law of curves: without i")
-    wrong = ~np.isfinite(found[:-1])  # beyond, an exponential may be too large for a number
+    wrong = ~np.isfinite(values[:-1])  # beyond, an exponential may be too large for a number
     if wrong.any():
-        at = _PLACES[int(np.argmax(wrong))]
-        raise InvalidInput("law", law.text, f"is no number where {axes[0]} is {at:g}: max(0, …) may help")
+        position = _AXIS_VALUES[int(np.argmax(wrong))]
+        raise InvalidInput("law", law.text, f"is no number where {axes[0]} is {position:g}: max(0, …) may help")
 
 
 def _neutral(
     laws: tuple[Expression, ...], acts_on: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]
 ) -> None:
-    """Whether a law changes nothing where each parameter that has a limit is at it."""
-    if all(entry.limit is None for entry in parameters.values()):
+    """Check that a law changes nothing where each parameter that has a limit is at it."""
+    if all(parameter.limit is None for parameter in parameters.values()):
         return
     values = {
-        name: entry.from_fit(entry.quantile(0.5)) if entry.limit is None else entry.limit
-        for name, entry in parameters.items()
+        name: parameter.from_fit(parameter.quantile(0.5)) if parameter.limit is None else parameter.limit
+        for name, parameter in parameters.items()
     }
     nothing = 0.0 if acts_on in _ADDED else 1.0
     for law in laws:
-        found = _evaluated(law, axes, values)
-        known = found[np.isfinite(found)]
-        if len(known) and np.abs(known - nothing).max() > _NEUTRAL:
-            said = f"must be {nothing:g}, which changes nothing, where each parameter is at its limit"
-            raise InvalidInput("law", law.text, f"{said}; it is {known[np.abs(known - nothing).argmax()]:.3g} there")
+        results = _evaluated(law, axes, values)
+        finite = results[np.isfinite(results)]
+        if len(finite) and np.abs(finite - nothing).max() > _NEUTRAL:
+            requirement = f"must be {nothing:g}, which changes nothing, where each parameter is at its limit"
+            raise InvalidInput(
+                "law", law.text, f"{requirement}; it is {finite[np.abs(finite - nothing).argmax()]:.3g} there"
+            )
 
 
 def _noticed(
     laws: tuple[Expression, ...], acts_on: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]
 ) -> None:
-    """Whether each parameter changes a law somewhere within its bounds: one that does not has any value at all."""
+    """Check that each parameter changes a law somewhere within its bounds; one that does not is unidentifiable."""
     least = _NOTICED_ADDED if acts_on in _ADDED else _NOTICED_FACTOR
     for name in parameters:
         changes = (_change(law, name, axes, parameters) for law in laws if name in law.names)
@@ -299,31 +303,40 @@ def _noticed(
 
 
 def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> float:
-    """The largest change of a law, relative where that is large, by one parameter with the others at some quantile: at
-    places far and near, and between the values of parameters, which may be edges."""
-    each = {other: [entry.from_fit(entry.quantile(at)) for at in _QUANTILES] for other, entry in parameters.items()}
-    values = np.array(list(each.values()))
-    places = np.concatenate([_FAR_PLACES, values.ravel(), (values[:, 1:] + values[:, :-1]).ravel() / 2])
-    apart = np.array([np.roll(places, _APART * number) for number in range(len(axes))])  # a law may be of their ratio
+    """The largest change of a law by one parameter, relative where it is large, with the others at some quantile.
+
+    Axes take values near and far, and between the values of parameters, which may be edges.
+    """
+    samples = {
+        other: [parameter.from_fit(parameter.quantile(probability)) for probability in _QUANTILES]
+        for other, parameter in parameters.items()
+    }
+    values = np.array(list(samples.values()))
+    positions = np.concatenate([_FAR_VALUES, values.ravel(), (values[:, 1:] + values[:, :-1]).ravel() / 2])
+    # Axes differ, since a law may depend on their ratio
+    arguments = np.array([np.roll(positions, _AXIS_SHIFT * number) for number in range(len(axes))])
     largest = 0.0
     for number in range(len(_QUANTILES)):
-        at = {other: quantiles[number] for other, quantiles in each.items()}
-        found = np.array([_evaluated(law, axes, {**at, name: value}, apart) for value in each[name]])
+        others = {other: quantiles[number] for other, quantiles in samples.items()}
+        results = np.array([_evaluated(law, axes, {**others, name: value}, arguments) for value in samples[name]])
         with np.errstate(all="ignore"):
-            change = np.abs(found[1:] - found[:-1]) / np.maximum(np.abs(found[1:]), 1.0)
+            change = np.abs(results[1:] - results[:-1]) / np.maximum(np.abs(results[1:]), 1.0)
         largest = max(largest, float(np.max(change, initial=0.0, where=np.isfinite(change))))
     return largest
 
 
 def _evaluated(
-    law: Expression, axes: tuple[str, ...], values: Mapping[str, float], places: Sequence[float] | Floats = _PLACES
+    law: Expression,
+    axes: tuple[str, ...],
+    values: Mapping[str, float],
+    positions: Sequence[float] | Floats = _AXIS_VALUES,
 ) -> Array:
-    """At a few places of all axes together (places,), or each at its own of these (axes, places)."""
+    """The law where all axes have these values (values,), or each axis its own (axes, values)."""
     numbers = {name: np.float64(value) for name, value in values.items()}  # which may be divided by 0
-    along = np.broadcast_to(places, (len(axes), np.shape(places)[-1]))
+    columns = np.broadcast_to(positions, (len(axes), np.shape(positions)[-1]))
     with np.errstate(all="ignore"):
-        found = np.asarray(law({**numbers, **dict(zip(axes, along, strict=True))}))
-    return np.asarray(found + np.zeros(along.shape[1]))
+        result = np.asarray(law({**numbers, **dict(zip(axes, columns, strict=True))}))
+    return np.asarray(result + np.zeros(columns.shape[1]))
 
 
 def _used(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:

@@ -1,4 +1,4 @@
-"""The lab's folder of declared mechanisms, which a setting names: what can be used of it, and why the rest cannot."""
+"""The lab's folder of declared mechanisms, named by a setting: the usable ones, and the errors of the others."""
 
 import os
 from collections.abc import Iterator
@@ -16,29 +16,28 @@ FOLDER = "UNDERSKIN_MECHANISMS"  # the setting
 
 @dataclass(frozen=True)
 class LabFolder:
-    """The mechanisms that can be used, each with its file and the beginning of that one's SHA-256, and the errors of
-    the files that cannot."""
+    """Usable mechanisms, each with its file and the beginning of its SHA-256, and the errors of unusable files."""
 
     mechanisms: tuple[tuple[DeclaredMechanism, str], ...]
     refused: tuple[FileError, ...]
 
 
 def in_folder() -> LabFolder:
-    """The folder of the setting by file name; an empty one where that is not set."""
+    """The contents of the folder, by file name; empty where the setting is not set."""
     usable: list[tuple[DeclaredMechanism, str]] = []
     refused = []
     for file in _files():
         try:
             content = _content(file)
-            usable.append((checked(content, _shown(file)), f"{file.name} {sha256(content).hexdigest()[:12]}"))
+            usable.append((checked(content, _printable(file)), f"{file.name} {sha256(content).hexdigest()[:12]}"))
         except FileError as error:
             refused.append(error)
     return LabFolder(tuple(usable), tuple(refused))
 
 
-def checked(content: bytes, file: str, *, apart: bool = False) -> DeclaredMechanism:
-    """The mechanism of a document, as `parse` has it, whose law gives finite numbers; raises FileError."""
-    mechanism = parse(content, file, apart=apart)
+def checked(content: bytes, file: str, *, in_sandbox: bool = False) -> DeclaredMechanism:
+    """The mechanism of a document (see `parse`), whose law gives finite numbers; raises FileError."""
+    mechanism = parse(content, file, in_sandbox=in_sandbox)
     try:
         check_numbers(mechanism)
     except InvalidInput as error:
@@ -47,29 +46,29 @@ def checked(content: bytes, file: str, *, apart: bool = False) -> DeclaredMechan
 
 
 def digest() -> str:
-    """SHA-256 of the folder's files, with their names; empty where there are none."""
-    whole, count = sha256(), 0
+    """SHA-256 of the folder's files and their names; empty where there are none."""
+    total, count = sha256(), 0
     for file in _files():
         try:
             content = _content(file)
         except FileError as error:
             content = error.reason.encode()
-        whole.update(os.fsencode(file.name) + b"\0" + sha256(content).digest())
+        total.update(os.fsencode(file.name) + b"\0" + sha256(content).digest())
         count += 1
-    return whole.hexdigest() if count else ""
+    return total.hexdigest() if count else ""
 
 
 def _files() -> Iterator[Path]:
-    """Those of the folder, where there is one, in the order of their names."""
-    where = os.environ.get(FOLDER)
-    if where:
-        yield from sorted(Path(where).glob("*.yaml"))
+    """The YAML files of the folder, by name."""
+    path = os.environ.get(FOLDER)
+    if path:
+        yield from sorted(Path(path).glob("*.yaml"))
 
 
 def _content(file: Path) -> bytes:
-    """At most a byte more than a document may have; raises FileError where it cannot be read."""
-    if _shown(file) != str(file):
-        raise FileError(_shown(file), "", "its name must be UTF-8")
+    """At most one byte more than a document may have; raises FileError where the file cannot be read."""
+    if _printable(file) != str(file):
+        raise FileError(_printable(file), "", "its name must be UTF-8")
     if not file.is_file():  # a pipe would be waited for
         raise FileError(str(file), "", "is no file")
     try:
@@ -79,5 +78,5 @@ def _content(file: Path) -> bytes:
         raise FileError(str(file), "", f"cannot be read: {error.strerror}") from None
 
 
-def _shown(file: Path) -> str:
+def _printable(file: Path) -> str:
     return os.fsencode(file).decode("utf-8", "replace")

@@ -1,12 +1,11 @@
 """Mechanisms that a file declares.
 
-Expressions of a declared law: read by a whitelist over the syntax tree, evaluated with derivatives.
+Expressions are read by a whitelist over the syntax tree and evaluated with derivatives. Allowed are numbers, names, + −
+* / **, `pi`, `i` (√−1), and the functions of FUNCTIONS with one or two arguments. No attribute, index, comparison,
+string, keyword or other call is accepted, and no code is compiled or executed.
 
-Numbers, names, + − * / **, and the functions of FUNCTIONS with one or two arguments; `pi` and `i` (√−1) are known. No
-attribute, index, comparison, string, keyword or call of anything else is read, and no code is compiled or executed.
-
-A declared law as a mechanism: it acts where it says, by its expressions over the axes that it names. A declared law of
-indentation curves: by its expression over depth, force or time of each sample.
+A declared mechanism acts on FRFs by expressions over its axes, or on indentation curves by an expression over depth,
+force or time of each sample.
 """
 
 import ast
@@ -39,58 +38,60 @@ CONSTANTS: Mapping[str, np.float64 | np.complex128] = {"pi": np.float64(np.pi), 
 
 @dataclass(frozen=True)
 class Expression:
-    """One that was read. Attributes: `text`; `names` of parameters and axes in it."""
+    """A parsed expression. Attributes: `text`; `names` of parameters and axes in it."""
 
     text: str
     names: frozenset[str]
     _tree: ast.expr
 
     def __call__(self, values: Mapping[str, Value]) -> Value:
-        """Its value where names have these values."""
+        """The value for these values of the names."""
         return _value(self._tree, values)
 
 
-def read(text: str, field: str, known: Collection[str]) -> Expression:
-    """Read an expression in these names; raises InvalidInput that names the field, the place and what is allowed."""
+def read(text: str, field: str, allowed: Collection[str]) -> Expression:
+    """Parse an expression in the allowed names; raises InvalidInput that names field, position and what is allowed."""
     if not isinstance(text, str) or not text.strip() or len(text) > LONGEST:
         raise InvalidInput(field, text, f"must be an expression of 1 to {LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        place = f" at column {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
-        raise InvalidInput(field, text, f"cannot be read as an expression{place}") from None
+        location = f" at column {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
+        raise InvalidInput(field, text, f"cannot be read as an expression{location}") from None
     nodes = list(ast.walk(tree.body))
     if len(nodes) > _MOST_NODES:
         raise InvalidInput(field, text, "is too long to be a law: take several")
-    called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+    called_functions = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
     for node in nodes:
-        _check(node, field, known, called)
-    names = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called}
+        _check(node, field, allowed, called_functions)
+    names = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called_functions}
     return Expression(text.strip(), frozenset(names - set(CONSTANTS)), tree.body)
 
 
-def _check(node: ast.AST, field: str, known: Collection[str], called: Collection[int]) -> None:
-    """Raises InvalidInput for everything that is not on the list."""
+def _check(node: ast.AST, field: str, allowed_names: Collection[str], called_functions: Collection[int]) -> None:
+    """Raise InvalidInput for every node that is not on the whitelist."""
     if isinstance(node, ast.expr_context | ast.operator | ast.unaryop):
         allowed = isinstance(node, ast.Load | ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow | ast.USub | ast.UAdd)
         if not allowed:
             raise InvalidInput(field, type(node).__name__, "may use + − * / ** only")
         return
-    place = f"{field}, column {getattr(node, 'col_offset', 0) + 1}"
+    location = f"{field}, column {getattr(node, 'col_offset', 0) + 1}"
     if isinstance(node, ast.Constant):
         number = type(node.value) in (int, float) and abs(node.value) <= _LARGEST  # type: ignore[arg-type]
         if not number:
-            raise InvalidInput(place, repr(node.value)[:40], "must be a number of usual size")
+            raise InvalidInput(location, repr(node.value)[:40], "must be a number of usual size")
     elif isinstance(node, ast.Name):
-        if id(node) not in called and node.id not in CONSTANTS and node.id not in known:
-            raise InvalidInput(place, node.id, f"must be one of {', '.join([*sorted(known), *CONSTANTS])}")
+        if id(node) not in called_functions and node.id not in CONSTANTS and node.id not in allowed_names:
+            raise InvalidInput(location, node.id, f"must be one of {', '.join([*sorted(allowed_names), *CONSTANTS])}")
     elif isinstance(node, ast.Call):
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS or node.keywords or len(node.args) != FUNCTIONS[name][0]:
             arguments = ", ".join(f"{key} of {count}" for key, (count, _) in FUNCTIONS.items())
-            raise InvalidInput(place, ast.unparse(node)[:40], f"must be a function with its arguments: {arguments}")
+            raise InvalidInput(location, ast.unparse(node)[:40], f"must be a function with its arguments: {arguments}")
     elif not isinstance(node, ast.BinOp | ast.UnaryOp):
-        raise InvalidInput(place, type(node).__name__, "is not allowed: numbers, names, + − * / ** and functions are")
+        raise InvalidInput(
+            location, type(node).__name__, "is not allowed: numbers, names, + − * / ** and functions are"
+        )
 
 
 def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
@@ -105,8 +106,8 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
         case ast.BinOp(left=left, op=op, right=right):
             return _combined(op, _value(left, values), _value(right, values))
         case ast.Call(func=ast.Name(id=name), args=args):
-            return FUNCTIONS[name][1](*(_value(entry, values) for entry in args))
-    raise AssertionError(node)  # `read` lets nothing else through
+            return FUNCTIONS[name][1](*(_value(argument, values) for argument in args))
+    raise AssertionError(node)  # `read` accepts no other node
 
 
 def _combined(op: ast.operator, a: Value, b: Value) -> Value:
@@ -151,7 +152,7 @@ def _larger(a: Value, b: Value) -> Value:
     return np.maximum(a, b)
 
 
-FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # how many arguments, and what it is
+FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # number of arguments, function
     "exp": (1, _exp),
     "log": (1, _log),
     "sqrt": (1, lambda x: _combined(ast.Pow(), x, 0.5)),
@@ -165,8 +166,8 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # how many argume
 
 
 def together(expressions: Sequence[Expression]) -> frozenset[str]:
-    """The names in several."""
-    return frozenset().union(*(entry.names for entry in expressions))
+    """The names in all expressions."""
+    return frozenset().union(*(expression.names for expression in expressions))
 
 
 FREQUENCY = "frequency_hz"
@@ -174,14 +175,14 @@ FREQUENCY = "frequency_hz"
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """The numbers of each axis by the recording's id, and how levels follow what is pressed."""
+    """The values of each axis by recording id, and the level of each recording as a function of what is pressed."""
 
     axes: dict[str, dict[str, float]]
     tables: LevelTables
 
     @classmethod
     def to(cls, conditions: Conditions, table: SigmaTable) -> "Bound":
-        """To the recordings of a campaign."""
+        """Bound to the recordings of a campaign."""
         axes = {axis.name: dict(axis.values) for axis in every_axis(conditions) if not (axis.relative or axis.words)}
         return cls(axes, LevelTables(conditions, table, ()))
 
@@ -192,10 +193,10 @@ def _bound(conditions: Conditions) -> Bound:
 
 
 class DeclaredMechanism(Mechanism):
-    """What a file declares."""
+    """A mechanism that a file declares."""
 
     order = 300
-    needs_axes: ClassVar[str]  # what is said of the axes that it reads
+    needs_axes: ClassVar[str]  # requirement on its axes, in words
 
     def __init__(
         self,
@@ -207,10 +208,10 @@ class DeclaredMechanism(Mechanism):
         parameters: tuple[Parameter, ...],
         source: str,
     ) -> None:
-        """Of what the file says."""
+        """Take the contents of the file."""
         self.name = name
         self.plain = description
-        self.law = f"{acts_on}: {', '.join(entry.text for entry in laws)}"
+        self.law = f"{acts_on}: {', '.join(expression.text for expression in laws)}"
         self.assumptions = "As declared by the lab; what other mechanisms do to its factor is left out."
         self.source = source
         self.needs = f"{' and '.join(axes)} {self.needs_axes}"
@@ -219,34 +220,35 @@ class DeclaredMechanism(Mechanism):
 
     @property
     def axes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Those that it reads."""
+        """The axes that the law reads."""
         return self.axes_read
 
 
 class DeclaredOfFrf(DeclaredMechanism):
-    """One of FRFs. A diagnosis binds it to its campaign, so that a part of that has the order of the whole."""
+    """A declared mechanism of FRFs. A diagnosis binds it to its campaign, so that subsets keep the order of the
+    whole."""
 
     kinds = ("frf",)
     needs_axes = "of every recording, not all the same"
     bound: Bound | None = None
 
     def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredOfFrf":
-        """The same, bound to the recordings of a campaign."""
+        """A copy bound to the recordings of a campaign."""
         other = copy(self)
         other.bound = Bound.to(conditions, table)
         return other
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """Axes that recordings lack, or on which they do not differ."""
-        known = self.bound.axes if self.bound is not None else _bound(conditions).axes
-        own = [entry.id for entry in conditions.recordings]
+        """Axes that recordings lack, or that do not vary."""
+        axes = self.bound.axes if self.bound is not None else _bound(conditions).axes
+        ids = [recording.id for recording in conditions.recordings]
         for name in self.axes_read:
             if name == FREQUENCY:
                 continue
-            if name not in known:
+            if name not in axes:
                 return f"not every recording has {name}, as a number"
         differing = [name for name in self.axes_read if name != FREQUENCY]
-        same = all(len({known[name][key] for key in own}) == 1 for name in differing)
+        same = all(len({axes[name][key] for key in ids}) == 1 for name in differing)
         return f"{differing[0]} is the same in all recordings" if differing and same and not self._of_lines else None
 
     @property
@@ -254,7 +256,7 @@ class DeclaredOfFrf(DeclaredMechanism):
         return FREQUENCY in self.axes_read
 
     def _evaluated(self, values: Values, axes: dict[str, Floats], rows: int) -> list[Differentiated]:
-        """Each expression on so many rows."""
+        """The value of each expression on this number of rows."""
         first = next(iter(values.values()))
         names: dict[str, Value] = {**values, **axes}
         answers = []
@@ -271,7 +273,7 @@ class DeclaredOfFrf(DeclaredMechanism):
 
 
 class DeclaredOfRecordings(DeclaredOfFrf):
-    """One that changes the level of each recording."""
+    """A declared mechanism that changes the level of each recording."""
 
     stage = Stage.RECORDING
 
@@ -291,13 +293,13 @@ class DeclaredOfRecordings(DeclaredOfFrf):
 
 
 class DeclaredOfLines(DeclaredOfFrf):
-    """One that changes each line."""
+    """A declared mechanism that changes each line."""
 
     stage = Stage.LINES
 
     @property
     def tells_recordings_apart(self) -> bool:  # type: ignore[override]
-        """Where it follows an axis of the recordings."""
+        """Whether the law reads an axis of the recordings."""
         return any(name != FREQUENCY for name in self.axes_read)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
@@ -314,50 +316,55 @@ _LARGEST_FACTOR = (
 
 
 class DeclaredOfCurves(DeclaredMechanism):
-    """One of indentations: a factor on the force of the contact, as the modulus has it where nothing sticks and no
-    stage gives (`modulus`), or on the cell's gain (`gain`), newtons added to what is read (`force`), millimetres added
-    to the travel (`position`)."""
+    """A declared mechanism of indentations.
+
+    `modulus`: a factor on the contact force, equivalent to the modulus without adhesion and stage compliance;
+    `gain`: a factor on the cell's gain; `force`: newtons added to the reading; `position`: millimetres added to the
+    travel.
+    """
 
     kinds = ("indentation",)
     stage = Stage.CURVE
     needs_axes = "of every sample"
-    begins: Mapping[str, float] | None = None  # when each recording begins [s], by its id
+    start_times: Mapping[str, float] | None = None  # start of each recording [s], by its id
 
     def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredOfCurves":
-        """The same, bound to the recordings of a campaign."""
+        """A copy bound to the recordings of a campaign."""
         other = copy(self)
         curves = curves_of(conditions)
-        other.begins = {entry.id: float(entry.time_s[0]) for entry in curves if entry.time_s is not None}
+        other.start_times = {
+            recording.id: float(recording.time_s[0]) for recording in curves if recording.time_s is not None
+        }
         return other
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """Times that recordings lack."""
-        curves = [entry for entry in conditions.recordings if isinstance(entry, IndentationConditions)]
-        untimed = "time_s" in self.axes_read and any(entry.time_s is None for entry in curves)
+        """Recordings without times, where the law reads them."""
+        curves = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
+        untimed = "time_s" in self.axes_read and any(recording.time_s is None for recording in curves)
         return "not every recording has time_s" if untimed else None
 
     def on_curve(self, curve: Curve, values: Values) -> None:
-        """Change its samples."""
+        """Add the law at these parameter values to the curve's laws."""
         curve.laws.append(_Bound(self, {name: numbers(value) for name, value in values.items()}))
 
     def change(self, samples: Samples, force: Floats, values: Mapping[str, Floats]) -> Floats:
-        """The expression at samples (points, curves, samples) where the contact bears `force` [N]."""
+        """The expression at samples (points, curves, samples) where the contact force is `force` [N]."""
         axes: dict[str, Value] = {
             "displacement_mm": 1e3 * np.maximum(samples.travel, 0.0),
             "force_n": np.maximum(force, 0.0),
             "time_s": self._since_the_beginning(samples),
         }
         with np.errstate(all="ignore"):
-            found = np.asarray(self.laws[0]({**values, **axes})) + np.zeros(np.broadcast(samples.travel, force).shape)
+            result = np.asarray(self.laws[0]({**values, **axes})) + np.zeros(np.broadcast(samples.travel, force).shape)
         return np.clip(
-            np.nan_to_num(found, nan=_LARGEST_FACTOR, posinf=_LARGEST_FACTOR, neginf=-_LARGEST_FACTOR),
+            np.nan_to_num(result, nan=_LARGEST_FACTOR, posinf=_LARGEST_FACTOR, neginf=-_LARGEST_FACTOR),
             -_LARGEST_FACTOR,
             _LARGEST_FACTOR,
         )
 
     def _since_the_beginning(self, samples: Samples) -> Floats:
-        known = self.begins or {}
-        first = [known.get(name, float(own[0])) for name, own in zip(samples.ids, samples.time, strict=True)]
+        start_times = self.start_times or {}
+        first = [start_times.get(name, float(times[0])) for name, times in zip(samples.ids, samples.time, strict=True)]
         return np.asarray(samples.time - np.array(first)[:, None])
 
 
@@ -368,14 +375,14 @@ class _Bound:
     law: DeclaredOfCurves
     values: Mapping[str, Floats]
 
-    def moved(self, samples: Samples, travel: Floats) -> Floats:
+    def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
         """The travel [m] at which a sphere presses."""
         if self.law.acts_on != "position":
             return travel
         return travel + 1e-3 * self.law.change(samples, np.zeros_like(travel), self.values)
 
-    def read(self, samples: Samples, force: Floats) -> Floats:
-        """The force [N] that is read where the contact bears `force`."""
+    def measured_force(self, samples: Samples, force: Floats) -> Floats:
+        """The measured force [N] where the contact force is `force`."""
         if self.law.acts_on == "position":
             return force
         change = self.law.change(samples, force, self.values)

@@ -1,4 +1,4 @@
-"""A law that a diagnosis found, as the document of a declared mechanism."""
+"""A law that a diagnosis found, written as the document of a declared mechanism."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -15,31 +15,33 @@ from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES
 _WIDER = 0.5  # of a value, or of its logarithm: the prior's sd in later campaigns
 _MARGIN = 0.05  # of the range, off its ends
 _ADDS = {"force", "position"}
-_PLACES = ("onset", "centre")  # parameters that are places along the axis
+_POSITIONS = ("onset", "centre")  # parameters that are positions along the axis
 
 
 def document(report: Mapping[str, Any], name: str, description: str | None = None) -> str:
-    """The YAML of the law that a report holds; raises InvalidInput where it holds none that an expression can say."""
+    """The YAML of the law in a report; raises InvalidInput where no expression can describe it."""
     law = report.get("unnamed")
     if law is None:
         raise InvalidInput("report", report.get("verdict"), "must hold a law that nobody listed (unnamed)")
-    found = report["provenance"].get("unnamed")
-    if found is None:
+    provenance = report["provenance"].get("unnamed")
+    if provenance is None:
         raise InvalidInput("report", "an older report", "says too little of its law: diagnose the campaign again")
-    values: dict[str, float] = {key.removeprefix("law_"): float(value) for key, value in found["parameters"].items()}
-    expressions, bending = _expressions(law, found["law"], values)
-    units = {entry["name"]: entry["unit"] for entry in law.get("parameters", ())}
+    values: dict[str, float] = {
+        key.removeprefix("law_"): float(value) for key, value in provenance["parameters"].items()
+    }
+    expressions, logarithmic = _expressions(law, provenance["law"], values)
+    units = {parameter["name"]: parameter["unit"] for parameter in law.get("parameters", ())}
     strengths = {key for key in values if key.startswith(("change", "lag"))} or {"exponent"}
     parameters: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
-        if key in bending:
+        if key in logarithmic:
             declared = _logarithmic(value)
-        elif key in _PLACES:
+        elif key in _POSITIONS:
             declared = _within(next(iter(law["range"].values())))
         else:
             declared = {**_linear_in(value), **({"limit": 0} if key in strengths else {})}
         parameters[key] = {"unit": units.get(key, "-"), **declared}
-    axes = [law["axis"], *(["preload_n"] if "__relative__" in found["law"] else [])]
+    axes = [law["axis"], *(["preload_n"] if "__relative__" in provenance["law"] else [])]
     body = {
         "schema": SCHEMA,
         "name": name,
@@ -65,24 +67,24 @@ def _linear_in(value: float) -> dict[str, Any]:
 
 
 def _within(ends: Sequence[float]) -> dict[str, Any]:
-    """A place along the axis, inside the range that was measured: at its end a threshold's slope has no bound."""
+    """A position along the axis, inside the measured range: at its end a threshold's slope is unbounded."""
     low, high = ends
     margin = _MARGIN * (high - low)
     return {"low": float(f"{low + margin:.6g}"), "high": float(f"{high - margin:.6g}")}
 
 
-_BENDING = {  # what lies on a logarithmic scale
+_LOGARITHMIC = {  # parameters with a logarithmic scale
     *("growth_length", "approach", "period", "width", "corner", "centre", "damping"),
 }
 
 
 def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float]) -> tuple[list[str], set[str]]:
-    """The law's expressions, and which of its parameters lie on a logarithmic scale."""
+    """The law's expressions, and which of its parameters have a logarithmic scale."""
     parts = name.removeprefix(PREFIX).split("__")
-    bending = {key for key in values if key in _BENDING}
+    logarithmic = {key for key in values if key in _LOGARITHMIC}
     if law["axis"] == "frequency_hz":
         low, high = next(iter(law["range"].values()))
-        return [_over_frequency(parts[-1], float(np.sqrt(low * high)))], bending
+        return [_over_frequency(parts[-1], float(np.sqrt(low * high)))], logarithmic
     ends = next(iter(law["range"].values()))
     if law["form"] == "free" or not all(isinstance(end, int | float) for end in ends):
         raise InvalidInput(
@@ -92,27 +94,27 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
     low, high = (float(end) for end in ends)
     form = parts[parts.index("relative") + 1 if "relative" in parts else 2]
     variant = parts[-1]
-    if law["form"] in ("peak", "notch") and "centre" in bending:
-        bending.discard("centre")  # along an axis of recordings a place may be negative
-    kind = next((entry for entry in parts if entry in ("angle", "delay", "power", "corner")), None)
+    if law["form"] in ("peak", "notch") and "centre" in logarithmic:
+        logarithmic.discard("centre")  # along an axis of recordings the centre may be negative
+    kind = next((part for part in parts if part in ("angle", "delay", "power", "corner")), None)
     if law["acts_on"] == "frequency_response":
         raise InvalidInput("report", kind, "a lag that follows an axis of the recordings: write its file by hand")
     amplitudes = [key for key in values if key.startswith("change")]
     if law["axis"] in OF_SAMPLES and form == "power":
         growing = f"change * ({x} / {high:.6g}) ** exponent"
-        return [growing if law["acts_on"] in _ADDS else f"1 + {growing}"], {*bending, "exponent"}
+        return [growing if law["acts_on"] in _ADDS else f"1 + {growing}"], {*logarithmic, "exponent"}
     if law["axis"] in OF_SAMPLES and form == "step":
         raise InvalidInput("report", form, "a step where the sphere turns back is no expression: it cannot be kept")
     shape = _SHAPES[form](x, low, high, variant)
     if form == "power" and law["acts_on"] != "position":
         middle = float(np.sqrt(low * high))
-        return [f"({x}/{middle:.6g}) ** {amplitudes[0]}"], bending
+        return [f"({x}/{middle:.6g}) ** {amplitudes[0]}"], logarithmic
     features = len(shape)
     changes = [
         " + ".join(f"{key} * {feature}" for key, feature in zip(amplitudes[first:], shape, strict=False))
         for first in range(0, len(amplitudes), features)
     ]
-    return [change if law["acts_on"] in _ADDS else f"1 + {change}" for change in changes], bending
+    return [change if law["acts_on"] in _ADDS else f"1 + {change}" for change in changes], logarithmic
 
 
 def _linear(x: str, low: float, high: float, variant: str) -> list[str]:
@@ -160,7 +162,7 @@ _SHAPES: Mapping[str, Callable[[str, float, float, str], list[str]]] = {
 def _over_frequency(variant: str, middle: float) -> str:
     ratio = f"frequency_hz / {middle:.6g}"
     resonance = "(1 - u ** 2 + 2 * i * damping * u)".replace("u", "(frequency_hz / centre)")
-    told = {
+    expressions = {
         "phase": f"exp(-i * lag * ({ratio}) ** exponent)",
         "delay": f"exp(-i * lag * {ratio})",
         "high_pass": "exp(-exponent * log(1 + corner / (i * frequency_hz)))",
@@ -172,6 +174,6 @@ def _over_frequency(variant: str, middle: float) -> str:
         "loss": f"1 + change * 2 * i * damping * (frequency_hz / centre) / {resonance}",
         "spring": f"1 + change / {resonance}",
     }
-    if variant not in told:
+    if variant not in expressions:
         raise InvalidInput("report", variant, "a smooth course is no expression: it cannot be kept")
-    return told[variant]
+    return expressions[variant]

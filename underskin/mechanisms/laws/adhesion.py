@@ -63,20 +63,25 @@ class Adhesion(Mechanism):
         """The work of adhesion, and of separation where an indentation has a way back."""
         if kind == "frf":
             return self.parameters_stated
-        back = any(isinstance(entry, IndentationConditions) and _comes_back(entry) for entry in conditions.recordings)
-        return (_WORK, _SEPARATION) if back else (_WORK,)
+        returns = any(
+            isinstance(recording, IndentationConditions) and _comes_back(recording)
+            for recording in conditions.recordings
+        )
+        return (_WORK, _SEPARATION) if returns else (_WORK,)
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """By the least forces on both ways: -4πwR/3 where a sphere snaps in, -5πwR/6 to -3πwR/2 where it parts."""
-        measured = [entry for entry in conditions.recordings if isinstance(entry, IndentationRecording)]
+        """From the least forces on both ways: -4πwR/3 at snap-in, -5πwR/6 to -3πwR/2 at pull-off."""
+        measured = [recording for recording in conditions.recordings if isinstance(recording, IndentationRecording)]
         if kind != "indentation" or not measured:
             return ()
-        each = np.array([_works(entry) for entry in measured])
-        snapping, parting = np.clip(np.median(each, axis=0), _WORK.low, _WORK.high)
+        works = np.array([_works(recording) for recording in measured])
+        snap_in, pull_off = np.clip(np.median(works, axis=0), _WORK.low, _WORK.high)
         if len(self.parameters(conditions, kind)) == 1:
-            return [(snapping,)]
-        parting = max(parting, snapping)
-        return [(one, max(share * parting, one)) for one in (snapping, 0.5 * parting, parting) for share in (1.0, 1.8)]
+            return [(snap_in,)]
+        pull_off = max(pull_off, snap_in)
+        return [
+            (work, max(share * pull_off, work)) for work in (snap_in, 0.5 * pull_off, pull_off) for share in (1.0, 1.8)
+        ]
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Make it stick."""
@@ -88,15 +93,15 @@ class Adhesion(Mechanism):
         curve.work_of_separation = values.get("work_of_separation")
 
 
-def _comes_back(entry: IndentationConditions) -> bool:
-    way = entry.displacement_mm
-    return bool(way.max() - way[int(np.argmax(way)) :].min() > _RETURN * np.ptp(way))
+def _comes_back(recording: IndentationConditions) -> bool:
+    travel = recording.displacement_mm
+    return bool(travel.max() - travel[int(np.argmax(travel)) :].min() > _RETURN * np.ptp(travel))
 
 
-def _works(entry: IndentationRecording) -> tuple[float, float]:
-    """What the least forces on the way in and on the way back would be with -4πwR/3 and -3πwR/2 [J/m²]."""
-    seen = course(entry.displacement_mm, entry.force_n, entry.time_s)
-    force = entry.force_n - seen.zero
-    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
-    least = [-float(part.min()) / (np.pi * radius) for part in (force[: seen.turn + 1], force[seen.turn :])]
+def _works(recording: IndentationRecording) -> tuple[float, float]:
+    """Works of adhesion and separation [J/m²] for which the least forces on both ways are -4πwR/3 and -3πwR/2."""
+    features = course(recording.displacement_mm, recording.force_n, recording.time_s)
+    force = recording.force_n - features.zero
+    radius = float(to_si("indenter_radius_mm", recording.indenter_radius_mm))
+    least = [-float(part.min()) / (np.pi * radius) for part in (force[: features.turn + 1], force[features.turn :])]
     return max(least[0], 0.0) / (4 / 3), max(least[1], 0.0) / 1.5

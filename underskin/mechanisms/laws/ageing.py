@@ -9,7 +9,7 @@ from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Unifo
 from underskin.recordings.campaign import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
-_LEAST = 0.05  # what is left of a response before its fall slows down
+_LEAST = 0.05  # of a response, below which its fall slows down
 _LOSS = "poled polymers lose some to tens of percent, a decade or in the end"
 _ONSET = "run-in takes tens to ten thousands of cycles; 1000 within a factor of 7"
 _SATURATION = "from a loss that goes on by the decade to one that ends: nothing is known beforehand"
@@ -41,7 +41,7 @@ class Ageing(Mechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Counts that differ are needed."""
-        cycles = {entry.id: entry.load_cycles for entry in frf_of(conditions)}
+        cycles = {recording.id: recording.load_cycles for recording in frf_of(conditions)}
         lacking = [name for name, value in cycles.items() if value is None]
         if lacking:
             return f"recording {lacking[0]!r} has no load_cycles"
@@ -49,9 +49,9 @@ class Ageing(Mechanism):
 
     def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
         """The factor on each recording."""
-        left = 1.0 - values["saturation"]
-        power = values["saturation"] / left
-        age = log(1.0 + left * (design.load_cycles / values["onset"]))
+        remaining = 1.0 - values["saturation"]
+        power = values["saturation"] / remaining
+        age = log(1.0 + remaining * (design.load_cycles / values["onset"]))
         # (1 − e^(−p x))/p = x · mean_decay(p x)
         lost = age * _mean_decay(power * age) / (np.log(10.0) * _mean_decay(np.log(10.0) * power))
         return _positive(1.0 - values["loss"] * lost)

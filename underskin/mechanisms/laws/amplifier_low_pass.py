@@ -15,7 +15,7 @@ from underskin.weak_cache import cached_while_alive
 _CORNER = "filters against noise and aliasing, leads and probes: 300 Hz within a factor of 4.5, as the bands of skins"
 _ORDER = "1 is a single pole, 2 Butterworth's pair; between them lie two real poles, and Bessel's pair at 1.5"
 _LOWEST_HZ = 1e-2
-_BEYOND = 5.0  # times the highest line: from there the response falls by 2 % at most, and is a delay alone
+_BEYOND = 5.0  # times the highest line: from there the response falls by 2 % at most, and equals a delay
 _DAMPING = math.sqrt(2.0) - 1.0  # of Butterworth's pair, 1 + √2 ix − x²
 
 
@@ -60,6 +60,6 @@ class AmplifierLowPass(Mechanism):
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _highest_hz(conditions: Conditions) -> float:
     """The highest line of all recordings [Hz]; ∞ without one."""
-    of_frf = [entry.frequency_hz for entry in conditions.recordings if isinstance(entry, FrfConditions)]
-    highest = [float(np.max(lines, initial=0.0, where=np.isfinite(lines))) for lines in of_frf if lines is not None]
+    columns = [recording.frequency_hz for recording in conditions.recordings if isinstance(recording, FrfConditions)]
+    highest = [float(np.max(lines, initial=0.0, where=np.isfinite(lines))) for lines in columns if lines is not None]
     return max(highest, default=math.inf)

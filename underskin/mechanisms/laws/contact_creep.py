@@ -75,7 +75,8 @@ class ContactCreep(Mechanism):
     parameters_stated = _ONE_PAIR
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """One Prony pair, or for indentations two: their sum, mean time, how far apart they lie, and their shares."""
+        """One Prony pair, or for indentations two: sum of the fractions, mean time, ratio of the times, and share of
+        the first."""
         if kind != "indentation":
             return _ONE_PAIR
         fraction, time, *shares = _TWO_PAIRS
@@ -92,7 +93,7 @@ class ContactCreep(Mechanism):
         return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
 
     def told(self, values: Mapping[str, float]) -> str:
-        """Of two pairs, what each relaxes and in which time; of two that have one time, what both do."""
+        """For two pairs the relaxed percentage and time of each; of both together where the times are equal."""
         if "time_spread" not in values:
             return ""
         fraction, share = values["relaxed_fraction"], values["first_share"]
@@ -105,20 +106,20 @@ class ContactCreep(Mechanism):
         return f"The force relaxes by {first} and by {second}."
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
+        """Times must be independent of the loads: dwell_s that differ, or time_s that does not follow displacement."""
         if kind != "frf":
             curves = [
-                entry
-                for entry in conditions.recordings
-                if isinstance(entry, IndentationConditions | CompressionConditions) and entry.kind == kind
+                recording
+                for recording in conditions.recordings
+                if isinstance(recording, IndentationConditions | CompressionConditions) and recording.kind == kind
             ]
-            lacking = [entry.id for entry in curves if entry.time_s is None]
+            lacking = [recording.id for recording in curves if recording.time_s is None]
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
             if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
-            return _again(conditions)
-        dwell = {entry.id: entry.dwell_s for entry in conditions.recordings if entry.kind == kind}
+            return _repeated_press(conditions)
+        dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
         lacking = [name for name, value in dwell.items() if value is None]
         if lacking:
             return f"recording {lacking[0]!r} has no dwell_s"
@@ -127,9 +128,9 @@ class ContactCreep(Mechanism):
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Creep under the preload."""
         fraction = values["relaxed_fraction"]
-        left = 1.0 - fraction
-        times = -contacts.dwell * left / values["relaxation_time"]
-        contacts.relaxed = 1.0 / (1.0 + fraction / left * (1.0 - exp(times)))
+        unrelaxed = 1.0 - fraction
+        times = -contacts.dwell * unrelaxed / values["relaxation_time"]
+        contacts.relaxed = 1.0 / (1.0 + fraction / unrelaxed * (1.0 - exp(times)))
         contacts.modulus = contacts.modulus * contacts.relaxed
 
     def on_curve(self, curve: Curve, values: Values) -> None:
@@ -144,21 +145,25 @@ class ContactCreep(Mechanism):
 
 
 def _times(conditions: Conditions) -> list[Floats]:
-    """Those of the indentations that have them [s]."""
-    indentations = (entry for entry in conditions.recordings if isinstance(entry, IndentationConditions))
-    return [entry.time_s for entry in indentations if entry.time_s is not None and len(entry.time_s) > 1]
+    """The times of the indentations that have them [s]."""
+    indentations = (recording for recording in conditions.recordings if isinstance(recording, IndentationConditions))
+    return [
+        recording.time_s for recording in indentations if recording.time_s is not None and len(recording.time_s) > 1
+    ]
 
 
-def _again(conditions: Conditions) -> str | None:
-    """The first indentation that goes in again after it had come back."""
-    for entry in conditions.recordings:
-        if isinstance(entry, IndentationConditions) and _presses_again(entry.displacement_mm):
-            return f"recording {entry.id!r} presses again after it was drawn back: give each way in and back by itself"
+def _repeated_press(conditions: Conditions) -> str | None:
+    """A refusal of the first indentation that presses in again after its way back; None without one."""
+    for recording in conditions.recordings:
+        if isinstance(recording, IndentationConditions) and _presses_again(recording.displacement_mm):
+            return (
+                f"recording {recording.id!r} presses again after it was drawn back: give each way in and back by itself"
+            )
     return None
 
 
 def _presses_again(displacement: Floats) -> bool:
     least = _RETURN * np.ptp(displacement)
-    back = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
-    after = displacement[back[0] :] if len(back) else displacement[:1]
+    returned = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
+    after = displacement[returned[0] :] if len(returned) else displacement[:1]
     return bool((after - np.minimum.accumulate(after)).max() > least)

@@ -46,9 +46,9 @@ class ContactResonance(Mechanism):
     )
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """The mass that has the resonances which recordings show on the base model's contacts, and their damping; a
-        larger one as well, from which a fit finds a sharp resonance that other contacts have elsewhere."""
-        return _shown(conditions)
+        """The tip mass and damping of the resonances that recordings show on the base model's contacts; and a
+        broader one, from which a fit finds a sharp resonance at other contacts' frequencies."""
+        return _resonance_guesses(conditions)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """The tip's transfer function."""
@@ -59,12 +59,16 @@ class ContactResonance(Mechanism):
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
-def _shown(conditions: Conditions) -> list[tuple[float, float]]:
+def _resonance_guesses(conditions: Conditions) -> list[tuple[float, float]]:
     """Tip mass [g] and damping ratio."""
     skin = conditions.skin
-    measured = [entry for entry in conditions.recordings if isinstance(entry, FrfRecording)]
-    seen = [(place, found) for place, entry in enumerate(measured) if (found := resonance(lines_of(entry))) is not None]
-    if not seen or skin.youngs_modulus_mpa is None or skin.thickness_mm is None:
+    measured = [recording for recording in conditions.recordings if isinstance(recording, FrfRecording)]
+    resonances = [
+        (index, peak)
+        for index, recording in enumerate(measured)
+        if (peak := resonance(lines_of(recording))) is not None
+    ]
+    if not resonances or skin.youngs_modulus_mpa is None or skin.thickness_mm is None:
         return []
     design = frf_design(conditions, (), neighbours=False)
     modulus, thickness = to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa), to_si("thickness_mm", skin.thickness_mm)
@@ -78,7 +82,7 @@ def _shown(conditions: Conditions) -> list[tuple[float, float]]:
     )
     curves = layer_curves(CurveGrid(np.zeros(1)), Layer(skin.poisson_ratio))
     spring = stiffness(contacts, press(contacts, None), curves).value[0]
-    own = design.point_contact[design.point]
-    masses = [1e3 * spring[own[place]] / (2 * np.pi * found.frequency) ** 2 for place, found in seen]
-    mass, damping = float(np.median(masses)), float(np.median([found.damping for _, found in seen]))
+    contact_of = design.point_contact[design.point]
+    masses = [1e3 * spring[contact_of[index]] / (2 * np.pi * peak.frequency) ** 2 for index, peak in resonances]
+    mass, damping = float(np.median(masses)), float(np.median([peak.damping for _, peak in resonances]))
     return [(mass, damping), (mass, max(_BROADER * damping, _BROAD))]

@@ -47,11 +47,15 @@ class InstrumentCompliance(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "indentation") -> tuple[Parameter, ...]:
         """The stiffness, expected for the spheres of the recordings."""
-        radii = [one.indenter_radius_mm for one in conditions.recordings if isinstance(one, IndentationConditions)]
+        radii = [
+            recording.indenter_radius_mm
+            for recording in conditions.recordings
+            if isinstance(recording, IndentationConditions)
+        ]
         if not radii:
             return self.parameters_stated
         usual = Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)
-        return tuple(replace(entry, prior=usual) for entry in self.parameters_stated)
+        return tuple(replace(parameter, prior=usual) for parameter in self.parameters_stated)
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Let the stage give."""

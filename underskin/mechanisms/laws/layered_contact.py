@@ -13,7 +13,7 @@ from underskin.recordings.campaign import Conditions, IndentationConditions
 
 _THICKNESS = "layer_thickness"
 _USUAL, _SD = 5.0, 1.5  # contact radii, and of the logarithm
-_LEAST, _MOST = 0.3, 300.0  # contact radii: beyond the solved layers, and where nothing shows of the base
+_LEAST, _MOST = 0.3, 300.0  # contact radii: beyond the solved layers, and where the base has no effect
 _REASON = "nobody declared it: 5 contact radii within a factor of 4.5, at 30 the base raises the force by 4 %"
 
 
@@ -52,8 +52,8 @@ class LayeredContact(Mechanism):
             ),
         )
 
-    def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
-        """A declared thickness takes the place of one that curves told."""
+    def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
+        """A declared thickness replaces one estimated from curves."""
         declared = conditions.skin.thickness_mm is not None
         return {name: value for name, value in values.items() if not (declared and name == _THICKNESS)}
 
@@ -80,8 +80,8 @@ class LayeredContact(Mechanism):
 def _contact_radius_mm(conditions: Conditions) -> float:
     """About the largest of the recordings, √(R δ), with half of the travel for the depth."""
     radii = [
-        math.sqrt(one.indenter_radius_mm * max(0.5 * float(np.ptp(one.displacement_mm)), 1e-12))
-        for one in conditions.recordings
-        if isinstance(one, IndentationConditions)
+        math.sqrt(recording.indenter_radius_mm * max(0.5 * float(np.ptp(recording.displacement_mm)), 1e-12))
+        for recording in conditions.recordings
+        if isinstance(recording, IndentationConditions)
     ]
     return max(radii, default=1.0)

@@ -16,11 +16,11 @@ from underskin.recordings.frf.spectra import Frf
 from underskin.units import Floats, Indices
 from underskin.weak_cache import cached_while_alive
 
-_WIDTH_HZ = 1.5  # where it is asked which mains stand out
+_WIDTH_HZ = 1.5  # of a line, in the test for the mains frequency
 _FURTHEST_HZ = 20.0  # beyond which no line reaches, and short of half way from one harmonic to the next
 _REACHED = 0.05  # of the shape
 _LEAST_LINES = 3
-_BESIDE = 9  # lines, the next in frequency, that say what is usual
+_NEIGHBOURS = 9  # lines, nearest in frequency, that give the usual scatter
 _LEAST_STRAY = 1e-6  # relative; of recordings without noise
 _CHARGE = "unshielded leads of some pF to mains at 230 V collect hundredths to tenths of a pC"
 _WIDTH = "the analyser's window and the mains' drift make lines a few Hz wide"
@@ -58,13 +58,13 @@ class MainsPickup(Mechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Lines near the mains are needed."""
-        for entry in frf_of(conditions):
-            if any(np.abs(frequencies(entry) - mains).min() < HARMONIC_WIDTH_HZ for mains in MAINS_HZ):
+        for recording in frf_of(conditions):
+            if any(np.abs(frequencies(recording) - mains).min() < HARMONIC_WIDTH_HZ for mains in MAINS_HZ):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
     def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup:
-        """Of the lines within the reach of the mains that stand out, each by the nearest multiple."""
+        """On the lines within reach of the mains that stand out, each by its nearest harmonic."""
         return _pickup(conditions, design)
 
 
@@ -88,16 +88,16 @@ def _pickup(conditions: Conditions, design: FrfDesign) -> Pickup:
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _outstanding_mains(conditions: Conditions) -> float:
     """The mains frequency [Hz] whose lines stand out; where none does, the one that has a line nearest."""
-    lines = np.concatenate([frequencies(entry) for entry in frf_of(conditions)])
+    lines = np.concatenate([frequencies(recording) for recording in frf_of(conditions)])
     nearest = {mains: float(np.abs(lines - mains).min()) for mains in MAINS_HZ}
-    measured = [lines_of(entry) for entry in conditions.recordings if isinstance(entry, FrfRecording)]
+    measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]
     return max(MAINS_HZ, key=lambda mains: (_excess(measured, mains), -nearest[mains]))
 
 
 def _excess(recordings: Sequence[Frf], mains: float) -> float:
-    """How much further the lines that these mains reach stray from a straight line between those that none reach than
-    the next ones do from each other: Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, the score of a variance of that
-    shape in units of its own scatter."""
+    """A score for pick-up at these mains: the scatter of the lines that they reach about a straight line between the
+    others, against the scatter of neighbouring other lines, Σ shape² (|stray|² over theirs − 1)/√Σ shape⁴, in
+    standard deviations."""
     score = weight = 0.0
     reaches: dict[bytes, _Reach] = {}  # most recordings have the same lines
     for lines in recordings:
@@ -110,7 +110,7 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
         size = np.maximum(np.abs(lines.values), max(float(np.median(np.abs(lines.values))), 1e-300))
         stray = _stray(lines, size, reach.near, reach.far)
         others = _stray(lines, size, reach.far[1::2], reach.far[::2])
-        usual = np.median(others[reach.beside] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
+        usual = np.median(others[reach.neighbours] ** 2, axis=1) / np.log(2.0)  # median = mean · ln 2
         score += float((reach.shape**2 * (stray**2 - usual) / np.maximum(usual, _LEAST_STRAY**2)).sum())
         weight += float((reach.shape**4).sum())
     return score / np.sqrt(weight) if weight else 0.0
@@ -118,25 +118,25 @@ def _excess(recordings: Sequence[Frf], mains: float) -> float:
 
 @dataclass(frozen=True)
 class _Reach:
-    """Of the lines of a recording: those that the mains reach, `near` with their shape, the others, and of each near
-    one which of every second other are next to it."""
+    """Indices of a recording's lines: `near`, reached by the mains, with their `shape`; `far`, the others;
+    `neighbours`, for each near line the nearest of every second far one."""
 
     near: Indices
     shape: Floats
     far: Indices
-    beside: Indices
+    neighbours: Indices
 
     @classmethod
     def of(cls, frequency: Floats, mains: float) -> "_Reach":
         shape = _shape(frequency, mains)
         near, far = np.flatnonzero(shape > _REACHED), np.flatnonzero(shape <= _REACHED)
-        beside = np.abs(frequency[near, None] - frequency[far[1::2]]).argsort(axis=1)[:, :_BESIDE]
-        return cls(near, shape[near], far, beside)
+        neighbours = np.abs(frequency[near, None] - frequency[far[1::2]]).argsort(axis=1)[:, :_NEIGHBOURS]
+        return cls(near, shape[near], far, neighbours)
 
 
-def _stray(lines: Frf, size: Floats, rows: Indices, beside: Indices) -> Floats:
-    """How far rows are from a straight line between others, relative to `size`."""
-    between = np.interp(lines.frequency[rows], lines.frequency[beside], lines.values[beside])
+def _stray(lines: Frf, size: Floats, rows: Indices, neighbours: Indices) -> Floats:
+    """The distance of rows from a straight line between `neighbours`, relative to `size`."""
+    between = np.interp(lines.frequency[rows], lines.frequency[neighbours], lines.values[neighbours])
     return np.asarray(np.abs(lines.values[rows] - between) / size[rows])
 
 

@@ -35,31 +35,31 @@ class Misalignment(Mechanism):
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The offset's two components, or its length where its direction cannot be determined."""
-        return self.parameters_beside((), conditions, kind)
+        return self.parameters_with((), conditions, kind)
 
-    def parameters_beside(
+    def parameters_with(
         self, others: Collection[Mechanism], conditions: Conditions, kind: Kind
     ) -> tuple[Parameter, ...]:
-        """The same; the charge of neighbours, which lie in known directions, tells the direction too."""
+        """As `parameters`; the charge of neighbours, which lie in known directions, determines the direction too."""
         directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
-        shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
+        figure_values, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
             Parameter(
                 name, "mm", low, _LARGEST_MM, HeavyTailed(0.0, 0.7), "linear", limit=0.0, shown=value, reason=_REASON
             )
-            for name, value in shown.items()
+            for name, value in figure_values.items()
         )
 
-    def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
-        """Centred presses need the offset's length alone; a length without its direction serves no others."""
+    def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
+        """Centred presses need only the offset's length; without a direction no other press can be predicted."""
         if "offset" not in values:
             return {**values, "offset": float(np.hypot(values["offset_x"], values["offset_y"]))}
-        beside = offsets(conditions).any(axis=1)
-        if beside.any():
-            entry = frf_of(conditions)[int(np.argmax(beside))]
-            known = "the adopted model knows how far presses miss it, not in which direction"
-            allowed = f"must be the sensor's centre: {known}"
-            raise conflicting(f"recordings[{entry.id}].position_mm", entry.position_mm, allowed)
+        off_centre = offsets(conditions).any(axis=1)
+        if off_centre.any():
+            recording = frf_of(conditions)[int(np.argmax(off_centre))]
+            reason = "the adopted model knows how far presses miss it, not in which direction"
+            allowed = f"must be the sensor's centre: {reason}"
+            raise conflicting(f"recordings[{recording.id}].position_mm", recording.position_mm, allowed)
         return values
 
     def offset(self, values: Values) -> tuple[Differentiated, Differentiated]:

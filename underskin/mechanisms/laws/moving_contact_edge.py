@@ -9,7 +9,7 @@ from underskin.units import Array, Floats
 
 _NODES, _MORE_NODES = 3, 6  # of the quadrature; the three are exact for charges of the fourth degree in the force
 _LARGE = 0.4  # of the preload: a dynamic force beyond which three nodes err by more than 1e-4 of σ
-_SMALL = 1e-3  # the same that stands for the limit of a small one: it errs by the order of its square
+_SMALL = 1e-3  # of the preload: a dynamic force used for the limit of 0; the error is of second order
 _LEAST_FORCE = 1e-6  # of the preload, for a sphere that has left the skin
 _REASON = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
 

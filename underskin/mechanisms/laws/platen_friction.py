@@ -9,7 +9,7 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter, Uniform
 from underskin.recordings.campaign import CompressionConditions, Conditions
 
-_ONE_SHAPE = 1.05  # of S²: samples that differ by less tell friction from the modulus no better than noise
+_LEAST_SHAPE_RATIO = 1.05  # of S²: with a smaller ratio, friction and modulus cannot be separated
 _FRICTIONS = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95)  # even quantiles of its prior
 _REASON = "from well oiled to bonded: nothing is known beforehand"
 
@@ -36,11 +36,11 @@ class PlatenFriction(Mechanism):
     def hidden_in_modulus(self, conditions: Conditions) -> Sequence[float]:
         """Of samples of one shape."""
         shapes = [
-            (0.25 * entry.sample_diameter_mm / entry.sample_height_mm) ** 2
-            for entry in conditions.recordings
-            if isinstance(entry, CompressionConditions)
+            (0.25 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2
+            for recording in conditions.recordings
+            if isinstance(recording, CompressionConditions)
         ]
-        if not shapes or max(shapes) > _ONE_SHAPE * min(shapes):
+        if not shapes or max(shapes) > _LEAST_SHAPE_RATIO * min(shapes):
             return ()
         return [float(np.log1p(2 * friction * np.mean(shapes))) for friction in _FRICTIONS]
 

@@ -42,6 +42,6 @@ class SensorSpread(Mechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Two sensors are needed."""
-        if len({entry.sensor for entry in frf_of(conditions)}) < 2:
+        if len({recording.sensor for recording in frf_of(conditions)}) < 2:
             return "all recordings are of one sensor"
         return None

@@ -16,7 +16,7 @@ _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8
 _COMPARED = 0.1  # the strain at which laws of curves and of FRFs are compared, as large as a contact's
 _LOCKED = 0.05  # of 1 + q c J, which is 0 where Gent's law locks
-_STRAIGHT = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
+_LEAST_FORM = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
 
 _COEFFICIENT = Parameter(
     name="stiffening",
@@ -124,9 +124,9 @@ class StrainStiffening(Mechanism):
         """The stiffening coefficient, or for curves the law's constants."""
         return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
 
-    def common(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
-        """s of 1 + s ε where the law of an indentation has strained ε = 0.1: how much stiffer than at no strain, over
-        that. A cylinder strains so much more that its law says nothing of so little."""
+    def shared_parameters(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
+        """s of 1 + s ε for the law of an indentation: the relative increase of the modulus at ε = 0.1, over ε. A
+        cylinder is strained so much more that its law gives no information on such small strains."""
         if kind == "frf":
             return values
         if kind == "compression":
@@ -135,13 +135,13 @@ class StrainStiffening(Mechanism):
         invariant = shortened**2 + 2.0 / shortened - 3.0
         coefficient, form, exponent = (values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         grown = coefficient * (3.0 * exp(exponent * (0.5 * np.log(invariant / 3.0))))
-        bend = where(np.abs(form.value) > _STRAIGHT, form, _STRAIGHT)
-        power = 1.0 + bend * grown
-        factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / bend)
+        nonzero_form = where(np.abs(form.value) > _LEAST_FORM, form, _LEAST_FORM)
+        power = 1.0 + nonzero_form * grown
+        factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / nonzero_form)
         return {"stiffening": (factor - 1.0) / _COMPARED}
 
     def told(self, values: Mapping[str, float]) -> str:
-        """Of a compression, that it is softer than a neo-Hookean solid where it is."""
+        """That a compressed sample is softer than a neo-Hookean solid, where it is."""
         softer = values.get("second_over_first", 0.0) < 0
         return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
 

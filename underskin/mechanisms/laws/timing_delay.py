@@ -42,8 +42,8 @@ class TimingDelay(Mechanism):
     )  # fmt: skip
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """The delay that the phases of all recordings show: beyond a turn over the band no fit finds it from afar."""
-        return _shown(conditions)
+        """The delay of all recordings' phases: beyond one turn over the band no fit converges to it from afar."""
+        return _delay_guess(conditions)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """exp(−iωt0)."""
@@ -51,8 +51,8 @@ class TimingDelay(Mechanism):
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
-def _shown(conditions: Conditions) -> list[tuple[float]]:
+def _delay_guess(conditions: Conditions) -> list[tuple[float]]:
     """The delay [µs]."""
-    measured = [lines_of(entry) for entry in conditions.recordings if isinstance(entry, FrfRecording)]
+    measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]
     delay = common_delay(stacked(measured)) if measured else 0.0
     return [(1e6 * delay,)] if delay else []

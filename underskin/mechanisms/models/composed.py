@@ -1,4 +1,4 @@
-"""A model of recordings: the base model, and a set of mechanisms composed with it in a fixed order."""
+"""A model of recordings: the base model composed with a set of mechanisms in a fixed order."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,7 +15,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 __all__ = ["Model", "Prediction", "compose"]
 
 
-# The `parameters` of each are the mechanisms' own, in order of composition, then the nuisances. `valid` (rows,) is
+# The `parameters` of each are those of the mechanisms, in order of composition, then the nuisances. `valid` (rows,) is
 # decided by the declared values, before any fit: False where the contact or its offset lies beyond the tables from the
 # start; such rows are predicted by continuation and should not be fitted.
 Model = FrfModel | IndentationModel | CompressionModel
@@ -26,9 +26,9 @@ def compose(
     conditions: Conditions,
     table: SigmaTable,
     kind: Kind | None = None,
-    known: Mapping[str, Mechanism] = CATALOGUE,
+    catalogue: Mapping[str, Mechanism] = CATALOGUE,
 ) -> Model:
-    """The model of some mechanisms for all recordings of one kind, where these can support the mechanisms.
+    """The model of some mechanisms for all recordings of one kind, provided that these can support the mechanisms.
 
     Parameters
     ----------
@@ -40,30 +40,30 @@ def compose(
     table
         The σ table.
     kind
-        Must be given where the conditions hold several kinds.
-    known
-        The mechanisms that names are of.
+        Required where the conditions hold several kinds.
+    catalogue
+        The mechanisms by name.
 
     Raises
     ------
     Unsupported
-        Where the recordings cannot support a mechanism: they would say nothing about its parameters.
+        Where the recordings cannot support a mechanism: they contain no information about its parameters.
     InvalidInput
         For an unknown name, or a kind of which there is no recording.
     """
     kind = kind or kind_of(conditions)
     _require_kind(conditions, kind)
-    mechanisms = chosen(names, known)
+    mechanisms = chosen(names, catalogue)
     check_supported(mechanisms, conditions, kind)
     return forward_model(mechanisms, conditions, table, kind)
 
 
 def forward_model(mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable, kind: Kind) -> Model:
-    """The model of mechanisms in order of composition, whether or not the recordings would tell their parameters.
+    """The model of mechanisms in order of composition, whether or not the recordings identify their parameters.
 
-    All models of a skin are worked out from one and the same σ around its sensors.
+    All models of a skin use the same σ around its sensors.
 
-    Raises InvalidInput for a kind of which there is no recording, and where a declared value is lacking.
+    Raises InvalidInput for a kind of which there is no recording, and where a declared value is missing.
     """
     _require_kind(conditions, kind)
     if kind == "frf":

@@ -1,10 +1,7 @@
-"""What a set of mechanisms is composed of.
+"""Composition of mechanisms into one model: their parameters in one vector, and the prediction.
 
-Parameters that every model has, whatever its mechanisms: of FRFs d33 and factors on the declared modulus and
-thickness; of a curve its modulus and where its contact begins,
-and of an indentation what finite strain adds to its depth.
-
-How mechanisms make up one model: their parameters in one vector, and what a model answers.
+Every model also has nuisance parameters: of FRFs d33 and factors on the declared modulus and thickness; of curves
+the modulus and the contact points, and of indentations the share of finite strain's effect on the depth.
 """
 
 from __future__ import annotations
@@ -40,21 +37,21 @@ STRAIN_SHARE = Parameter(
 )
 _LEAST_SD = 1e-4  # of a factor on a value that is declared to be exact
 _BOUNDS = 5.0  # standard deviations
-_WIDE_SD = 1.5  # of the logarithm of a modulus that nobody declared
+_WIDE_SD = 1.5  # of the logarithm of an undeclared modulus
 
 
 def frf_nuisances(skin: SkinDescription) -> tuple[Parameter, ...]:
-    """d33, and the factors on the declared modulus and thickness, within the skin's tolerances where it states them."""
-    off = skin.tolerances
-    if off is None:
+    """d33, and the factors on the declared modulus and thickness, within the skin's tolerances where stated."""
+    tolerances = skin.tolerances
+    if tolerances is None:
         return D33, YOUNGS_MODULUS, THICKNESS
-    return D33, _within(YOUNGS_MODULUS, off.youngs_modulus_percent), thickness_parameter(skin)
+    return D33, _within(YOUNGS_MODULUS, tolerances.youngs_modulus_percent), thickness_parameter(skin)
 
 
 def thickness_parameter(skin: SkinDescription) -> Parameter:
     """The factor on the declared thickness."""
-    off = skin.tolerances
-    return THICKNESS if off is None else _within(THICKNESS, off.thickness_percent)
+    tolerances = skin.tolerances
+    return THICKNESS if tolerances is None else _within(THICKNESS, tolerances.thickness_percent)
 
 
 def _within(factor: Parameter, percent: float) -> Parameter:
@@ -65,7 +62,7 @@ def _within(factor: Parameter, percent: float) -> Parameter:
 
 
 def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Parameter:
-    """A factor on the declared modulus, or the modulus itself, around the estimates [Pa], where none is declared."""
+    """A factor on the declared modulus; where none is declared, the modulus itself, around the estimates [Pa]."""
     if skin.youngs_modulus_mpa is not None:
         return YOUNGS_MODULUS
     middle = float(to_lab("youngs_modulus_mpa", np.median(estimates)))
@@ -76,7 +73,7 @@ def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Para
 
 
 def required_modulus(skin: SkinDescription) -> float:
-    """The declared modulus [MPa]; raises InvalidInput where there is none and no measured curve tells it either."""
+    """The declared modulus [MPa]; raises InvalidInput where it is missing and no measured curve determines it."""
     if skin.youngs_modulus_mpa is None:
         raise required("skin.youngs_modulus_mpa", "required to predict curves that were not measured")
     return skin.youngs_modulus_mpa
@@ -116,22 +113,23 @@ class Prediction:
 
 
 class Composition:
-    """The mechanisms of a model, in order, and how one vector of fit coordinates is theirs and the nuisances'.
+    """The mechanisms of a model, in order, and the indices of their parameters and of the nuisances in the fit
+    coordinates.
 
-    Attributes: `places` of each mechanism's parameters in that vector, by its name and theirs; `nuisances`, theirs.
+    Attributes: `indices`, the index of each mechanism's parameter by both names; `nuisances`, those of the nuisances.
     """
 
     def __init__(
         self, mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind, nuisances: Sequence[Parameter]
     ) -> None:
-        """Take the parameters of each mechanism, then the nuisances."""
+        """Arrange the parameters of each mechanism, then the nuisances."""
         self.mechanisms = tuple(mechanisms)
-        own = parameters_together(mechanisms, conditions, kind)
-        self.parameters = (*(parameter for group in own.values() for parameter in group), *nuisances)
-        starts = np.cumsum([0, *(len(group) for group in own.values())])
-        self.places = {
+        groups = parameters_together(mechanisms, conditions, kind)
+        self.parameters = (*(parameter for group in groups.values() for parameter in group), *nuisances)
+        starts = np.cumsum([0, *(len(group) for group in groups.values())])
+        self.indices = {
             name: {parameter.name: start + index for index, parameter in enumerate(group)}
-            for (name, group), start in zip(own.items(), starts[:-1], strict=True)
+            for (name, group), start in zip(groups.items(), starts[:-1], strict=True)
         }
         self.nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
@@ -154,21 +152,23 @@ class Composition:
         value = np.concatenate(
             [np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1
         )
-        by_own = np.zeros((count + further, *points, count + further))
-        every = np.arange(count + further)
-        by_own[every, ..., every] = np.moveaxis(
+        seed_slopes = np.zeros((count + further, *points, count + further))
+        diagonal = np.arange(count + further)
+        seed_slopes[diagonal, ..., diagonal] = np.moveaxis(
             np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
         )
-        seeds = variables(value, by_own if slopes else by_own[count:])
-        own = {name: {key: seeds[place] for key, place in places.items()} for name, places in self.places.items()}
-        for name, places in self.places.items():
-            for key, place in places.items():
-                other = self.parameters[place].relative_to
+        seeds = variables(value, seed_slopes if slopes else seed_slopes[count:])
+        by_mechanism = {
+            name: {key: seeds[index] for key, index in indices.items()} for name, indices in self.indices.items()
+        }
+        for name, indices in self.indices.items():
+            for key, index in indices.items():
+                other = self.parameters[index].relative_to
                 if other is not None:
-                    own[name][key] = own[name][key] * own[name][other]
+                    by_mechanism[name][key] = by_mechanism[name][key] * by_mechanism[name][other]
         return (
-            dict(own),
-            {name: seeds[place] for name, place in self.nuisances.items()},
+            dict(by_mechanism),
+            {name: seeds[index] for name, index in self.nuisances.items()},
             seeds[count:],
         )
 
@@ -176,12 +176,12 @@ class Composition:
 def parameters_together(
     mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind
 ) -> dict[str, tuple[Parameter, ...]]:
-    """The parameters of each mechanism by its name, as they are where all of these act together."""
-    return {mechanism.name: mechanism.parameters_beside(mechanisms, conditions, kind) for mechanism in mechanisms}
+    """The parameters of each mechanism by its name, in a model with all of these mechanisms."""
+    return {mechanism.name: mechanism.parameters_with(mechanisms, conditions, kind) for mechanism in mechanisms}
 
 
 def kind_of(conditions: Conditions) -> Kind:
-    """The kind of the campaign's recordings; raises InvalidInput where there are several, or none."""
+    """The kind of the campaign's recordings; raises InvalidInput for several kinds, or none."""
     kinds = {recording.kind for recording in conditions.recordings}
     if len(kinds) != 1:
         raise InvalidInput("kind", sorted(kinds), "name one: the campaign's recordings are of several kinds, or none")
@@ -190,7 +190,7 @@ def kind_of(conditions: Conditions) -> Kind:
 
 
 def check_supported(mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind) -> None:
-    """Raises Unsupported at the first mechanism that the conditions, or this kind of recording, cannot support."""
+    """Raise Unsupported at the first mechanism that the conditions, or this kind of recording, cannot support."""
     for mechanism in mechanisms:
         if kind not in mechanism.kinds:
             raise Unsupported(mechanism.name, f"does not act on recordings of kind {kind}")
@@ -200,7 +200,7 @@ def check_supported(mechanisms: Sequence[Mechanism], conditions: Conditions, kin
 
 
 def chosen(names: Sequence[str], catalogue: Mapping[str, Mechanism]) -> list[Mechanism]:
-    """The mechanisms of these names in order of composition; raises InvalidInput for one unknown or twice."""
+    """The mechanisms of these names in order of composition; raises InvalidInput for an unknown or repeated name."""
     for name in names:
         if name not in catalogue:
             raise not_one_of("mechanisms", name, catalogue)

@@ -1,13 +1,10 @@
-"""The contact of an FRF recording as mechanisms change it.
+"""The contacts of FRF recordings as mechanisms change them, and the stage that turns loads into contacts. SI.
 
-The contacts of a campaign on their way through a model: what is pressed, by what, and how. SI throughout.
-
-The stage that turns loads into contacts: radius, and the pressure's shape as a mixture of a sphere's and a punch's.
-
-Four cases (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301; Lebedev & Ufliand, J. Appl. Math. Mech. 22
-(1958) 442): half space or layer, with or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'),
-F1 = F + 3πwR + √(6πwRF + (3πwR)²), and the pressure is Hertz' under F1 less a flat punch's under F1 − F; on the
-layer both parts are those of contact_curves.
+Radius, and the shape of the pressure as a mixture of a sphere's and a punch's, in four cases (Johnson, Kendall &
+Roberts, Proc. R. Soc. A 324 (1971) 301; Lebedev & Ufliand, J. Appl. Math. Mech. 22 (1958) 442): half space or layer,
+with or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'), F1 = F + 3πwR + √(6πwRF + (3πwR)²), and
+the pressure is Hertz' under F1 less a flat punch's under F1 − F; on the layer both parts are those of
+contact_curves.
 """
 
 from __future__ import annotations
@@ -28,11 +25,11 @@ from underskin.units import Floats, Indices
 
 @dataclass
 class Contacts:
-    """One row a contact, (…, contacts); a Differentiated of a single row stands for all of them."""
+    """One row per contact, (…, contacts); a Differentiated of a single row is broadcast to all."""
 
     force: Floats  # F [N]
     indenter_radius: Floats  # R [m]
-    dwell: Floats  # time since the preload was put on [s]; 0 where no mechanism asks
+    dwell: Floats  # time since the preload was put on [s]; 0 where no mechanism reads it
     modulus: Differentiated  # E [Pa] in force in each contact: that of the static contact
     thickness: Differentiated  # h [m], of one row
     poisson_ratio: Differentiated  # ν, of one row
@@ -40,21 +37,21 @@ class Contacts:
     work_of_adhesion: Differentiated | None = None  # w [J/m²], of one row; None without adhesion
     relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
-    stiffness: Differentiated | None = None  # dF/dδ [N/m] at the radius in force, where a mechanism asks
+    stiffness: Differentiated | None = None  # dF/dδ [N/m] at the present radius, where a mechanism reads it
 
-    def at_points(self, some: Indices | None) -> Contacts:
+    def at_points(self, subset: Indices | None) -> Contacts:
         """At some of several points (points, contacts), at all for None."""
-        if some is None:
+        if subset is None:
             return self
-        return self._with({name: x.at_points(some) for name, x in self._differentiated().items()})
+        return self._with({name: x.at_points(subset) for name, x in self._differentiated().items()})
 
     @classmethod
     def stacked(cls, parts: Sequence[Contacts], points: Sequence[int]) -> Contacts:
-        """Contacts of the same structure at several sets of points, of so many each."""
+        """Contacts of the same structure at several sets of points, stacked; `points` is the size of each set."""
         if len(parts) == 1:
             return parts[0]
-        each = [part._differentiated() for part in parts]
-        return parts[0]._with({name: stacked([own[name] for own in each], points) for name in each[0]})
+        fields = [part._differentiated() for part in parts]
+        return parts[0]._with({name: stacked([values[name] for values in fields], points) for name in fields[0]})
 
     def _with(self, changed: dict[str, Any]) -> Contacts:
         other = copy(self)
@@ -102,14 +99,14 @@ def layer_curves(grid: CurveGrid, layer: Layer) -> ContactCurves:
 
 
 def press(contacts: Contacts, curves: ContactCurves | None) -> PressedContacts:
-    """The contacts under their forces; `curves`, of the layer at hand, where the contact is the layer's."""
+    """The contacts under their forces; `curves` of the layer for contact with the layer itself."""
     if curves is not None:
         return _on_layer(contacts, curves)
     if contacts.work_of_adhesion is None:
         return PressedContacts(contacts.hertz_radius / contacts.thickness, contacts.cbrt_load, None)
-    pull = (1.5 * np.pi) * contacts.indenter_radius * contacts.work_of_adhesion
-    root = 2.0 * (pull * (contacts.force + pull)) ** 0.5
-    equivalent = contacts.force + 2.0 * pull + root
+    adhesive_force = (1.5 * np.pi) * contacts.indenter_radius * contacts.work_of_adhesion
+    root = 2.0 * (adhesive_force * (contacts.force + adhesive_force)) ** 0.5
+    equivalent = contacts.force + 2.0 * adhesive_force + root
     radius = cbrt(0.75 * contacts.indenter_radius * equivalent / contacts.reduced_modulus)
     return PressedContacts(radius / contacts.thickness, contacts.cbrt_load, equivalent / contacts.force)
 
@@ -139,13 +136,13 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
 
 
 def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurves) -> Differentiated:
-    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the contact radius in force, the edge held, E' unrelaxed."""
+    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the present contact radius, with the edge fixed and E' unrelaxed."""
     alpha = pressed.a_over_h
     shape = alpha.value.shape
     at_radius = curves.stiffness_at(np.minimum(alpha.value, LARGEST_A_OVER_H).ravel())
     by_alpha, by_poisson_ratio, by_slip = at_radius.slopes.reshape(-1, *shape)
     terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
     terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]
-    held = chain(at_radius.value.reshape(shape), *terms) * alpha * contacts.thickness
-    held = 2.0 * contacts.reduced_modulus * held
-    return held if contacts.relaxed is None else held / contacts.relaxed
+    result = chain(at_radius.value.reshape(shape), *terms) * alpha * contacts.thickness
+    result = 2.0 * contacts.reduced_modulus * result
+    return result if contacts.relaxed is None else result / contacts.relaxed

@@ -1,4 +1,4 @@
-"""A characterisation curve on its way through a model: the elastomer, the bench, and the flow of time. SI."""
+"""A force curve as mechanisms change it: the elastomer, the stage, and relaxation. SI."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,8 +13,8 @@ from underskin.units import Floats
 
 @dataclass(frozen=True)
 class Samples:
-    """What is known of samples without a law: `travel` from the contact point [m] (points, curves, samples), `time` [s]
-    (curves, samples), and the recordings' `ids`."""
+    """The samples before any law: `travel` from the contact point [m] (points, curves, samples), `time` [s] (curves,
+    samples), and the recordings' `ids`."""
 
     ids: Sequence[str]
     travel: Floats
@@ -22,18 +22,18 @@ class Samples:
 
 
 class SampleLaw(Protocol):
-    """What a law that nobody listed changes of samples."""
+    """A law that changes samples one by one."""
 
-    def moved(self, samples: Samples, travel: Floats) -> Floats:
-        """The travel at which a sphere presses [m] (points, curves, samples)."""
+    def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
+        """The travel at which the sphere presses [m] (points, curves, samples)."""
 
-    def read(self, samples: Samples, force: Floats) -> Floats:
-        """The force that is read where the contact bears `force` [N] (points, curves, samples)."""
+    def measured_force(self, samples: Samples, force: Floats) -> Floats:
+        """The measured force [N] where the contact force is `force` [N] (points, curves, samples)."""
 
 
 @dataclass
 class Curve:
-    """What an indentation or compression is governed by; each number is one of each point of the fit coordinates."""
+    """The quantities that govern an indentation or compression; each is one number per point of the fit coordinates."""
 
     modulus: Differentiated  # E [Pa]
     poisson_ratio: Differentiated
@@ -51,7 +51,7 @@ class Curve:
 
     @property
     def prony_pairs(self) -> Relaxation | None:
-        """The pairs, (points, 1, 1, pairs); None where nothing relaxes."""
+        """The Prony pairs, (points, 1, 1, pairs); None without relaxation."""
         if not self.relaxation:
             return None
         fraction, time = (np.stack([numbers(pair[part]) for pair in self.relaxation], axis=-1) for part in range(2))
@@ -59,5 +59,5 @@ class Curve:
 
 
 def numbers(quantity: Differentiated) -> Floats:
-    """A number of each point, as curves take it: (points, 1, 1)."""
+    """A quantity's value at each point, with axes for curves and samples: (points, 1, 1)."""
     return quantity.value[..., None]

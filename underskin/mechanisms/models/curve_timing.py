@@ -1,4 +1,4 @@
-"""Whether the times of curves say more than their displacements: else no law of time can be told from a shape."""
+"""Whether the times of curves add information to their displacements; else no law of time can be identified."""
 
 from collections.abc import Sequence
 
@@ -12,18 +12,18 @@ _LIKE_SPEEDS = 1.5
 
 
 def time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
-    """True where all curves go one way at one and the same constant speed; recordings without time_s do not count."""
+    """True where all curves move in one direction at the same constant speed; recordings without time_s are ignored."""
     speeds = []
-    for entry in recordings:
-        if entry.time_s is None:
+    for recording in recordings:
+        if recording.time_s is None:
             continue
-        moved = np.abs(entry.displacement_mm - entry.displacement_mm[0])
-        passed = entry.time_s - entry.time_s[0]
-        span, duration = float(moved.max()), float(passed[-1])
+        moved = np.abs(recording.displacement_mm - recording.displacement_mm[0])
+        elapsed = recording.time_s - recording.time_s[0]
+        span, duration = float(moved.max()), float(elapsed[-1])
         if span <= 0 or duration <= 0:
             return False
         turned = float((np.maximum.accumulate(moved) - moved).max())
-        uneven = float(np.abs(moved / span - passed / duration).max())
+        uneven = float(np.abs(moved / span - elapsed / duration).max())
         if turned > _TURNED_BACK * span or uneven > _UNEVEN:
             return False
         speeds.append(span / duration)

@@ -1,16 +1,12 @@
-"""Models of curves, and of compressed blocks.
+"""Models of force curves: what all share, and the compression (or tension) of cylinders.
 
-What models of curves share: samples as rectangular arrays, forces at many points, derivatives by differences.
+Arrays are (points, curves, samples): points of the fit coordinates; shorter curves are padded with their last value.
+Derivatives are central differences, exact to about 1e-8: the shifted points are computed together, with the contact of
+the central one. Contact points are shifted all at once, since each moves one curve only.
 
-Arrays are (points, curves, samples): points of the fit coordinates; curves shorter than the longest stay where they
-end. Derivatives are central differences, exact to about 1e-8: all points aside are worked out together with the one in
-the middle, whose samples decide which are in contact. Contact points move one curve each, all of them at once.
-
-The force of compression (or tension) curves, sample by sample, under a set of mechanisms.
-
-Base model: one modulus E of an incompressible neo-Hookean solid between smooth platens, F = (E A/3)(λ⁻² − λ) with
-λ = 1 − (d − d0)/H, compression positive. Stages: declared value → nominal stress of the
-material → friction at the platens → relaxation.
+Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
+platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. Stages: declared value → nominal stress
+of the material → friction at the platens → relaxation.
 """
 
 from abc import ABC, abstractmethod
@@ -67,55 +63,58 @@ class CurveModel(ABC):
         self.parameters = self._composition.parameters
         self._mechanisms = self._composition.mechanisms
         self._skin = conditions.skin
-        lengths = np.array([len(entry.displacement_mm) for entry in recordings], dtype=np.intp)
+        lengths = np.array([len(recording.displacement_mm) for recording in recordings], dtype=np.intp)
         self.recording = np.repeat(np.arange(len(recordings)), lengths)
         self.valid = np.ones(len(self.recording), dtype=bool)
         self._sample = np.arange(len(self.recording)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-        self.displacement = self._arranged([to_si("displacement_mm", one.displacement_mm) for one in recordings])
-        self.time = self._arranged([times_of(entry) for entry in recordings])
+        self.displacement = self._arranged(
+            [to_si("displacement_mm", recording.displacement_mm) for recording in recordings]
+        )
+        self.time = self._arranged([times_of(recording) for recording in recordings])
         count = len(self.parameters) - len(recordings)
         self.contact_points = np.arange(count, len(self.parameters))
         # What moves together in the differences: each shared parameter, then all contact points.
-        self._moved = [np.array([place]) for place in range(count)] + [self.contact_points]
-        bounds = np.array([entry.bounds for entry in self.parameters]).reshape(-1, 2)
-        logarithmic = np.array([entry.scale == "log" for entry in self.parameters])
+        self._moved = [np.array([index]) for index in range(count)] + [self.contact_points]
+        bounds = np.array([parameter.bounds for parameter in self.parameters]).reshape(-1, 2)
+        logarithmic = np.array([parameter.scale == "log" for parameter in self.parameters])
         self._low, self._high = bounds.T
         self._step = np.where(logarithmic, _STEP, _STEP * np.minimum(1.0, self._high - self._low))
 
     @abstractmethod
-    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
-        """What governs the curves, its numbers (points, 1), as the mechanisms make it."""
+    def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
+        """The quantities that govern the curves, numbers (points, 1), as changed by the mechanisms."""
 
     @abstractmethod
-    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
-        """F (points, curves, samples) [N], which samples are in contact, and which of these the tables reach.
+    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
+        """F (points, curves, samples) [N], which samples are in contact, and which are inside the tables.
 
-        `contact` (points, curves, 1) [m]; the contacts are as `held`, where that is given.
+        `contact` (points, curves, 1) [m]; `held`: the contact to be used, where given.
         """
 
-    def forces(self, fit: Floats, held: Mask | None = None) -> Floats:
-        """F (points, rows) [N] at points (points, parameters); `held` (rows,) are in contact, where that is known."""
+    def forces(self, fit: Floats, contact_mask: Mask | None = None) -> Floats:
+        """F (points, rows) [N] at points (points, parameters); `held` (rows,): which samples are in contact, where
+        known."""
         at_once = max(_AT_ONCE // self.displacement.size, 1)
-        known = self._arranged_mask(held)
+        arranged = self._arranged_mask(contact_mask)
         parts = []
         for first in range(0, len(fit), at_once):
             part = fit[first : first + at_once]
-            held_there = None if known is None else np.broadcast_to(known, (len(part), *known.shape))
-            parts.append(self._forces(part, held_there)[0])
+            part_mask = None if arranged is None else np.broadcast_to(arranged, (len(part), *arranged.shape))
+            parts.append(self._forces(part, part_mask)[0])
         return np.concatenate(parts)[:, self.recording, self._sample]
 
-    def forces_and_slopes(self, fit: Floats, held: Mask | None = None) -> tuple[Floats, Floats]:
+    def forces_and_slopes(self, fit: Floats, contact_mask: Mask | None = None) -> tuple[Floats, Floats]:
         """F (points, rows) [N], and its derivatives by the fit coordinates (points, parameters, rows)."""
-        known = self._arranged_mask(held)
-        values, slopes, _ = zip(*(self._differentiated(point, known) for point in fit), strict=True)
+        arranged = self._arranged_mask(contact_mask)
+        values, slopes, _ = zip(*(self._differentiated(point, arranged) for point in fit), strict=True)
         return np.stack(values), np.stack(slopes)
 
-    def _arranged_mask(self, held: Mask | None) -> Mask | None:
-        """Of rows (rows,) as curves (curves, samples)."""
-        if held is None:
+    def _arranged_mask(self, contact_mask: Mask | None) -> Mask | None:
+        """Rows (rows,) as curves (curves, samples)."""
+        if contact_mask is None:
             return None
         arranged = np.zeros(self.displacement.shape, dtype=bool)
-        arranged[self.recording, self._sample] = held
+        arranged[self.recording, self._sample] = contact_mask
         return arranged
 
     def predict(self, fit: Floats) -> Prediction:
@@ -123,48 +122,50 @@ class CurveModel(ABC):
         value, slopes, inside = self._differentiated(np.asarray(fit, dtype=float))
         return Prediction(value, slopes, None, None, None, inside)
 
-    def _forces(self, fit: Floats, held: Mask | None = None) -> tuple[Floats, Mask, Mask]:
-        own, nuisances, _ = self._composition.values(fit, slopes=False)
+    def _forces(self, fit: Floats, contact_mask: Mask | None = None) -> tuple[Floats, Mask, Mask]:
+        values, nuisances, _ = self._composition.values(fit, slopes=False)
         contact = 1e-3 * fit[:, self.contact_points, None]
-        return self._force(self._curve(own, nuisances), contact, held)
+        return self._force(self._curve(values, nuisances), contact, contact_mask)
 
-    def _differentiated(self, fit: Floats, known: Mask | None = None) -> tuple[Floats, Floats, Mask]:
-        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside; `known` (curves,
-        samples) are in contact, where that is given."""
-        middle, held, inside = self._forces(fit[None], None if known is None else known[None])
+    def _differentiated(self, fit: Floats, in_contact: Mask | None = None) -> tuple[Floats, Floats, Mask]:
+        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside.
+
+        `in_contact` (curves, samples): which samples are in contact, where known.
+        """
+        middle, contact_mask, inside = self._forces(fit[None], None if in_contact is None else in_contact[None])
         points = np.tile(fit, (2 * len(self._moved), 1))
-        for number, places in enumerate(self._moved):
-            points[2 * number, places] += self._step[places]
-            points[2 * number + 1, places] -= self._step[places]
-        # On one side alone where the other is out of bounds
+        for number, indices in enumerate(self._moved):
+            points[2 * number, indices] += self._step[indices]
+            points[2 * number + 1, indices] -= self._step[indices]
+        # One-sided where the other side is out of bounds
         points = np.clip(points, np.minimum(self._low, fit), np.maximum(self._high, fit))
-        aside, _, _ = self._forces(points, np.broadcast_to(held, (len(points), *held.shape[1:])))
+        shifted, _, _ = self._forces(points, np.broadcast_to(contact_mask, (len(points), *contact_mask.shape[1:])))
         rows = self.recording, self._sample
         slopes = np.zeros((len(self.parameters), len(self.recording)))
-        for number, places in enumerate(self._moved):
-            change = (aside[2 * number] - aside[2 * number + 1])[rows]
-            way = points[2 * number, places] - points[2 * number + 1, places]
-            if places is self.contact_points:
-                slopes[places[self.recording], np.arange(len(self.recording))] = change / way[self.recording]
+        for number, indices in enumerate(self._moved):
+            change = (shifted[2 * number] - shifted[2 * number + 1])[rows]
+            distance = points[2 * number, indices] - points[2 * number + 1, indices]
+            if indices is self.contact_points:
+                slopes[indices[self.recording], np.arange(len(self.recording))] = change / distance[self.recording]
             else:
-                slopes[places[0]] = change / way[0]
+                slopes[indices[0]] = change / distance[0]
         return middle[0][rows], slopes, inside[0][rows]
 
     def _arranged(self, columns: Sequence[Floats]) -> Floats:
-        """Columns of the curves as one array (curves, samples), each staying at its last value."""
+        """Columns of the curves as one array (curves, samples), padded with their last values."""
         longest = max(map(len, columns))
         return np.stack([np.pad(column, (0, longest - len(column)), mode="edge") for column in columns])
 
 
 def times_of(recording: CurveConditions) -> Floats:
-    """time_s of the samples; their numbers where a recording has none, and no mechanism asks."""
+    """time_s of the samples; their indices where a recording has none."""
     if recording.time_s is None:
         return np.arange(float(len(recording.displacement_mm)))
     return recording.time_s
 
 
 def declared_modulus(youngs_modulus_mpa: float | None) -> float:
-    """What the parameter youngs_modulus multiplies [Pa]: the declared modulus, or 1 MPa."""
+    """The unit of the parameter youngs_modulus [Pa]: the declared modulus, or 1 MPa."""
     return float(to_si("youngs_modulus_mpa", 1.0 if youngs_modulus_mpa is None else youngs_modulus_mpa))
 
 
@@ -175,41 +176,41 @@ _LEAST_STRETCH = 0.02  # of λ: curves that are pressed to 0.15 are left out
 class CompressionModel(CurveModel):
     """The force of compressions under a set of mechanisms.
 
-    Of measured curves, contact points and an undeclared modulus have priors around the base model's own fits. Of
+    For measured curves, contact points and an undeclared modulus have priors around the base model's own fits. For
     conditions alone, contact is around displacement 0 and the modulus must be declared.
     """
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
-        """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
-        recordings = [entry for entry in conditions.recordings if isinstance(entry, CompressionConditions)]
+        """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
+        recordings = [recording for recording in conditions.recordings if isinstance(recording, CompressionConditions)]
         nuisances = _nuisances(recordings, conditions.skin)
         super().__init__(mechanisms, conditions, "compression", recordings, nuisances)
-        self._height = to_si("sample_height_mm", [entry.sample_height_mm for entry in recordings])[:, None]
-        diameter = to_si("sample_diameter_mm", [entry.sample_diameter_mm for entry in recordings])[:, None]
+        self._height = to_si("sample_height_mm", [recording.sample_height_mm for recording in recordings])[:, None]
+        diameter = to_si("sample_diameter_mm", [recording.sample_diameter_mm for recording in recordings])[:, None]
         self._area = np.pi / 4 * diameter**2
         self._shape_factor = diameter / (4 * self._height)
 
-    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
+    def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
         curve = Curve(modulus=modulus, poisson_ratio=constant(INCOMPRESSIBLE, 0, modulus.value.shape[:-1]))
         for mechanism in self._mechanisms:
-            mechanism.on_curve(curve, own[mechanism.name])
+            mechanism.on_curve(curve, values[mechanism.name])
         return curve
 
-    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         strain = (self.displacement - contact) / self._height
         force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
         relaxation = curve.prony_pairs
         if relaxation is not None:
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
-        every = np.ones(force.shape, dtype=bool)
-        return force, every, every
+        all_samples = np.ones(force.shape, dtype=bool)
+        return force, all_samples, all_samples
 
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
         """Nominal stress over E, compression positive.
 
-        Neo-Hookean, (λ⁻² − λ)/3; what stiffens has that times 1 + 2 c2 J + 3 c3 J², J = 3 (I/3)^(m/2), I = I1 − 3:
-        Yeoh's law at m = 2.
+        Neo-Hookean, (λ⁻² − λ)/3; with stiffening times 1 + 2 c2 J + 3 c3 J², J = 3 (I/3)^(m/2), I = I1 − 3: Yeoh's
+        law at m = 2.
         """
         stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
         stress = (1.0 / (stretch * stretch) - stretch) / 3.0
@@ -224,19 +225,19 @@ class CompressionModel(CurveModel):
 
 
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:
-    """The nuisances' parameters; raises InvalidInput where a measured curve does not load."""
+    """The nuisance parameters; raises InvalidInput where a measured curve does not load."""
     estimates, points = [], []
-    for entry in recordings:
-        height = float(to_si("sample_height_mm", entry.sample_height_mm))
-        begins = 0.0
-        if isinstance(entry, CompressionRecording):
+    for recording in recordings:
+        height = float(to_si("sample_height_mm", recording.sample_height_mm))
+        contact = 0.0
+        if isinstance(recording, CompressionRecording):
             try:
-                estimates.append(of_compression(entry).modulus)
+                estimates.append(of_compression(recording).modulus)
             except InvalidInput as refusal:
-                raise refusal.at(f"recordings[{entry.id}].{refusal.field}") from refusal
-            unloaded = int(np.abs(entry.force_n).argmin())
-            begins = float(to_si("displacement_mm", entry.displacement_mm[unloaded]))
+                raise refusal.at(f"recordings[{recording.id}].{refusal.field}") from refusal
+            unloaded = int(np.abs(recording.force_n).argmin())
+            contact = float(to_si("displacement_mm", recording.displacement_mm[unloaded]))
         else:
             required_modulus(skin)
-        points.append(contact_point(entry.id, begins, _CONTACT_SD * height, _CONTACT_BOUND * height))
+        points.append(contact_point(recording.id, contact, _CONTACT_SD * height, _CONTACT_BOUND * height))
     return [modulus_parameter(skin, estimates), *points]

@@ -1,22 +1,16 @@
-"""FRFs of one set of mechanisms, or of several sets at once.
+"""The FRF of recordings under a set of mechanisms, for one set or several at once.
 
-Values of parameters at points of several models, whose parameters have different places in their fit coordinates.
-
-Points of one or several FRF models of the same conditions, evaluated at once.
-
-Models differ in their mechanisms, and share most of what costs time: contacts, places, the table. Points whose models
-press the same contacts are worked out as one array, as far as what presses them has the same structure (sphere on the
-half space or on the layer, with or without adhesion, a glue line). The hook of a mechanism is called once for all
-points whose models have it. The derivatives of a point are those by its own model's parameters, in their order.
-
-The FRF of recordings under a set of mechanisms.
-
-Base model: Hertz' radius on a half space, the contact edge still, σ of the bonded finite-strain layer averaged over the
+Base model: Hertz' radius on a half space, a fixed contact edge, σ of the bonded finite-strain layer averaged over the
 sensor's disc at its offset; FRF = d33 · (3/2) ρ² σ (Seminara 2018, equations 7 to 16). The stages, in this order:
 
 declared values → material → contact radius and pressure → position → σ → increment with the load → d33 of each
 sensor under its own stress → neighbours' charge → ageing → dynamics of tip, sensor and electronics, line by line.
-Pick-up stands beside, as a covariance.
+Pick-up is a covariance.
+
+Models of the same conditions share contacts, positions and the table, which take most of the time. Points whose
+models press the same contacts are computed as one array, as far as their contacts have the same structure (sphere on
+half space or layer, with or without adhesion, a glue line). The hook of a mechanism is called once for all points
+whose models have it. The derivatives of a point are those by its own model's parameters, in their order.
 """
 
 from __future__ import annotations
@@ -56,12 +50,12 @@ from underskin.units import Array, Floats, Indices, Mask, to_si
 class ParameterBatch:
     """Points of fit coordinates as values in their units, with derivatives by each point's own coordinates.
 
-    Attributes: `owner`, which model each point is of; `variables`, by how many the derivatives are; `position`, two
-    further variables of value 0, or none.
+    Attributes: `owner`, the model of each point; `variables`, the number of derivatives; `position`, two further
+    variables of value 0, or none.
     """
 
     def __init__(self, fit: Floats, log: Mask, owner: Indices, *, slopes: bool, further: int) -> None:
-        """`log` says which coordinates (points, parameters) are logarithms; without `slopes`, derivatives are by the
+        """`log`: which coordinates (points, parameters) are logarithms; without `slopes`, derivatives are by the
         `further` variables alone."""
         self.owner = owner
         self._value = np.where(log, np.exp(np.where(log, fit, 0.0)), fit)
@@ -70,56 +64,60 @@ class ParameterBatch:
         count = fit.shape[1] if slopes else 0
         self.variables = count + further
         self.position = []
-        for place in range(count, self.variables):
-            by_place = np.zeros((self.variables, 1, 1))
-            by_place[place] = 1.0
-            self.position.append(Differentiated(np.zeros((1, 1)), by_place))
+        for index in range(count, self.variables):
+            seed = np.zeros((self.variables, 1, 1))
+            seed[index] = 1.0
+            self.position.append(Differentiated(np.zeros((1, 1)), seed))
 
-    def of(self, points: Indices, places: Indices) -> Differentiated:
-        """The parameters that are at these places of each model, at some of the points: (points, 1)."""
-        place = places[self.owner[points]]
+    def of(self, points: Indices, indices: Indices) -> Differentiated:
+        """The parameters at these indices of each model, for some of the points: (points, 1)."""
+        columns = indices[self.owner[points]]
         slopes = np.zeros((self.variables, len(points), 1))
         if self._slopes:
-            slopes[place, np.arange(len(points)), 0] = self._slope[points, place]
-        return Differentiated(self._value[points, place][:, None], slopes)
+            slopes[columns, np.arange(len(points)), 0] = self._slope[points, columns]
+        return Differentiated(self._value[points, columns][:, None], slopes)
 
 
 class MechanismInModels:
-    """A mechanism with certain parameters, in those of several models that have it. Attribute: `has` (models,)."""
+    """A mechanism with its parameters' indices in several models. Attribute: `has` (models,), which models hold it."""
 
     def __init__(self, mechanism: Mechanism, parameters: Mapping[str, Parameter], models: int) -> None:
-        """In none of so many models yet."""
+        """Start with no model."""
         self.mechanism = mechanism
         self.has = np.zeros(models, dtype=bool)
-        self._places = {name: np.zeros(models, dtype=np.intp) for name in parameters}
-        self._relative = [(name, entry.relative_to) for name, entry in parameters.items() if entry.relative_to]
+        self._indices = {name: np.zeros(models, dtype=np.intp) for name in parameters}
+        self._relative = [
+            (name, parameter.relative_to) for name, parameter in parameters.items() if parameter.relative_to
+        ]
         self._hooks = _overridden(type(mechanism))
 
-    def add(self, model: int, places: Mapping[str, int]) -> None:
-        """Note that a model has it, its parameters at these places."""
+    def add(self, model: int, indices: Mapping[str, int]) -> None:
+        """Record that a model has it, with its parameters at these indices."""
         self.has[model] = True
-        for name, place in places.items():
-            self._places[name][model] = place
+        for name, index in indices.items():
+            self._indices[name][model] = index
 
-    def on(self, *hooks: str) -> bool:
-        """Whether it has one of these hooks."""
+    def has_hook(self, *hooks: str) -> bool:
+        """Whether it overrides one of these hooks."""
         return not self._hooks.isdisjoint(hooks)
 
     def values(self, points: Indices, seeds: ParameterBatch) -> Values:
         """Its parameters in their units at points whose models have it."""
-        values = {name: seeds.of(points, places) for name, places in self._places.items()}
+        values = {name: seeds.of(points, indices) for name, indices in self._indices.items()}
         for name, other in self._relative:
             values[name] = values[name] * values[other]
         return values
 
 
-_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # what each class has of its own
+_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # the hooks that each class overrides
 
 
-def _overridden(own: type[Mechanism]) -> frozenset[str]:
-    if own not in _HOOKS:
-        _HOOKS[own] = frozenset(name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name))
-    return _HOOKS[own]
+def _overridden(mechanism_type: type[Mechanism]) -> frozenset[str]:
+    if mechanism_type not in _HOOKS:
+        _HOOKS[mechanism_type] = frozenset(
+            name for name in dir(Mechanism) if getattr(mechanism_type, name) is not getattr(Mechanism, name)
+        )
+    return _HOOKS[mechanism_type]
 
 
 _POSITION = 2  # two more variables: the contact's x and y
@@ -132,34 +130,35 @@ class FrfModels:
     """Several models of the same conditions and skin."""
 
     def __init__(self, models: Sequence[FrfModel]) -> None:
-        """Note which of them have which mechanism, and which press the same contacts."""
+        """Find which models have which mechanism, and which press the same contacts."""
         self._models = tuple(models)
         self._count = max(len(model.parameters) for model in models)
         self._log = np.zeros((len(models), self._count), dtype=bool)
-        self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].places_of_nuisances}
+        self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].nuisance_indices}
         mechanisms: dict[Hashable, MechanismInModels] = {}
         self._alike: dict[Hashable, list[int]] = {}
         for number, model in enumerate(models):
-            self._log[number, : len(model.parameters)] = [entry.scale == "log" for entry in model.parameters]
-            for name, place in model.places_of_nuisances.items():
-                self._nuisances[name][number] = place
+            self._log[number, : len(model.parameters)] = [parameter.scale == "log" for parameter in model.parameters]
+            for name, index in model.nuisance_indices.items():
+                self._nuisances[name][number] = index
             for mechanism in model.mechanisms:
-                places = model.places_of(mechanism)
-                key = mechanism.name, tuple(places)
+                indices = model.parameter_indices(mechanism)
+                key = mechanism.name, tuple(indices)
                 if key not in mechanisms:
                     mechanisms[key] = MechanismInModels(
-                        mechanism, {name: model.parameters[at] for name, at in places.items()}, len(models)
+                        mechanism, {name: model.parameters[column] for name, column in indices.items()}, len(models)
                     )
-                mechanisms[key].add(number, places)
+                mechanisms[key].add(number, indices)
             self._alike.setdefault(model.structure, []).append(number)
-        self._mechanisms = sorted(mechanisms.values(), key=_place_in_order)
+        self._mechanisms = sorted(mechanisms.values(), key=_composition_order)
         self._with_hook: dict[str, list[MechanismInModels]] = {}
 
     def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
-        """The responses at points (points, parameters) of these models, in rising order of `owner`; each part holds
-        some of them. Fit coordinates beyond those of a point's own model do not count.
+        """The responses at points (points, parameters) of these models, in rising order of `owner`, in parts of some
+        points.
 
-        Derivatives by the parameters and by the contact's place on request; without `lines`, no line factors.
+        Fit coordinates beyond those of a point's own model are ignored. `slopes`: derivatives by the parameters;
+        `place`: by the contact's position; without `lines`, no line factors.
         """
         seeds = ParameterBatch(fit, self._log[owner], owner, slopes=slopes, further=_POSITION if place else 0)
         edges = np.searchsorted(owner, np.arange(len(self._models) + 1))
@@ -175,65 +174,66 @@ class FrfModels:
         return parts
 
     def _pressed(self, rows: dict[int, Indices], seeds: ParameterBatch) -> list[tuple[Indices, Contacts]]:
-        """The contacts of these models' points as declared and as their mechanisms change them, those of one structure
-        together."""
+        """The contacts of these models' points, declared values changed by the mechanisms, grouped by structure."""
         sets: dict[tuple[MechanismInModels, ...], list[int]] = {}
         for number in rows:
-            key = tuple(entry for entry in self._mechanisms if entry.has[number] and entry.on(*_MATERIAL))
+            key = tuple(
+                candidate for candidate in self._mechanisms if candidate.has[number] and candidate.has_hook(*_MATERIAL)
+            )
             sets.setdefault(key, []).append(number)
-        alike: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
+        groups: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
         for acting, numbers in sets.items():
             points = np.concatenate([rows[number] for number in numbers])
             contacts = self._contacts(self._models[numbers[0]], points, seeds)
-            own = [(entry.mechanism, entry.values(points, seeds)) for entry in acting]
-            for mechanism, values in own:
+            acting_values = [(candidate.mechanism, candidate.values(points, seeds)) for candidate in acting]
+            for mechanism, values in acting_values:
                 mechanism.on_declared(contacts, values)
-            for mechanism, values in own:
+            for mechanism, values in acting_values:
                 mechanism.on_material(contacts, values)
             needs_layer = contacts.layered or self._models[numbers[0]].needs_stiffness
-            for some, part in _of_one_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
+            for subset, part in _split_by_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
                 layer = layer_of(part) if needs_layer else as_in_the_table(part)
                 structure = part.layered, *(x is None for x in (part.slip, part.work_of_adhesion, part.relaxed)), layer
-                alike.setdefault(structure, []).append((points[some], part))
+                groups.setdefault(structure, []).append((points[subset], part))
         return [
             (np.concatenate([points for points, _ in group]), Contacts.stacked([part for _, part in group], lengths))
-            for group in alike.values()
+            for group in groups.values()
             for lengths in ([len(points) for points, _ in group],)
         ]
 
     def _contacts(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Contacts:
-        """The contacts at all force nodes, one node after another, as declared."""
+        """The declared contacts at all force nodes, one node after another."""
         nodes, design = len(model.force), model.design
-        of = {name: seeds.of(points, places) for name, places in self._nuisances.items() if name != "d33"}
+        factors = {name: seeds.of(points, indices) for name, indices in self._nuisances.items() if name != "d33"}
         return Contacts(
             force=model.force.ravel(),
             indenter_radius=np.tile(design.indenter_radius, nodes),
             dwell=np.tile(design.dwell, nodes),
-            modulus=model.modulus * of["youngs_modulus"],
-            thickness=model.thickness * of["thickness"],
+            modulus=model.modulus * factors["youngs_modulus"],
+            thickness=model.thickness * factors["thickness"],
             poisson_ratio=constant(model.poisson_ratio, seeds.variables, (len(points),)),
         )
 
     def _acting(
         self, hook: str, points: Indices, seeds: ParameterBatch
     ) -> Iterator[tuple[Mechanism, Indices | None, Values]]:
-        """The mechanisms with this hook: each with those among the points whose models have it, None where all have,
-        and their values."""
+        """The mechanisms with this hook, each with the indices of the points whose models have it (None: all) and
+        their values."""
         if hook not in self._with_hook:
-            self._with_hook[hook] = [entry for entry in self._mechanisms if entry.on(hook)]
+            self._with_hook[hook] = [candidate for candidate in self._mechanisms if candidate.has_hook(hook)]
         owner = seeds.owner[points]
-        for entry in self._with_hook[hook]:
-            some = np.flatnonzero(entry.has[owner])
-            if len(some) == len(points):
-                yield entry.mechanism, None, entry.values(points, seeds)
-            elif len(some):
-                yield entry.mechanism, some, entry.values(points[some], seeds)
+        for candidate in self._with_hook[hook]:
+            subset = np.flatnonzero(candidate.has[owner])
+            if len(subset) == len(points):
+                yield candidate.mechanism, None, candidate.values(points, seeds)
+            elif len(subset):
+                yield candidate.mechanism, subset, candidate.values(points[subset], seeds)
 
     def _level_and_inside(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> tuple[Differentiated, Mask]:
-        """The FRF before the dynamics [C/N] and which recordings are inside the table, at points whose contacts have
-        one structure; `model` is one of theirs."""
+        """The FRF before the dynamics [C/N], and which recordings are inside the table, at points of one contact
+        structure; `model` is one of their models."""
         sigma, inside = self._sigma_at_points(model, points, contacts, seeds)
         level = self._level(model, points, contacts, sigma, seeds).spread(len(model.design.point))
         return level, np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, model.design.point]
@@ -241,27 +241,29 @@ class FrfModels:
     def _sigma_at_points(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> tuple[list[Differentiated], Mask]:
-        """σ of each place at each force node, and which places are inside the table at all of them.
+        """σ at each position for each force node, and which positions are inside the table at all of them.
 
-        Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
+        Inside includes that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
         """
         design, table = model.design, model.sigma
         if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
             of_contacts = self._of_pressed(model, contacts)
         else:
             of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
-        nodes, places = len(model.force), len(design.point_contact)
+        nodes, positions = len(model.force), len(design.point_contact)
         contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
         offset = self._offset(model, points, seeds) / contacts.thickness
-        every = np.tile(np.arange(places), nodes)
-        sigma = of_contacts.at(contact, offset.spread(places)[every] if nodes > 1 else offset)
+        repeated = np.tile(np.arange(positions), nodes)
+        sigma = of_contacts.at(contact, offset.spread(positions)[repeated] if nodes > 1 else offset)
         near = (offset.value <= table.end) & (offset.value + of_contacts.rho.value <= PROFILE_END)
-        reached = of_contacts.inside[..., contact]
-        inside = near & reached.reshape(*reached.shape[:-1], nodes, places).all(axis=-2)
-        return [sigma[places * node : places * (node + 1)] for node in range(nodes)] if nodes > 1 else [sigma], inside
+        contact_inside = of_contacts.inside[..., contact]
+        inside = near & contact_inside.reshape(*contact_inside.shape[:-1], nodes, positions).all(axis=-2)
+        return [sigma[positions * node : positions * (node + 1)] for node in range(nodes)] if nodes > 1 else [
+            sigma
+        ], inside
 
     def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
-        """σ of contacts that the table is not of, or whose stiffness is asked for."""
+        """σ of contacts other than the table's, or whose stiffness is needed."""
         table = model.sigma
         layer = None
         if contacts.layered or model.needs_stiffness:
@@ -272,20 +274,25 @@ class FrfModels:
         return SigmaOfContacts(table, contacts, model.sensor_radius, pressed, layer if contacts.layered else None)
 
     def _offset(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Differentiated:
-        """The distance of each place's contact from its sensor's centre [m], where positions vary, with them."""
+        """The distance of each contact from its sensor's centre [m], with derivatives by position where it varies."""
         design = model.design
-        moved = [(some, mechanism.offset(values)) for mechanism, some, values in self._acting("offset", points, seeds)]
+        moved = [
+            (subset, mechanism.offset(values)) for mechanism, subset, values in self._acting("offset", points, seeds)
+        ]
         if not (seeds.position or moved):
             distance = np.tile(np.hypot(design.point_x, design.point_y), (len(points), 1))
             return Differentiated(distance, np.zeros((seeds.variables, *distance.shape)))
         still = constant(0.0, seeds.variables, (len(points),))
         x, y = (
-            own + shift
-            for own, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
+            coordinate + shift
+            for coordinate, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
         )
-        for some, shift in moved:
+        for subset, shift in moved:
             if shift is not None:
-                x, y = (place.plus(by, some, len(points)) for place, by in zip((x, y), shift, strict=True))
+                x, y = (
+                    coordinate.plus(displacement, subset, len(points))
+                    for coordinate, displacement in zip((x, y), shift, strict=True)
+                )
         distance = np.hypot(x.value, y.value)
         away = np.where(distance > 0, distance, 1.0)
         return chain(distance, (x.value / away, x), (y.value / away, y))
@@ -295,67 +302,67 @@ class FrfModels:
     ) -> Differentiated:
         """The FRF of each recording before the dynamics [C/N]."""
         design, count = model.design, len(points)
-        own = {mechanism.name: values for mechanism, _, values in self._acting("mobility", points, seeds)}
+        mobility_values = {mechanism.name: values for mechanism, _, values in self._acting("mobility", points, seeds)}
         oscillating = sigma[0]
         for mechanism, nodes, weights in model.increments:
             rate = sigma[nodes[0]] * weights[0][design.point_contact]
             for node, weight in zip(nodes[1:], weights[1:], strict=True):
                 rate = rate + sigma[node] * weight[design.point_contact]
-            oscillating = oscillating + mechanism.mobility(own[mechanism.name]) * (rate - oscillating)
+            oscillating = oscillating + mechanism.mobility(mobility_values[mechanism.name]) * (rate - oscillating)
         rho = model.sensor_radius / contacts.thickness
         charge = oscillating * (1.5e-12 * seeds.of(points, self._nuisances["d33"]) * rho * rho)
-        for mechanism, some, values in self._acting("on_d33", points, seeds):
+        for mechanism, subset, values in self._acting("on_d33", points, seeds):
             mean_stress = sigma[0] * (1.5 / np.pi * design.force[design.point_contact]) / (contacts.thickness**2.0)
-            charge = charge.times(mechanism.on_d33(mean_stress.at_points(some), values), some, count)
+            charge = charge.times(mechanism.on_d33(mean_stress.at_points(subset), values), subset, count)
         level = charge[design.point]
-        for mechanism, some, values in self._acting("neighbour_fraction", points, seeds):
+        for mechanism, subset, values in self._acting("neighbour_fraction", points, seeds):
             fraction = mechanism.neighbour_fraction(values)
             if fraction is not None:
-                neighbours = charge.at_points(some)[design.neighbour_point]
+                neighbours = charge.at_points(subset)[design.neighbour_point]
                 theirs = fraction * sum_rows(neighbours, design.neighbour_recording, len(design.point))
-                level = level.plus(theirs, some, count)
-        for mechanism, some, values in self._acting("on_recordings", points, seeds):
-            level = level.times(mechanism.on_recordings(design, values), some, count)
+                level = level.plus(theirs, subset, count)
+        for mechanism, subset, values in self._acting("on_recordings", points, seeds):
+            level = level.times(mechanism.on_recordings(design, values), subset, count)
         return level
 
     def _line_factor(
         self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> Differentiated | None:
-        """The complex factor of each distinct line; None where no mechanism has one."""
+        """The complex factor of each distinct line; None without any such mechanism."""
         product: Differentiated | None = None
         count, lines = len(points), len(model.design.line_frequency)
-        for mechanism, some, values in self._acting("on_lines", points, seeds):
-            factor = mechanism.on_lines(model.design, contacts.at_points(some), values)
-            if product is None and some is None:
+        for mechanism, subset, values in self._acting("on_lines", points, seeds):
+            factor = mechanism.on_lines(model.design, contacts.at_points(subset), values)
+            if product is None and subset is None:
                 product = factor
             elif factor is not None:
-                one = (
+                base = (
                     constant(np.ones(1, dtype=complex), seeds.variables, (count,)).spread(lines)
                     if product is None
                     else product
                 )
-                product = one.times(factor, some, count)
+                product = base.times(factor, subset, count)
         return product
 
 
 def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: ParameterBatch) -> Response:
-    """With the derivatives by the contact's place apart from the others."""
-    count, place = seeds.variables - len(seeds.position), None
+    """The response, with the derivatives by the contact's position separate from the others."""
+    count, position_slopes = seeds.variables - len(seeds.position), None
     if seeds.position:
-        place = level.slopes[count:]
+        position_slopes = level.slopes[count:]
     if lines is not None:
         lines = Differentiated(lines.value, lines.slopes[:count])
-    return Response(Differentiated(level.value, level.slopes[:count]), place, lines, inside)
+    return Response(Differentiated(level.value, level.slopes[:count]), position_slopes, lines, inside)
 
 
-def _place_in_order(entry: MechanismInModels) -> tuple[int, int, str]:
-    """Of composition."""
-    mechanism = entry.mechanism
-    return mechanism.stage.place, mechanism.order, mechanism.name
+def _composition_order(candidate: MechanismInModels) -> tuple[int, int, str]:
+    """The sort key of the order of composition."""
+    mechanism = candidate.mechanism
+    return mechanism.stage.position, mechanism.order, mechanism.name
 
 
-def _of_one_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
-    """The points' contacts, such that all of a part are on the same linear layer."""
+def _split_by_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
+    """The points' contacts in parts, each on one linear layer."""
     layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
     if all(bool((value == value.flat[0]).all()) for value in layers):
         return [(slice(None), contacts)]
@@ -378,9 +385,12 @@ class FrfModel:
         mechanisms: Sequence[Mechanism],
         conditions: Conditions,
         table: SigmaTable,
-        beside: Sequence[Mechanism] = (),
+        further_mechanisms: Sequence[Mechanism] = (),
     ) -> None:
-        """Work out everything that no parameter changes; σ with room for the mechanisms `beside` as well."""
+        """Compute all that no parameter changes.
+
+        `further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well.
+        """
         self._composition = Composition(mechanisms, conditions, "frf", frf_nuisances(conditions.skin))
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
@@ -396,12 +406,14 @@ class FrfModel:
         self.thickness = _required("thickness_mm", skin.thickness_mm)
         self.sensor_radius = _required("sensor_radius_mm", skin.sensor_radius_mm)
         self.poisson_ratio = skin.poisson_ratio
-        room = (*mechanisms, *beside)
+        room = (*mechanisms, *further_mechanisms)
         further = max((mechanism.largest_offset for mechanism in room), default=0.0)
-        bounds = max(max(1 / entry.low, entry.high) for entry in self.parameters if entry.name == "thickness")
+        bounds = max(
+            max(1 / parameter.low, parameter.high) for parameter in self.parameters if parameter.name == "thickness"
+        )
         stretch = _ROOM * bounds * max((mechanism.largest_stretch for mechanism in room), default=1.0)
-        reached = min(PROFILE_END, stretch * largest_offset(design, further) / self.thickness)
-        self.sigma = offset_sigma(table, self.sensor_radius / self.thickness, stretch, reached)
+        offset_range = min(PROFILE_END, stretch * largest_offset(design, further) / self.thickness)
+        self.sigma = offset_sigma(table, self.sensor_radius / self.thickness, stretch, offset_range)
         self.needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
         pickups = [mechanism.pickup(conditions, design) for mechanism in self.mechanisms]
         self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
@@ -435,7 +447,7 @@ class FrfModel:
         fit = np.asarray(fit, dtype=float)
         if fit.ndim != 1:
             raise InvalidInput("fit", fit.shape, "must be one point: (parameters,)", code=ErrorCode.UNEQUAL_LENGTHS)
-        own, _, _ = self._composition.values(fit)
+        values, _, _ = self._composition.values(fit)
         response = self.respond(fit, slopes=slopes, place=place)
         value, by_all = response.on_rows(self.design)
         count = len(response.level.slopes)
@@ -443,13 +455,14 @@ class FrfModel:
             value=value,
             slopes=by_all[:count],
             position_slopes=by_all[count:] if place else None,
-            pickup=None if self.pickup is None else self.pickup.on_rows(self.pickup.deviation(_by_name(own))),
+            pickup=None if self.pickup is None else self.pickup.on_rows(self.pickup.deviation(_by_name(values))),
             pickup_rows=None if self.pickup is None else self.pickup.rows,
             inside=response.inside[self.recording],
         )
 
     def relative_place_slopes(self, fit: Floats) -> Floats:
-        """∇m/m of each recording over its contact's place [1/m] (2, recordings) at one point; 0 of what is faint."""
+        """∇m/m of each recording by its contact's position [1/m] (2, recordings) at one point; 0 where the response
+        is faint."""
         response = self.respond(fit, slopes=False, place=True)
         assert response.place_slopes is not None
         value = response.level.value
@@ -463,28 +476,28 @@ class FrfModel:
             yield response.part(point).on_rows(self.design)[0]
 
     def numbers(self, variables: int) -> int:
-        """How many numbers the largest arrays of a response with derivatives by so many variables take, roughly: bounds
-        the points that are worked out at once."""
+        """The approximate size of a response's largest arrays with derivatives by `variables`: limits the points
+        computed at once."""
         contacts, lines = len(self.force.ravel()), len(self.design.line_frequency)
         return _QUANTITIES * contacts * self.sigma.wavenumbers + 2 * (1 + variables) * lines
 
     @property
     def structure(self) -> Hashable:
-        """The same for models that press the same contacts and need the same of them."""
+        """A key that is equal for models that press the same contacts and need the same quantities of them."""
         increments = tuple(mechanism.name for mechanism, _, _ in self.increments)
         return self.design, self.sigma, self.needs_stiffness, increments
 
     @property
-    def places_of_nuisances(self) -> Mapping[str, int]:
-        """Where in the fit coordinates d33 and the factors on the declared modulus and thickness are."""
+    def nuisance_indices(self) -> Mapping[str, int]:
+        """Indices in the fit coordinates of d33 and of the factors on the declared modulus and thickness."""
         return self._composition.nuisances
 
-    def places_of(self, mechanism: Mechanism) -> Mapping[str, int]:
-        """Where in the fit coordinates a mechanism's parameters are, by their names."""
-        return self._composition.places[mechanism.name]
+    def parameter_indices(self, mechanism: Mechanism) -> Mapping[str, int]:
+        """Indices in the fit coordinates of a mechanism's parameters, by their names."""
+        return self._composition.indices[mechanism.name]
 
     def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:
-        """The response at points (…, parameters); its derivatives by the parameters and by the contact's place on
+        """The response at points (…, parameters); its derivatives by the parameters and by the contact's position on
         request."""
         several = np.atleast_2d(fit)
         owner = np.zeros(len(several), dtype=np.intp)
@@ -493,7 +506,7 @@ class FrfModel:
         return response if fit.ndim > 1 else response.part(0)
 
     def _declared_inside(self, table: SigmaTable) -> Mask:
-        """Which points lie inside the table as declared."""
+        """Which points are inside the table for the declared values."""
         none = np.zeros((0, 1))
         modulus, thickness, poisson_ratio = (
             Differentiated(np.array([v]), none) for v in (self.modulus, self.thickness, self.poisson_ratio)
@@ -511,7 +524,8 @@ class FrfModel:
 def _force_nodes(
     mechanisms: Sequence[Mechanism], design: FrfDesign
 ) -> tuple[Floats, list[tuple[Mechanism, list[int], Array]]]:
-    """Forces (nodes, contacts), the preload first, and for each mechanism that asks its nodes and their weights."""
+    """Forces (nodes, contacts), the preload first, and for each mechanism with `force_nodes` its nodes and their
+    weights."""
     forces = [design.force]
     increments = []
     for mechanism in mechanisms:
@@ -522,9 +536,9 @@ def _force_nodes(
     return np.stack(forces), increments
 
 
-def _by_name(own: dict[str, Values]) -> dict[str, Floats]:
-    """The mechanisms' parameters (1,), whosever they are."""
-    return {name: value.value for values in own.values() for name, value in values.items()}
+def _by_name(values_by_mechanism: dict[str, Values]) -> dict[str, Floats]:
+    """The parameters (1,) of all mechanisms by name."""
+    return {name: value.value for values in values_by_mechanism.values() for name, value in values.items()}
 
 
 def _required(name: str, value: float | None) -> float:

@@ -1,13 +1,9 @@
-"""The lines of FRFs and where they were recorded, and what is predicted on them.
+"""The design of FRF recordings and the response on it: all that no parameter changes, computed once.
 
-Charge that comes from elsewhere than the skin: random on each row, so it moves the covariance and not the mean.
-
-What the conditions of FRF recordings amount to for a model, worked out once: everything that no parameter changes.
-
-Recordings share contacts (sphere, preload and what else a mechanism asks for), contacts at one place beside a sensor
-are points, and a contact at one frequency is a line. Only these distinct ones are computed.
-
-What a model of FRFs answers before it is spread over rows: a level for each recording, a factor for each line.
+Recordings share contacts (sphere, preload and further fields that a mechanism reads); a contact at one offset from a
+sensor is a point, and a contact at one frequency is a line. Only distinct ones are computed. A response is a level
+for each recording and a factor for each line. Pick-up is charge from other sources: random on each row, it changes
+the covariance and not the mean.
 """
 
 import weakref
@@ -26,10 +22,10 @@ from underskin.weak_cache import cached_while_alive
 
 @dataclass(frozen=True, eq=False)
 class Pickup:
-    """`deviation`: of real and of imaginary part on these rows [C/N], from the parameters by name in their units.
+    """`deviation`: sd of real and of imaginary part on these rows [C/N], from the parameters by name in their units.
 
-    Parameters (…, 1) give (…, rows); where rows are `alike` (rows,), they give (…, distinct), of which each row has the
-    one named there.
+    Parameters (…, 1) give (…, rows); with `alike` (rows,) they give (…, distinct), and `alike` is the index of each
+    row's value.
     """
 
     rows: Indices
@@ -37,21 +33,21 @@ class Pickup:
     alike: Indices | None = None
 
     def on_rows(self, distinct: Floats) -> Floats:
-        """Deviations as `deviation` gives them (…, distinct), on the rows (…, rows)."""
+        """Deviations (…, distinct) expanded to the rows (…, rows)."""
         return distinct if self.alike is None else distinct[..., self.alike]
 
 
 def together(pickups: Sequence[Pickup]) -> Pickup | None:
-    """Independent charges as one: their variances add on the rows that several reach; None where there is none."""
+    """Independent charges combined: variances add on common rows; None for no charge."""
     if len(pickups) < 2:
         return pickups[0] if pickups else None
     rows = np.unique(np.concatenate([pickup.rows for pickup in pickups]))
 
     def deviation(values: Mapping[str, Floats]) -> Floats:
-        each = [(np.searchsorted(rows, pickup.rows), pickup.on_rows(pickup.deviation(values))) for pickup in pickups]
-        variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in each)), len(rows)))
-        for places, sd in each:
-            variance[..., places] += sd**2
+        parts = [(np.searchsorted(rows, pickup.rows), pickup.on_rows(pickup.deviation(values))) for pickup in pickups]
+        variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in parts)), len(rows)))
+        for columns, sd in parts:
+            variance[..., columns] += sd**2
         return np.sqrt(variance)
 
     return Pickup(rows, deviation)
@@ -65,25 +61,27 @@ class FrfDesign:
     """Arrays over recordings, contacts, points, neighbours, lines and rows; SI."""
 
     def __init__(self, conditions: Conditions, fields: Collection[str], neighbours: bool) -> None:
-        """`fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n", "id" (every recording)."""
+        """`fields`: what else distinguishes contacts: "dwell_s", "dynamic_force_n", "id" (every recording)."""
         recordings = frf_of(conditions)
         count = len(recordings)
         self._conditions = weakref.ref(conditions)  # which keep the design in a cache
-        self.ids = tuple(entry.id for entry in recordings)
+        self.ids = tuple(recording.id for recording in recordings)
         number = {sensor.id: index for index, sensor in enumerate(conditions.skin.sensors)}
-        places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
+        sensor_positions = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
         # Of each recording
-        self.sensor: Indices = np.array([number[entry.sensor] for entry in recordings])
-        cycles = [np.nan if entry.load_cycles is None else entry.load_cycles for entry in recordings]
+        self.sensor: Indices = np.array([number[recording.sensor] for recording in recordings])
+        cycles = [np.nan if recording.load_cycles is None else recording.load_cycles for recording in recordings]
         self.load_cycles: Floats = np.array(cycles)
         position = np.array(
             [
-                places[own] if entry.position_mm is None else to_si("thickness_mm", entry.position_mm)
-                for own, entry in zip(self.sensor, recordings, strict=True)
+                sensor_positions[sensor_index]
+                if recording.position_mm is None
+                else to_si("thickness_mm", recording.position_mm)
+                for sensor_index, recording in zip(self.sensor, recordings, strict=True)
             ]
         )
-        # Of each contact; the dynamic force and the dwell are 0 where no mechanism asks
-        keys = np.array([_contact_key(entry, fields) for entry in recordings])
+        # Of each contact; dynamic force and dwell are 0 where no mechanism reads them
+        keys = np.array([_contact_key(recording, fields) for recording in recordings])
         if "id" in fields:
             keys = np.column_stack([keys, np.arange(count)])
         contacts, first, contact = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -91,28 +89,34 @@ class FrfDesign:
         self.force, self.indenter_radius, self.dynamic_force, self.dwell = contacts.T[:4]
         # Of each point: its contact, and that contact's place seen from the sensor's centre; of each recording its
         # point beside its own sensor; of each pair of a recording and a neighbour of its sensor both
-        pairs = _neighbours(places) if neighbours else np.zeros((len(places), len(places)), dtype=bool)
+        pairs = (
+            _neighbours(sensor_positions)
+            if neighbours
+            else np.zeros((len(sensor_positions), len(sensor_positions)), dtype=bool)
+        )
         self.neighbour_recording, other = np.nonzero(pairs[self.sensor])
-        every = np.concatenate([np.arange(count), self.neighbour_recording])
-        beside = position[every] - places[np.concatenate([self.sensor, other])]
-        points, point = np.unique(np.column_stack([contact[every], np.round(beside, 12)]), axis=0, return_inverse=True)
+        pair_recording = np.concatenate([np.arange(count), self.neighbour_recording])
+        offset = position[pair_recording] - sensor_positions[np.concatenate([self.sensor, other])]
+        points, point = np.unique(
+            np.column_stack([contact[pair_recording], np.round(offset, 12)]), axis=0, return_inverse=True
+        )
         self.point_contact: Indices = points[:, 0].astype(np.intp)
         self.point_x, self.point_y = points[:, 1], points[:, 2]
         self.point, self.neighbour_point = point[:count], point[count:]
         # Of each row, and of each distinct line
-        lines_hz = [frequencies(entry) for entry in recordings]
+        lines_hz = [frequencies(recording) for recording in recordings]
         self.recording: Indices = np.repeat(np.arange(count), [len(column) for column in lines_hz])
-        self._dynamic_forces = np.array([entry.dynamic_force_n for entry in recordings])
+        self._dynamic_forces = np.array([recording.dynamic_force_n for recording in recordings])
         distinct, frequency = _distinct(lines_hz)
         self.line: Indices
-        own_line = contact[self.recording] * len(distinct) + frequency
-        if len(contacts) * len(distinct) > _SPARSE * len(own_line):
-            lines, self.line = np.unique(own_line, return_inverse=True)
+        line_of_row = contact[self.recording] * len(distinct) + frequency
+        if len(contacts) * len(distinct) > _SPARSE * len(line_of_row):
+            lines, self.line = np.unique(line_of_row, return_inverse=True)
         else:  # without sorting all rows
             measured = np.zeros(len(contacts) * len(distinct), dtype=bool)
-            measured[own_line] = True
+            measured[line_of_row] = True
             lines = np.flatnonzero(measured)
-            self.line = (np.cumsum(measured) - 1)[own_line]
+            self.line = (np.cumsum(measured) - 1)[line_of_row]
         self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
 
     @property
@@ -127,48 +131,49 @@ class FrfDesign:
 
     @property
     def conditions(self) -> Conditions:
-        """Those that it was worked out from, which a model of them holds."""
+        """The conditions that it was computed from, which a model of them holds."""
         conditions = self._conditions()
         assert conditions is not None
         return conditions
 
 
-_kept = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of models of one campaign
+_cached_design = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of models of one campaign
 
 
 def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
-    """The design, kept for the next model of the same conditions."""
-    return _kept(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n", "id"}, neighbours)
+    """The design, cached for further models of the same conditions."""
+    return _cached_design(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n", "id"}, neighbours)
 
 
-def frequencies(entry: FrfConditions) -> Floats:
+def frequencies(recording: FrfConditions) -> Floats:
     """The lines of one FRF [Hz]; raises InvalidInput where they are yet to be estimated from a time series."""
-    if entry.frequency_hz is None:
-        raise required(f"recordings[{entry.id}].frequency_hz", "required for a prediction")
-    return entry.frequency_hz
+    if recording.frequency_hz is None:
+        raise required(f"recordings[{recording.id}].frequency_hz", "required for a prediction")
+    return recording.frequency_hz
 
 
 def _distinct(columns: Sequence[Floats]) -> tuple[Floats, Indices]:
-    """The distinct frequencies of recordings, most of which share their lines, and which of them each row has."""
+    """The distinct frequencies of recordings, most of which share their lines, and the index of each row's
+    frequency."""
     keys = [column.tobytes() for column in columns]
     shared = dict(zip(keys, columns, strict=True))
     distinct = np.unique(np.concatenate(list(shared.values())))
-    places = {key: np.searchsorted(distinct, column) for key, column in shared.items()}
-    return distinct, np.concatenate([places[key] for key in keys])
+    indices = {key: np.searchsorted(distinct, column) for key, column in shared.items()}
+    return distinct, np.concatenate([indices[key] for key in keys])
 
 
-def _neighbours(places: Floats) -> Mask:
-    """Which sensors (sensors, sensors) are within 1.2 pitches of which."""
-    distance = cdist(places, places)
+def _neighbours(sensor_positions: Floats) -> Mask:
+    """Which sensors (sensors, sensors) are within 1.2 pitches of each other."""
+    distance = cdist(sensor_positions, sensor_positions)
     np.fill_diagonal(distance, np.inf)
     near: Mask = distance <= NEIGHBOUR_PITCHES * distance.min()
     return near
 
 
-def _contact_key(entry: FrfConditions, fields: Collection[str]) -> tuple[float, float, float, float]:
-    dwell = entry.dwell_s if "dwell_s" in fields and entry.dwell_s is not None else 0.0
-    dynamic_force = entry.dynamic_force_n if "dynamic_force_n" in fields else 0.0
-    return entry.preload_n, float(to_si("indenter_radius_mm", entry.indenter_radius_mm)), dynamic_force, dwell
+def _contact_key(recording: FrfConditions, fields: Collection[str]) -> tuple[float, float, float, float]:
+    dwell = recording.dwell_s if "dwell_s" in fields and recording.dwell_s is not None else 0.0
+    dynamic_force = recording.dynamic_force_n if "dynamic_force_n" in fields else 0.0
+    return recording.preload_n, float(to_si("indenter_radius_mm", recording.indenter_radius_mm)), dynamic_force, dwell
 
 
 def largest_offset(design: FrfDesign, further: float) -> float:
@@ -180,7 +185,7 @@ def largest_offset(design: FrfDesign, further: float) -> float:
 class Response:
     """FRFs at one or several points of the fit coordinates, in two factors: leading axes are those of the points.
 
-    `place_slopes` are by the contact's x and y, None where they were not asked for.
+    `place_slopes` are by the contact's x and y, None where not requested.
     """
 
     level: Differentiated  # (…, recordings) [C/N], real: before the dynamics
@@ -191,43 +196,45 @@ class Response:
     def on_rows(self, design: FrfDesign) -> tuple[Array, Array]:
         """Level times line factor on every row of a single point (rows,), and its derivatives (variables, rows).
 
-        These are by the parameters, then by the place where those were asked for.
+        These are by the parameters, then by the position where requested.
         """
-        place = np.zeros((0, *self.level.value.shape)) if self.place_slopes is None else self.place_slopes
+        position_slopes = np.zeros((0, *self.level.value.shape)) if self.place_slopes is None else self.place_slopes
         level = self.level.value[design.recording]
-        slopes = np.concatenate([self.level.slopes, place])[:, design.recording]
+        slopes = np.concatenate([self.level.slopes, position_slopes])[:, design.recording]
         if self.lines is None:
             return level.astype(complex), slopes.astype(complex)
         factor = self.lines.value[design.line]
         slopes = slopes * factor
-        for row, of_lines in zip(slopes, self.lines.slopes, strict=False):  # which are by the parameters alone
+        for row, of_lines in zip(slopes, self.lines.slopes, strict=False):  # derivatives by the parameters only
             if of_lines.any():
                 row += level * of_lines[design.line]
         return level * factor, slopes
 
     def part(self, index: int | slice | Indices) -> "Response":
-        """At some of several points."""
+        """The response at some of several points."""
 
         def of(x: Differentiated) -> Differentiated:
             return Differentiated(x.value[index], x.slopes[:, index])
 
-        place = None if self.place_slopes is None else self.place_slopes[:, index]
-        return Response(of(self.level), place, None if self.lines is None else of(self.lines), self.inside[index])
+        position_slopes = None if self.place_slopes is None else self.place_slopes[:, index]
+        return Response(
+            of(self.level), position_slopes, None if self.lines is None else of(self.lines), self.inside[index]
+        )
 
 
 def joined(responses: Sequence[Response]) -> Response:
-    """Responses of one model at several sets of points, as one."""
+    """Responses of one model at several sets of points, concatenated."""
 
     def of(parts: Sequence[Differentiated]) -> Differentiated:
         return Differentiated(
             np.concatenate([part.value for part in parts]), np.concatenate([part.slopes for part in parts], axis=1)
         )
 
-    place = [entry.place_slopes for entry in responses if entry.place_slopes is not None]
-    lines = [entry.lines for entry in responses if entry.lines is not None]
+    position_slopes = [response.place_slopes for response in responses if response.place_slopes is not None]
+    lines = [response.lines for response in responses if response.lines is not None]
     return Response(
-        of([entry.level for entry in responses]),
-        np.concatenate(place, axis=1) if place else None,
+        of([response.level for response in responses]),
+        np.concatenate(position_slopes, axis=1) if position_slopes else None,
         of(lines) if lines else None,
-        np.concatenate([entry.inside for entry in responses]),
+        np.concatenate([response.inside for response in responses]),
     )

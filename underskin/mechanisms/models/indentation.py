@@ -1,55 +1,44 @@
-"""Indentations by a sphere.
+"""The force of indentation curves by a sphere, sample by sample, under a set of mechanisms. SI.
 
-A rigid sphere on the elastic half space or layer, with adhesion, stiffening and a stage that gives. SI.
+Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
+declared, E free; for deep indentation Sneddon's law of the sphere; and `strain_share` of the effect of finite strain on
+the depth. Stages: declared value → material → contact radius, depth and force together with the stage's compliance,
+through the history where the body relaxes. Zero, drift and gain of the load cell are in the covariance
+(diagnosis/noise).
 
-All follows from the contact radius a. Without adhesion, on the half space: δ = a²/R, F = 4E'a³/(3R), and at a fixed
-edge the stiffness is K = 2E'a; on the layer these are multiplied by functions of a/h (contact_curves). An edge whose
-energy release rate is w is stretched by ℓ: δ and F fall by ℓ and K ℓ, on the half space ℓ = √(2πaw/E') (Johnson,
-Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E' times its nominal stress
-over a neo-Hookean solid's at the representative strain 0.2 a/R (after Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129
-(2007) 904, whose ratio to Hooke's law would count the neo-Hookean solid's own 9 % at a/R 0.4, where a sphere's contact
-gets softer by 5 %). What the stage commands is δ + F/k.
+Elastic contact, all as functions of the contact radius a. Without adhesion, on the half space: δ = a²/R,
+F = 4E'a³/(3R), and at a fixed edge the stiffness is K = 2E'a; on the layer these are multiplied by functions of a/h
+(contact_curves). An edge of energy release rate w is stretched by ℓ: δ and F fall by ℓ and K ℓ, on the half space
+ℓ = √(2πaw/E') (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E' times its
+nominal stress over a neo-Hookean solid's at the representative strain 0.2 a/R (after Lin, Dimitriadis & Horkay,
+J. Biomech. Eng. 129 (2007) 904; their ratio to Hooke's law would include the neo-Hookean solid's own 9 % at a/R 0.4,
+where the contact of a sphere gets softer by 5 %). The stage is commanded to δ + F/k.
 
-Pressed deep, the sphere is no paraboloid: δ = a artanh(a/R), dF = 2E'a dδ (Sneddon, Int. J. Eng. Sci. 3 (1965) 47).
-Finite strain makes the contact softer: at the same force, δ of the solved frictionless contact of the round sphere with
-a neo-Hookean layer is up to 3.4 % above the linear one's (contact table), of which `strain_share` is taken; a is then
-the radius of the linear contact.
+Deep indentation: δ = a artanh(a/R), dF = 2E'a dδ (Sneddon, Int. J. Eng. Sci. 3 (1965) 47). Finite strain softens the
+contact: at the same force, δ of the solved frictionless contact with a neo-Hookean layer is up to 3.4 % above the
+linear one's (contact table), of which `strain_share` is taken; a is then the radius of the linear contact.
 
-Under a given travel the contact is stable where the travel grows with a. It ends at the least travel: at JKR's least
-depth for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one. The functions of a are compiled
-(sphere_kernels).
+At a given travel the contact is stable where the travel grows with a. It ends at the least travel: at JKR's least depth
+for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one.
 
-Arrays are (points, curves, samples), with 1 where nothing differs: points of the fit coordinates, samples of a curve.
-
-The force of a sphere on a body that relaxes, while its contact grows, stays and recedes (Ting's theory). SI.
-
-E(t) = E(0) e(t), e(t) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs. While the contact grows it is as large as on an
-elastic body at this depth δ, u being that body's force. A ring of the contact that was reached at the time s and has
-stuck since carries H(s,t) = ∫ e(t−s') dδ(s') over s < s' < t, and the contact recedes to the ring that is about to let
-go:
+Relaxing body (Ting, J. Appl. Mech. 33 (1966) 845): E(t) = E(0) e(t), e(t) = 1 − Σ g (1 − e^(−t/τ)) over the Prony
+pairs; u is the elastic body's force at the depth δ. While the contact grows it is as large as on the elastic body. A
+ring of the contact that was reached at the time s and has stuck since carries H(s,t) = ∫ e(t−s') dδ(s') over
+s < s' < t, and the contact recedes to the ring that is about to let go:
 
     H(t1,t) = ℓ e(t−t1) − ℓ_s,   F(t) = ∫₀^{t1} e(t−s) du(s) + K H(t1,t)
 
-(Ting, J. Appl. Mech. 33 (1966) 845: without adhesion the stretches ℓ, ℓ_s are 0, and so is H(t1,t)). K is the stiffness
-of the contact as large as at t1, ℓ its adhesive stretch when it was reached and ℓ_s that at which it lets go; an edge
-that moves sees the instantaneous modulus (Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). What stiffens has E times
-its ratio of stiffening at the present contact: u, K and F above are those at rest, and F is multiplied by it. Where all
-rings but those of the first touch have let go, these are an elastic contact of modulus E(0) e at the depth
-[(1−g) δ + Σ g Y]/e with the work of separation over e²; it ends at that contact's pull-off. Y is the fading memory of δ
-(relaxation). δ and u run straight between samples.
+Without adhesion the stretches ℓ, ℓ_s and H(t1,t) are 0. K is the stiffness of the contact at its size at t1, ℓ its
+adhesive stretch when it was reached and ℓ_s that at which it lets go; a moving edge has the instantaneous modulus
+(Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). With stiffening, u, K and F above are those at rest, and F is
+multiplied by the stiffening ratio at the present contact. Where only the rings of the first touch still hold, the
+contact is elastic with modulus E(0) e at the depth [(1−g) δ + Σ g Y]/e and the work of separation over e²; it ends at
+that contact's pull-off. Y is the fading memory of δ (relaxation). δ and u are linear between samples. Exact for half
+space and layer through one growth and one shrinkage of the contact, with holds in between; in small returns on the way
+(noise) rings are assumed to stick, larger ones are rejected by contact_creep.
 
-Exact for half space and layer through one growing and one shrinking of the contact, with holds in between. Of small
-returns on the way (noise) the rings are taken to have stuck throughout; larger ones are refused by contact_creep.
-
-Arrays are (points, curves, samples), as in sphere_contact.
-
-The force of indentation curves, sample by sample, under a set of mechanisms.
-
-Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
-declared, E free; under a sphere that is pressed deep, Sneddon's law of the whole sphere in its place; and a share of
-what finite strain adds to the depth. Stages: declared value → material → contact radius, depth and force together with
-the stage's give, through the body's history where it relaxes. What the load cell adds, a zero, a drift and a gain,
-stands in the covariance (diagnosis/noise).
+Arrays are (points, curves, samples), with 1 where nothing differs: points of the fit coordinates, samples of a
+curve. The functions of a are compiled (sphere_kernels).
 """
 
 from collections.abc import Callable, Sequence
@@ -89,7 +78,7 @@ from underskin.recordings.modulus import estimate
 from underskin.surrogate.contact_table import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
 
-_SMALLEST = 1e-12  # m of depth, below which a radius is not told from 0
+_SMALLEST = 1e-12  # m of depth, below which a radius counts as 0
 _NODES = 401  # of the layer's functions over a/h
 
 
@@ -106,9 +95,10 @@ class Stiffening:
 
 
 class LayerRatios:
-    """A layer's force, depth, stiffness and adhesive stretch over the half space's, of a/h; and a/h of the depth.
+    """Force, depth, stiffness and adhesive stretch of a layer over the half space's, as functions of a/h; and a/h of
+    depth.
 
-    Attributes: `cubics` (cells, powers, 7), these four and finite strain's three coefficients.
+    Attributes: `cubics` (cells, powers, 7), these four and the three coefficients of finite strain.
     """
 
     def __init__(self, poisson_ratio: float) -> None:
@@ -128,13 +118,13 @@ class LayerRatios:
 
 @lru_cache(maxsize=256)
 def layer_ratios(poisson_ratio: float) -> LayerRatios:
-    """Those of one Poisson ratio."""
+    """The ratios for one Poisson ratio."""
     return LayerRatios(poisson_ratio)
 
 
 @cache
 def _half_space() -> Floats:
-    """The cubics (1, 1, powers, 7) of a half space, whose ratios nobody asks for."""
+    """The cubics (1, 1, powers, 7) of a half space, whose four ratios are not used."""
     cubics = np.zeros((1, 1, 4, 7))
     cubics[0, 0, 3, 4:] = load_contact().softening_coefficients(np.zeros(()))
     return cubics
@@ -142,41 +132,41 @@ def _half_space() -> Floats:
 
 @cache
 def _grid() -> CurveGrid:
-    """No stress is asked for: one wave number, of no use."""
+    """A grid of one wave number: stresses are not needed."""
     return CurveGrid(np.ones(1))
 
 
 @dataclass(frozen=True)
 class Layers:
-    """The layers that each point of the fit coordinates has: their thickness [m] (points, 1, 1) and functions."""
+    """The layer at each point of the fit coordinates: thickness [m] (points, 1, 1) and functions of a/h."""
 
     thickness: Floats
-    each: Sequence[LayerRatios]  # of each point, or one for all
+    by_point: Sequence[LayerRatios]  # one for each point of the fit coordinates, or one for all
 
     @cached_property
     def cubics(self) -> Floats:
         """The functions as cubics (points or 1, cells, powers, 4)."""
-        return np.stack([ratios.cubics for ratios in self.each])
+        return np.stack([ratios.cubics for ratios in self.by_point])
 
     def radius_of(self, root: Floats) -> Floats:
         """a of √(δR) [m] without adhesion."""
         relative = root / self.thickness
-        if len(self.each) == 1:
-            return self.each[0].alpha_of(relative) * self.thickness
-        parts = [ratios.alpha_of(of_point) for ratios, of_point in zip(self.each, relative, strict=True)]
+        if len(self.by_point) == 1:
+            return self.by_point[0].alpha_of(relative) * self.thickness
+        parts = [ratios.alpha_of(of_point) for ratios, of_point in zip(self.by_point, relative, strict=True)]
         return np.stack(parts) * self.thickness
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """Spheres of `radius` on elastomer of reduced modulus E' = E/(1 − ν²); `give` is 1/k of the stage [m/N]."""
+    """Spheres of `radius` on elastomer of reduced modulus E' = E/(1 − ν²); `compliance` is 1/k of the stage [m/N]."""
 
     modulus: Floats
     radius: Floats
     layers: Layers | None = None
     stiffening: Stiffening | None = None
-    give: Floats | float = 0.0
-    whole: Floats | float = 0.0  # 1 where it is pressed so deep that it is no paraboloid (curves, 1), else 0
+    compliance: Floats | float = 0.0
+    deep: Floats | float = 0.0  # 1 where it is pressed so deep that it is no paraboloid (curves, 1), else 0
     strain_share: Floats | float = 0.0  # of finite strain's correction of the depth
 
     def at(self, a: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -188,27 +178,27 @@ class Sphere:
         return force, depth, stiffness, stretch
 
     def travel(self, a: Floats, work: Floats) -> Floats:
-        """δ + F/k in equilibrium."""
+        """The travel δ + F/k in equilibrium."""
         force, depth, stiffness, unit = self.at(a)
         stretch = unit * np.sqrt(work)
-        return np.asarray(depth - stretch + self.give * (force - stiffness * stretch))
+        return np.asarray(depth - stretch + self.compliance * (force - stiffness * stretch))
 
     def force_at(self, travel: Floats, a: Floats) -> Floats:
-        """F at a travel, where the edge is at a: as its stretch then is."""
+        """F at a travel with the edge at a, stretched accordingly."""
         force, depth, stiffness, _ = self.at(a)
-        stretch = (depth + self.give * force - travel) / (1 + self.give * stiffness)
+        stretch = (depth + self.compliance * force - travel) / (1 + self.compliance * stiffness)
         return np.asarray(force - stiffness * stretch)
 
     def radius_at(self, travel: Floats, work: Floats | None, least: Floats | float = 0.0) -> Floats:
-        """a of the stable contact at a travel in equilibrium; `least` where there is none: its radius at pull-off."""
+        """The radius of the stable contact at a travel in equilibrium; without one `least`, the radius at pull-off."""
         depth = np.maximum(travel, _SMALLEST)
         root = np.sqrt(self.radius * depth)
         start = root if self.layers is None else self.layers.radius_of(root)
-        if work is None and not (np.any(self.give) or np.any(self.whole) or np.any(self.strain_share)):
+        if work is None and not (np.any(self.compliance) or np.any(self.deep) or np.any(self.strain_share)):
             return start
         if work is None:
             work = np.zeros((1, 1, 1))
-        pulled = np.sqrt(1.5 * np.pi * work * self.give) * self.radius
+        pulled = np.sqrt(1.5 * np.pi * work * self.compliance) * self.radius
         start = start + (1.0 if self.layers is None else 1.3) * (self._unit(work) + pulled)
         shape = np.broadcast_shapes(np.shape(start), np.shape(travel), self._body.shape[:-1])
         a = np.array(np.broadcast_to(start, shape))
@@ -228,18 +218,18 @@ class Sphere:
 
     @cached_property
     def _body(self) -> Floats:
-        """As the compiled functions take it."""
+        """The columns of `sphere_kernels`' `body`."""
         thickness = 0.0 if self.layers is None else self.layers.thickness
         law = self.stiffening
         stiffening = (-1.0, 0.0, 0.0) if law is None else (law.coefficient, law.form, law.exponent)
-        columns = (self.modulus, self.radius, self.give, thickness, *stiffening, self.whole, self.strain_share)
-        whole = np.empty((*np.broadcast_shapes(*map(np.shape, columns)), len(columns)))
+        columns = (self.modulus, self.radius, self.compliance, thickness, *stiffening, self.deep, self.strain_share)
+        rows = np.empty((*np.broadcast_shapes(*map(np.shape, columns)), len(columns)))
         for number, column in enumerate(columns):
-            whole[..., number] = column
-        return whole.reshape((1,) * (4 - whole.ndim) + whole.shape)
+            rows[..., number] = column
+        return rows.reshape((1,) * (4 - rows.ndim) + rows.shape)
 
     def _wide_body(self, shape: tuple[int, ...]) -> Floats:
-        """For points and curves of a shape."""
+        """The body broadcast to points and curves of a shape."""
         return _wide(self._body, (*shape[:2], *self._body.shape[2:]))
 
     @property
@@ -247,7 +237,7 @@ class Sphere:
         return _half_space() if self.layers is None else self.layers.cubics
 
     def inside(self, a: Floats) -> Mask:
-        """Which contacts the layer's functions reach."""
+        """Which contacts are within the range of the layer's functions."""
         if self.layers is None:
             return np.ones(np.shape(a), dtype=bool)
         return np.asarray(a < (1 - 1e-9) * LARGEST_A_OVER_H * self.layers.thickness)
@@ -258,15 +248,16 @@ class Sphere:
 
 
 def _wide(values: Floats | float, shape: tuple[int, ...], last: tuple[int, ...] = ()) -> Floats:
-    """Broadcast to a shape, but along the last axis to what is `last`; contiguous."""
-    whole = (*shape[:-1], *last) if last else shape
-    if isinstance(values, np.ndarray) and values.shape == whole:
+    """Broadcast to a shape, with `last` in place of its last axis; contiguous."""
+    target = (*shape[:-1], *last) if last else shape
+    if isinstance(values, np.ndarray) and values.shape == target:
         return contiguous(values)
-    return contiguous(np.broadcast_to(values, whole))
+    return contiguous(np.broadcast_to(values, target))
 
 
 def in_contact(travel: Floats, pull_off: Floats) -> Mask:
-    """Which samples are: from the first that reaches the surface, at 0, to the first below pull-off, and so on."""
+    """Which samples are in contact: from the first at or beyond the surface, travel 0, to the first below pull-off,
+    and so on."""
     meets = travel >= 0
     changes = meets | (travel < pull_off)
     changes[..., 0] = True
@@ -274,20 +265,20 @@ def in_contact(travel: Floats, pull_off: Floats) -> Mask:
     return np.asarray(np.take_along_axis(meets, last, axis=-1))
 
 
-def edges(sphere: Sphere, travel: Floats, held: Mask, work: Floats, separation: Floats | None) -> Floats:
-    """The edge's radius at each sample (points, curves, samples).
+def edges(sphere: Sphere, travel: Floats, contact_mask: Mask, work: Floats, separation: Floats | None) -> Floats:
+    """The contact radius at each sample (points, curves, samples).
 
-    The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of `separation`,
-    and rests in between.
+    The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of
+    `separation`, and rests in between.
     """
-    parting = work if separation is None else separation
-    least, _ = sphere.pull_off(parting)
+    receding_work = work if separation is None else separation
+    least, _ = sphere.pull_off(receding_work)
     if separation is None:
         return sphere.radius_at(travel, work, least)
     first_least, _ = sphere.pull_off(work)
-    advancing, receding = sphere.radius_at(travel, work, first_least), sphere.radius_at(travel, parting, least)
+    advancing, receding = sphere.radius_at(travel, work, first_least), sphere.radius_at(travel, receding_work, least)
     a = np.empty_like(receding)
-    edge_rows(advancing, receding, contiguous(np.broadcast_to(held, a.shape)), a)
+    edge_rows(advancing, receding, contiguous(np.broadcast_to(contact_mask, a.shape)), a)
     return a
 
 
@@ -305,95 +296,108 @@ class Adhesion:
 
 @dataclass(frozen=True)
 class Path:
-    """What is commanded: `travel` [m] and `time` [s] of samples (points, curves, samples).
+    """The commanded `travel` [m] and `time` [s] of the samples (points, curves, samples).
 
-    `begins` (points, curves) is the sample with which contact starts: the first, or one put where it touches; the
-    number of samples where there is none.
+    `first_contact` (points, curves): index of the sample at which contact starts, the first or one that was moved to
+    the touch; the number of samples without contact.
     """
 
     travel: Floats
     time: Floats
-    begins: Indices
+    first_contact: Indices
 
     @property
     def touched(self) -> Mask:
-        """From the touch on."""
-        return np.asarray(np.arange(self.travel.shape[-1]) >= self.begins[..., None])
+        """Whether a sample is at or after the touch."""
+        return np.asarray(np.arange(self.travel.shape[-1]) >= self.first_contact[..., None])
 
 
 def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path) -> tuple[Floats, Mask]:
     """F (points, curves, samples) [N] where a path's travel is the depth δ, and where there is contact.
 
-    The sphere's own stage is not looked at.
+    The compliance of the sphere's stage is ignored.
     """
-    if np.any(sphere.give):
-        sphere = replace(sphere, give=0.0)
-    begins, started = np.minimum(path.begins, path.travel.shape[-1] - 1)[..., None], path.touched
+    if np.any(sphere.compliance):
+        sphere = replace(sphere, compliance=0.0)
+    first_contact, started = np.minimum(path.first_contact, path.travel.shape[-1] - 1)[..., None], path.touched
     number = np.arange(path.travel.shape[-1])
     depth = np.where(started, path.travel, 0.0)
-    time = np.maximum(path.time, np.take_along_axis(path.time, begins, axis=-1))  # what is felt at the touch is at once
+    # The load at the touch is a step
+    time = np.maximum(path.time, np.take_along_axis(path.time, first_contact, axis=-1))
     work = None if adhesion is None else adhesion.work
     least, lowest = sphere.pull_off(work)
-    held = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
+    contact_mask = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
     a = sphere.radius_at(depth, work, np.maximum(least, 1e-12))
-    force, stiffness, slack, parting, stiffer = _elastic(sphere, a, adhesion)
-    force = np.where(held, force, 0.0)
+    force, stiffness, advancing_stretch, receding_stretch, stiffer = _elastic(sphere, a, adhesion)
+    force = np.where(contact_mask, force, 0.0)
     depth_memory, force_memory = memories(depth, time, relaxation), memories(force, time, relaxation)
     growing = relaxation.convolved(force, force_memory)
     record = np.maximum.accumulate(np.where(depth >= np.maximum.accumulate(depth, axis=-1), number, 0), axis=-1)
-    record = np.maximum(record, begins)
-    back = started & (record < number)
-    if not back.any():
-        return np.where(held, stiffer * growing, 0.0), held
-    edge, carried, kept = (np.zeros(depth.shape) for _ in range(3))
+    record = np.maximum(record, first_contact)
+    returning = started & (record < number)
+    if not returning.any():
+        return np.where(contact_mask, stiffer * growing, 0.0), contact_mask
+    edge, relaxed_depth, memory_force = (np.zeros(depth.shape) for _ in range(3))
     stuck = np.zeros(depth.shape, dtype=bool)
-    reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, begins[..., 0])
-    creep_edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, kept, stuck)
-    answer, some = stiffer * growing, np.s_[..., np.flatnonzero(back.any(axis=(0, 1)))]
-    a = sphere.radius_at(contiguous(edge[some]), work, np.maximum(least, 1e-12))
+    inputs = (
+        depth,
+        time,
+        depth_memory,
+        advancing_stretch,
+        receding_stretch,
+        force,
+        force_memory,
+        record,
+        first_contact[..., 0],
+    )
+    creep_edge_rows(
+        *map(contiguous, inputs), *relaxation.of_points(len(depth)), edge, relaxed_depth, memory_force, stuck
+    )
+    answer, columns = stiffer * growing, np.s_[..., np.flatnonzero(returning.any(axis=(0, 1)))]
+    a = sphere.radius_at(contiguous(edge[columns]), work, np.maximum(least, 1e-12))
     ring, stiffness, _, _, stiffer_ring = _elastic(sphere, a, adhesion)
-    receding = stiffer_ring * (relaxation.unrelaxed * ring + kept[some] + stiffness * carried[some])
-    answer[some] = np.where(back[some], receding, answer[some])
-    held = np.where(back, stuck, held)
-    touch = back & ~held
+    receding = stiffer_ring * (relaxation.unrelaxed * ring + memory_force[columns] + stiffness * relaxed_depth[columns])
+    answer[columns] = np.where(returning[columns], receding, answer[columns])
+    contact_mask = np.where(returning, stuck, contact_mask)
+    touch = returning & ~contact_mask
     if touch.any() and adhesion is not None:
         of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
-        answer, held = np.where(touch, of_touch, answer), np.where(touch, holds, held)
-    return np.where(held, answer, 0.0), held
+        answer, contact_mask = np.where(touch, of_touch, answer), np.where(touch, holds, contact_mask)
+    return np.where(contact_mask, answer, 0.0), contact_mask
 
 
 def relaxing_on_stage(
     sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
 ) -> tuple[Floats, Mask]:
-    """The same where the travel is δ + F/k of a stage that gives: depths by secant steps at all samples together."""
-    give, travel, touched = sphere.give, path.travel, path.touched
+    """As `relaxing`, with travel δ + F/k of a compliant stage: secant steps for the depths of all samples together."""
+    compliance, travel, touched = sphere.compliance, path.travel, path.touched
     work = None if adhesion is None else adhesion.work
     least, _ = sphere.pull_off(work)
     a = sphere.radius_at(travel, work, np.maximum(least, 1e-12))
     elastic = sphere.force_at(travel, a) if work is not None else sphere.at(a)[0]
-    depth = np.where(touched, travel - give * elastic, travel)
+    depth = np.where(touched, travel - compliance * elastic, travel)
     slope = sphere.at(a)[2]
     scale = np.abs(travel).max(axis=-1, keepdims=True) + 1e-15
-    force, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=depth))
+    force, contact_mask = relaxing(sphere, relaxation, adhesion, replace(path, travel=depth))
     for _ in range(_ITERATIONS):
-        left = np.where(touched, depth + give * force - travel, 0.0)
-        if (np.abs(left) <= _SETTLED * scale).all():
+        residual = np.where(touched, depth + compliance * force - travel, 0.0)
+        if (np.abs(residual) <= _SETTLED * scale).all():
             break
-        moved = depth - left / (1 + give * slope)
-        after, held = relaxing(sphere, relaxation, adhesion, replace(path, travel=moved))
+        moved = depth - residual / (1 + compliance * slope)
+        after, contact_mask = relaxing(sphere, relaxation, adhesion, replace(path, travel=moved))
         change = moved - depth
         with np.errstate(divide="ignore", invalid="ignore"):
             secant = (after - force) / change
         far = np.abs(change) > 1e-12 * scale
         slope = np.where(far & np.isfinite(secant) & (secant > 0), 0.5 * (slope + np.minimum(secant, 4 * slope)), slope)
         depth, force = moved, after
-    lost = np.maximum.accumulate(np.abs(left) > _UNSETTLED * scale, axis=-1) & touched
-    held = held & ~lost
-    return np.where(held, force, 0.0), held
+    lost = np.maximum.accumulate(np.abs(residual) > _UNSETTLED * scale, axis=-1) & touched
+    contact_mask = contact_mask & ~lost
+    return np.where(contact_mask, force, 0.0), contact_mask
 
 
 def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """F and K of the elastic contact that grows, at its modulus at rest; ℓ and ℓ_s; and how much stiffer it is."""
+    """F and K of the growing elastic contact, at its modulus at rest; ℓ and ℓ_s; and the stiffening ratio."""
     force, _, stiffness, unit = sphere.at(a)
     stiffer = np.ones_like(a)
     if sphere.stiffening is not None:
@@ -402,8 +406,8 @@ def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floa
     if adhesion is None:
         none = np.zeros_like(force)
         return force, stiffness, none, none, stiffer
-    stretch, parting = unit * np.sqrt(adhesion.work), unit * np.sqrt(adhesion.separation)
-    return force - stiffness * stretch, stiffness, stretch, parting, stiffer
+    stretch, receding_stretch = unit * np.sqrt(adhesion.work), unit * np.sqrt(adhesion.separation)
+    return force - stiffness * stretch, stiffness, stretch, receding_stretch, stiffer
 
 
 def _first_touch(
@@ -414,14 +418,14 @@ def _first_touch(
     memory: Floats,
     time: Floats,
 ) -> tuple[Floats, Mask]:
-    """F of what is left of the first touch, at the first of the times, and whether it holds."""
-    left = relaxation.remaining(time - time[..., :1])
-    relaxed = relaxation.convolved(depth, memory) / left
-    work = adhesion.separation / left**2
+    """F of the remaining first touch, from the first of the times on, and whether it holds."""
+    remaining = relaxation.remaining(time - time[..., :1])
+    relaxed = relaxation.convolved(depth, memory) / remaining
+    work = adhesion.separation / remaining**2
     unit = replace(sphere, radius=sphere.radius + np.zeros_like(depth))
     least, lowest = unit.pull_off(work)
     a = unit.radius_at(relaxed, work, least)
-    return left * unit.force_at(relaxed, a), relaxed > lowest
+    return remaining * unit.force_at(relaxed, a), relaxed > lowest
 
 
 _CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
@@ -430,24 +434,26 @@ _CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the cont
 class IndentationModel(CurveModel):
     """The force of indentations under a set of mechanisms.
 
-    Of measured curves, contact points and an undeclared modulus have priors around the base model's own fits. Of
-    conditions alone they are those expected of the declared modulus, with contact at displacement 0.
+    For measured curves, contact points and an undeclared modulus have priors around the base model's own fits. For
+    conditions alone the priors are those of the declared modulus, with contact at displacement 0.
     """
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
-        """Work out everything that no parameter changes; InvalidInput names a recording that does not load."""
-        recordings = [entry for entry in conditions.recordings if isinstance(entry, IndentationConditions)]
+        """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
+        recordings = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
         nuisances = _nuisances(recordings, conditions.skin)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
-        self._ids = [entry.id for entry in recordings]
-        known = [entry.stage_stiffness_n_per_mm for entry in recordings]
-        self._give = np.array([0.0 if stage is None else 1e-3 / stage for stage in known])[:, None]  # m/N
-        self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])[:, None]
+        self._ids = [recording.id for recording in recordings]
+        stiffnesses = [recording.stage_stiffness_n_per_mm for recording in recordings]
+        self._stage_compliance = np.array([0.0 if stage is None else 1e-3 / stage for stage in stiffnesses])[
+            :, None
+        ]  # m/N
+        self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
         deepest = self.displacement.max(axis=1) - 1e-3 * middles
-        self._whole = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
+        self._deep = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
 
-    def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
+    def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         thickness = self._skin.thickness_mm
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
         curve = Curve(
@@ -457,44 +463,48 @@ class IndentationModel(CurveModel):
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
         )
         for mechanism in self._mechanisms:
-            mechanism.on_curve(curve, own[mechanism.name])
+            mechanism.on_curve(curve, values[mechanism.name])
         return curve
 
-    def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         travel = self.displacement - contact
         samples = Samples(self._ids, travel, self.time)
         for law in curve.laws:
-            travel = law.moved(samples, travel)
-        force, held, inside = self._force_at(curve, travel, held)
+            travel = law.pressed_travel(samples, travel)
+        force, contact_mask, inside = self._force_at(curve, travel, contact_mask)
         for law in curve.laws:
-            force = law.read(samples, force)
-        return force, held, inside
+            force = law.measured_force(samples, force)
+        return force, contact_mask, inside
 
-    def _force_at(self, curve: Curve, travel: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force_at(self, curve: Curve, travel: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         sphere, adhesion = self._sphere(curve), _adhesion(curve)
         relaxation = curve.prony_pairs
         if relaxation is not None:
-            on = relaxing if curve.stage_stiffness is None else relaxing_on_stage
-            return self._relaxing(sphere, partial(on, sphere, relaxation, adhesion), adhesion, travel, held)
+            relaxing_force = relaxing if curve.stage_stiffness is None else relaxing_on_stage
+            return self._relaxing(
+                sphere, partial(relaxing_force, sphere, relaxation, adhesion), adhesion, travel, contact_mask
+            )
         if adhesion is None:
             depth = np.maximum(travel, 0.0)
             a = sphere.radius_at(depth, None)
             force = np.where(travel > 0, sphere.at(a)[0], 0.0)
             return force, travel > 0, sphere.inside(a) | (travel <= 0)
-        if held is None:
-            held = in_contact(travel, self._last_travel(sphere, adhesion.separation))
-        a = edges(sphere, travel, held, adhesion.work, adhesion.separation if curve.work_of_separation else None)
-        force = np.where(held, sphere.force_at(travel, a), 0.0)
-        return force, held, sphere.inside(a) | ~held
+        if contact_mask is None:
+            contact_mask = in_contact(travel, self._last_travel(sphere, adhesion.separation))
+        a = edges(
+            sphere, travel, contact_mask, adhesion.work, adhesion.separation if curve.work_of_separation else None
+        )
+        force = np.where(contact_mask, sphere.force_at(travel, a), 0.0)
+        return force, contact_mask, sphere.inside(a) | ~contact_mask
 
     def _last_travel(self, sphere: Sphere, work: Floats) -> Floats:
-        """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage that is known to
-        give although its deflection has been subtracted, else as the sphere's own stage has it."""
+        """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage known to be
+        compliant (although its deflection has been subtracted), else under the sphere's own stage."""
         least, travel = sphere.pull_off(work)
-        if np.any(self._give):
-            on_stage = replace(sphere, give=sphere.give + self._give)
+        if np.any(self._stage_compliance):
+            on_stage = replace(sphere, compliance=sphere.compliance + self._stage_compliance)
             radius, _ = on_stage.pull_off(work)
-            travel = np.where(self._give > 0, sphere.travel(np.maximum(radius, least), work), travel)
+            travel = np.where(self._stage_compliance > 0, sphere.travel(np.maximum(radius, least), work), travel)
         return travel
 
     def _relaxing(
@@ -503,33 +513,33 @@ class IndentationModel(CurveModel):
         force_on: Callable[[Path], tuple[Floats, Mask]],
         adhesion: Adhesion | None,
         travel: Floats,
-        held: Mask | None,
+        contact_mask: Mask | None,
     ) -> tuple[Floats, Mask, Mask]:
-        """The same through the history, which begins where a recording touches, between two samples."""
+        """As `_force_at` through the history, which begins at the touch of a recording, between two samples."""
         path = _with_touch(travel, self.time)
-        force, own = force_on(path)
-        own = own & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
-        held = own if held is None else held
-        force = np.where(held, force, 0.0)
+        force, own_contact = force_on(path)
+        own_contact = own_contact & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
+        contact_mask = own_contact if contact_mask is None else contact_mask
+        force = np.where(contact_mask, force, 0.0)
         if sphere.layers is None:  # a half space, which has no tables to leave
-            return force, held, np.ones_like(held)
+            return force, contact_mask, np.ones_like(contact_mask)
         least = sphere.pull_off(None if adhesion is None else adhesion.work)[0]
         a = sphere.radius_at(np.maximum(path.travel, 0.0), None, least)
-        return force, held, sphere.inside(a) | ~held
+        return force, contact_mask, sphere.inside(a) | ~contact_mask
 
     def _sphere(self, curve: Curve) -> Sphere:
         poisson_ratio = numbers(curve.poisson_ratio)
         layers = None
         if curve.layered:
             assert curve.thickness is not None
-            each = poisson_ratio.ravel().tolist()
-            alike = each[:1] if len(set(each)) == 1 else each
-            layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in alike])
+            poisson_ratios = poisson_ratio.ravel().tolist()
+            distinct = poisson_ratios[:1] if len(set(poisson_ratios)) == 1 else poisson_ratios
+            layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in distinct])
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
-        give = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
+        compliance = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
         reduced = numbers(curve.modulus) / (1 - poisson_ratio**2)
         assert curve.strain_share is not None
-        return Sphere(reduced, self._radius, layers, stiffening, give, self._whole, numbers(curve.strain_share))
+        return Sphere(reduced, self._radius, layers, stiffening, compliance, self._deep, numbers(curve.strain_share))
 
 
 def _adhesion(curve: Curve) -> Adhesion | None:
@@ -540,7 +550,7 @@ def _adhesion(curve: Curve) -> Adhesion | None:
 
 
 def _with_touch(travel: Floats, time: Floats) -> Path:
-    """The path, with the touch, travel 0, in the place of the last sample before it."""
+    """The path with its last sample before contact moved to the touch, travel 0."""
     touched = travel >= 0
     first = np.where(touched.any(axis=-1), touched.argmax(axis=-1), travel.shape[-1])
     time = np.broadcast_to(time, travel.shape).copy()
@@ -551,32 +561,32 @@ def _with_touch(travel: Floats, time: Floats) -> Path:
     share = before / (before - after)
     time[point, curve, then - 1] += share * (time[point, curve, then] - time[point, curve, then - 1])
     travel[point, curve, then - 1] = 0.0
-    begins = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
-    return Path(travel, time, begins)
+    first_contact = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
+    return Path(travel, time, first_contact)
 
 
 def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescription) -> list[Parameter]:
-    """The nuisances' parameters; raises InvalidInput where no measured curve loads, or one does not move."""
+    """The nuisance parameters; raises InvalidInput where no measured curve loads, or one does not move."""
     estimates, contact_points, refused = [], [], None
-    for entry in recordings:
-        span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
-        begins = 0.0
-        if isinstance(entry, IndentationRecording):
-            seen = course(entry.displacement_mm, entry.force_n, entry.time_s)
-            force = entry.force_n - seen.drift * times_of(entry)
-            columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, force)]
+    for recording in recordings:
+        span = float(np.ptp(to_si("displacement_mm", recording.displacement_mm)))
+        contact = 0.0
+        if isinstance(recording, IndentationRecording):
+            features = course(recording.displacement_mm, recording.force_n, recording.time_s)
+            force = recording.force_n - features.drift * times_of(recording)
+            columns = [np.asarray(column, dtype=float).tobytes() for column in (recording.displacement_mm, force)]
             try:
-                modulus, begins = _hertz(*columns, entry.indenter_radius_mm, skin.poisson_ratio)
-                estimates.append(modulus if modulus > 0 else _secant_modulus(entry, skin.poisson_ratio))
+                modulus, contact = _hertz(*columns, recording.indenter_radius_mm, skin.poisson_ratio)
+                estimates.append(modulus if modulus > 0 else _secant_modulus(recording, skin.poisson_ratio))
             except InvalidInput as refusal:
-                refused = refusal.at(f"recordings[{entry.id}].{refusal.field}")
+                refused = refusal.at(f"recordings[{recording.id}].{refusal.field}")
                 # A curve that does not load begins where it shows least force.
-                begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(force).argmin())]))
-            if seen.snap_in is not None:
-                begins = float(to_si("displacement_mm", touch(entry.displacement_mm, seen.snap_in)))
+                contact = float(to_si("displacement_mm", recording.displacement_mm[int(np.abs(force).argmin())]))
+            if features.snap_in is not None:
+                contact = float(to_si("displacement_mm", touch(recording.displacement_mm, features.snap_in)))
             if refused is not None and span == 0:
                 raise refused
-        contact_points.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_BOUND * span))
+        contact_points.append(contact_point(recording.id, contact, _CONTACT_SD * span, _CONTACT_BOUND * span))
     if refused is not None and not estimates:
         raise refused
     thickness = [] if skin.thickness_mm is None else [thickness_parameter(skin)]
@@ -585,10 +595,10 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
     return [modulus_parameter(skin, estimates), STRAIN_SHARE, *thickness, *contact_points]
 
 
-def _secant_modulus(entry: IndentationRecording, poisson_ratio: float) -> float:
-    """Of a curve that does not load: Hertz's modulus [Pa] of the range of force over the range of travel."""
-    force, travel = (float(np.ptp(to_si(name, getattr(entry, name)))) for name in ("force_n", "displacement_mm"))
-    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
+def _secant_modulus(recording: IndentationRecording, poisson_ratio: float) -> float:
+    """Hertz's modulus [Pa] from the ranges of force and travel, for a curve that does not load."""
+    force, travel = (float(np.ptp(to_si(name, getattr(recording, name)))) for name in ("force_n", "displacement_mm"))
+    radius = float(to_si("indenter_radius_mm", recording.indenter_radius_mm))
     return max(0.75 * (1 - poisson_ratio**2) * force / (np.sqrt(radius) * max(travel, 1e-300) ** 1.5), 1e-300)
 
 

@@ -1,8 +1,8 @@
-"""What a body that relaxes remembers: E(t)/E(0) = 1 − Σ g (1 − e^(−t/τ)) over its Prony pairs.
+"""Relaxation with fading memory: E(t)/E(0) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs.
 
-u(t) is what an elastic body would show; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading memories
-Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for which the step is exact (Fung, Biomechanics,
-1993, section 7.6). Memories have the pairs on a last axis of their own.
+u(t) is the force of the elastic body; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading
+memories Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for which the step is exact (Fung,
+Biomechanics, 1993, section 7.6). Memories have the pairs on a last axis of their own.
 """
 
 from dataclasses import dataclass
@@ -36,15 +36,17 @@ class Relaxation:
         return np.asarray(self.unrelaxed * history + (self.fraction * memory).sum(axis=-1))
 
     def of_points(self, count: int) -> tuple[Floats, Floats]:
-        """g and τ of so many points, (points, pairs)."""
+        """g and τ broadcast to `count` points, (points, pairs)."""
         pairs = self.fraction.shape[-1]
-        fraction, time = (np.broadcast_to(one.reshape(-1, pairs), (count, pairs)) for one in (self.fraction, self.time))
+        fraction, time = (
+            np.broadcast_to(values.reshape(-1, pairs), (count, pairs)) for values in (self.fraction, self.time)
+        )
         return contiguous(fraction), contiguous(time)
 
 
 def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
-    """Y (points, curves, samples, pairs) of histories u (points, curves, samples) at times [s]; what u is at the first
-    sample came at once."""
+    """Y (points, curves, samples, pairs) of histories u (points, curves, samples) at times [s]; u at the first
+    sample is a step."""
     _, times = relaxation.of_points(len(history))
     memory = np.empty((*history.shape, times.shape[-1]))
     memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), times, memory)

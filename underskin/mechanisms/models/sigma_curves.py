@@ -1,32 +1,20 @@
-"""σ over the contact's radius and place, as splines.
+"""σ of many contacts on one skin at any offset from the sensor, with derivatives, as cubic splines.
 
-The four cubic B-splines that differ from 0 at a point: values and slopes, for many points at once.
+The bottom profile of the σ table, averaged over the sensor's disc at its offset, is tabulated once as a cubic spline in
+a/h, L^(1/3), log(rT/h) and e/h. It holds for Hertz' pressure on a bonded incompressible layer. Where a mechanism
+changes the shape of the pressure or the layer,
 
-σ of many contacts on one skin at any offset, with derivatives, fast enough for a fit.
+    σ = linear(p̂, M; a, e) + finite strain,
 
-The table's bottom profile, averaged over the sensor's disc at its offset, is tabulated once as a cubic spline in a/h,
-L^(1/3), log(rT/h) and e/h. To it may be added what a linear layer of another transmission or a pressure of another
-shape puts there, by its Hankel integral (underskin/physics/hankel_transform.py):
+with the Hankel integral of the linear layer (underskin/physics/hankel_transform.py). The finite-strain term is table(a,
+L, e) − table(a, 0, e) in contact with a half space, and the correction of the contact table (tables/contact.h5) in
+contact with the layer itself. The transform of the pressure is p̂ = s p̂_sphere + (1 − s) p̂_punch, s the sphere's
+share of the load; on the half space p̂_sphere is Hertz', 3 (sin x − x cos x)/x³, and p̂_punch sin x/x, x = k a/h; on
+the layer both come from its own contact (contact_curves).
 
-    σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)],
-
-where the bracket is what finite strain adds under Hertz' pressure. In contact with the layer itself, the correction of
-the contact table (tables/contact.h5) stands in its place.
-
-A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond its
-a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to a/h =
-4.2); beyond the profile's end, r/h = 8, the stress is 0 (below 1e-6 of its peak).
-
-σ at points beside the contacts, from the table alone or from the linear layer at hand plus finite strain.
-
-The table serves Hertz' pressure on a bonded incompressible layer. Where a mechanism changes the pressure's shape or the
-layer, σ = linear(p̂, M; a, e) + what finite strain adds, in contact with a half space [table(a, L, e) − table(a, 0, e)],
-in contact with the layer itself the correction of the contact table; with the transform of the pressure
-
-    p̂ = s p̂_sphere + (1 − s) p̂_punch,
-
-s the sphere's share of the load; on the half space p̂_sphere is Hertz', 3 (sin x − x cos x)/x³, and p̂_punch sin x/x,
-x = k a/h; on the layer both come from its own contact (contact_curves).
+A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond
+its a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to
+a/h = 4.2); beyond the profile's end, r/h = 8, the stress is 0 (below 1e-6 of its peak).
 """
 
 from __future__ import annotations
@@ -77,7 +65,8 @@ class CubicBasis:
         return np.moveaxis(np.tensordot(self.to_coefficients, values, (1, axis)), 0, axis)
 
     def weights(self, at: Floats) -> tuple[Indices, Floats, Floats]:
-        """For each point (…): the first of its four functions, their values (…, 4) and their slopes (…, 4).
+        """For each point (…): the index of the first of its four functions, their values (…, 4) and their slopes (…,
+        4).
 
         Beyond the nodes every function is continued along its tangent.
         """
@@ -161,7 +150,7 @@ class _Splines:
 class OffsetSigma:
     """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h).
 
-    Attributes: `hertz`, σ of the table; `end`, the largest offset e/h that has a place, beyond which σ is 0.
+    Attributes: `hertz`, σ of the table; `end`, the largest offset e/h, beyond which σ is 0.
     """
 
     def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> None:
@@ -172,11 +161,11 @@ class OffsetSigma:
         rho = np.asarray(rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes), dtype=np.float64)
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
-        along = CubicBasis(radii)
+        radial_basis = CubicBasis(radii)
         self._of_rho, self._of_offset = of_rho, of_offset = CubicBasis(np.log(rho)), CubicBasis(offsets)
         self.end = min(float(offsets[-1]), PROFILE_END)
         # Splines and averages are all linear: the smaller arrays are turned into coefficients before their product
-        average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
+        average = np.stack([_disc_averages(radial_basis, np.abs(offsets), ratio) for ratio in rho])
         self._radii, self._average = radii, of_offset.coefficients(of_rho.coefficients(average, 0), 1)
         self.hertz = self._splines(*table.contact_axes, table.profile_over(radii))
         self._turns = float(offsets[-1] + rho[-1] + table.contact_axes[0][-1])
@@ -190,14 +179,14 @@ class OffsetSigma:
 
     @cached_property
     def hertz_strain(self) -> _Splines:
-        """What finite strain adds under Hertz' pressure: the first coefficient over L^(1/3) is the value at L = 0, and
-        splines sum to 1."""
+        """The effect of finite strain under Hertz' pressure: the first coefficient over L^(1/3) is the value at L =
+        0, and splines sum to 1."""
         table = self.hertz.coefficients
         return replace(self.hertz, coefficients=np.ascontiguousarray(table - table[:, :1]))
 
     @cached_property
     def contact_strain(self) -> _Splines:
-        """What finite strain adds in contact with the linear layer."""
+        """The effect of finite strain in contact with the linear layer."""
         table = load_contact()
         return self._splines(*table.contact_axes, table.profile_over(self._radii))
 
@@ -207,12 +196,12 @@ class OffsetSigma:
 
     @property
     def wavenumbers(self) -> int:
-        """How many there are."""
+        """The number of wave numbers."""
         return PANEL * _panels(self._turns)
 
     @property
     def wavenumber(self) -> Floats:
-        """k, in units of 1/h, at which `linear_at` wants transforms."""
+        """k [1/h] at which `linear_at` takes transforms."""
         return self._wavenumbers[0]
 
     @cached_property
@@ -224,7 +213,7 @@ class OffsetSigma:
 
     @cached_property
     def contact_grid(self) -> CurveGrid:
-        """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
+        """The grid for contacts with a layer, whose pressure transforms are at `wavenumber`."""
         return CurveGrid(self.wavenumber)
 
     def linear_at(self, transforms: Floats, contact: Indices, offset: Floats, points: tuple[int, ...]) -> Floats:
@@ -232,7 +221,7 @@ class OffsetSigma:
         at offsets e/h (…, rows), and the first one's derivative by e/h: (quantities + 1, *points, rows)."""
         from underskin.mechanisms.models.sigma_kernels import linear_sigma
 
-        whole = np.empty((len(transforms) + 1, *points, len(contact)))
+        result = np.empty((len(transforms) + 1, *points, len(contact)))
         linear_sigma(
             self._bessel,
             self.hertz.ends[3],
@@ -240,37 +229,44 @@ class OffsetSigma:
             contact,
             contiguous(transforms.reshape(len(transforms), -1, *transforms.shape[-2:])),
             contiguous(offset.reshape(-1, offset.shape[-1])),
-            whole.reshape(len(whole), -1, len(contact)),
+            result.reshape(len(result), -1, len(contact)),
         )
-        return whole
+        return result
 
 
 def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
-    """The same, kept for the next model of the same skin; with room for offsets up to the next half of h."""
-    return _kept(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
+    """An `OffsetSigma`, cached for further models of the skin; with room for offsets up to the next multiple of h/2."""
+    return _cached_sigma(table, rt_over_h, stretch, min(PROFILE_END, float(np.ceil(2 * largest_offset) / 2)))
 
 
 @lru_cache(maxsize=8)
-def _kept(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
+def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
-def _disc_averages(along: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
+def _disc_averages(radial_basis: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
     """The matrix (offsets, radii) that averages a profile given at its radii over the offset disc; 0 beyond them."""
     from underskin.mechanisms.models.sigma_kernels import disc_averages
 
     x, weight = np.polynomial.legendre.leggauss(_RADIAL)
     radius = rt_over_h * (x + 1) / 2
     cosine = np.cos(np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR)
-    total = np.zeros((len(offsets), len(along.nodes)))
+    total = np.zeros((len(offsets), len(radial_basis.nodes)))
     disc_averages(
-        offsets, radius, weight * (x + 1) / 2 / _ANGULAR, cosine, along.nodes[-1], along.knots, along.cubics, total
+        offsets,
+        radius,
+        weight * (x + 1) / 2 / _ANGULAR,
+        cosine,
+        radial_basis.nodes[-1],
+        radial_basis.knots,
+        radial_basis.cubics,
+        total,
     )
-    return total @ along.to_coefficients
+    return total @ radial_basis.to_coefficients
 
 
 def _panels(highest: float) -> int:
-    """Panels of [0, end] that are short enough for an oscillation over this distance."""
+    """The number of panels of [0, end] that resolve an oscillation over this distance."""
     turns = _WAVENUMBER_END * highest / (2 * np.pi)
     return int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
 
@@ -285,7 +281,7 @@ def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
 
 
 class SigmaOfContacts:
-    """σ of all contacts at any place beside them.
+    """σ of all contacts at any offset from them.
 
     Attributes: `inside` (…, contacts), which are within the tables; `rho`, rT/h.
     """
@@ -298,8 +294,8 @@ class SigmaOfContacts:
         pressed: PressedContacts | None = None,
         layer: ContactCurves | None = None,
     ) -> None:
-        """`pressed` where the table is not of such contacts as they are; `layer` where the contact is the layer's own:
-        all contacts then are on one and the same layer."""
+        """`pressed` for contacts other than the table's; `layer` for contact with the layer itself: all contacts are
+        then on the same layer."""
         self._sigma = sigma
         self._sensor_radius, self._thickness = sensor_radius, contacts.thickness
         self.rho = sensor_radius / contacts.thickness
@@ -326,7 +322,7 @@ class SigmaOfContacts:
 
 
 def _spheres(contacts: Contacts) -> tuple[Differentiated, Differentiated]:
-    """a/h and L^(1/3) of contacts that the table is of."""
+    """a/h and L^(1/3) of contacts of the kind that the table holds."""
     from underskin.mechanisms.models.sigma_kernels import spheres
 
     modulus, thickness = contacts.modulus, contacts.thickness
@@ -343,13 +339,13 @@ def _spheres(contacts: Contacts) -> tuple[Differentiated, Differentiated]:
 
 
 def layer_of(contacts: Contacts) -> Layer:
-    """The linear layer at hand."""
+    """The linear layer of the contacts."""
     slip = 0.0 if contacts.slip is None else float(contacts.slip.value.flat[0])
     return Layer(float(contacts.poisson_ratio.value.flat[0]), slip)
 
 
 def as_in_the_table(contacts: Contacts) -> bool:
-    """Whether the table is of such contacts: of spheres without adhesion, on a bonded incompressible layer."""
+    """Whether contacts are those of the table: spheres without adhesion, on a bonded incompressible layer."""
     nu = contacts.poisson_ratio
     incompressible = (nu.value == INCOMPRESSIBLE).all() and not nu.slopes.any()
     return contacts.work_of_adhesion is None and contacts.slip is None and bool(incompressible)
@@ -358,7 +354,8 @@ def as_in_the_table(contacts: Contacts) -> bool:
 def _transforms(
     k: Floats, contacts: Contacts, pressed: PressedContacts, rho: Floats, layer: ContactCurves | None
 ) -> tuple[Floats, list[Differentiated]]:
-    """p̂ · M · disc (quantities, …, contacts, k): its value, its derivatives by a/h, rT/h and what follows; and that."""
+    """p̂ · M · disc (quantities, …, contacts, k), with derivatives by a/h, rT/h and further variables; and these
+    variables."""
     slip = np.zeros(1) if contacts.slip is None else contacts.slip.value
     of_layer = [x for x in (contacts.poisson_ratio, contacts.slip) if x is not None and x.slopes.any()]
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer, moving=bool(of_layer))
@@ -379,12 +376,12 @@ def _transforms(
         if contacts.slip in of_layer:
             terms.append(((shape.value, by_slip * disc), (shape.by_slip, passed)))
             further.append(contacts.slip)
-    whole = np.empty((len(terms), *np.broadcast_shapes(shape.value.shape, passed.shape)))
-    for quantity, (first, *others) in zip(whole, terms, strict=True):
+    result = np.empty((len(terms), *np.broadcast_shapes(shape.value.shape, passed.shape)))
+    for quantity, (first, *others) in zip(result, terms, strict=True):
         np.multiply(*first, out=quantity)
-        for one, other in others:
-            quantity += one * other
-    return whole, further
+        for pressure, transmitted in others:
+            quantity += pressure * transmitted
+    return result, further
 
 
 @dataclass(frozen=True)

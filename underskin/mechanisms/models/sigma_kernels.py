@@ -1,15 +1,9 @@
-"""Compiled: Hertz's radii, and σ of contacts beside the sensors' centres.
+"""Compiled functions for σ of contacts at an offset from the sensors' centres, with derivatives.
 
-Compiled: what the σ table is entered with under spheres without adhesion on an incompressible layer.
-
-Contacts by Hertz' law: a³ = 9 F R/(16 E), L = F/(R² E). Arrays are (points, rows), where either may be 1 and
-then stands for all; derivatives have the variables along their first axis.
-
-Compiled: σ of contacts beside a sensor, from the coefficients of `sigma_curves`, with derivatives.
-
-Arrays are (points, rows), where either may be 1 and then stands for all; derivatives have the variables along their
-first axis. A tensor product s(a, x, ρ, e) = Σ c_ijkl A_i(a) X_j(x) P_k(ln ρ) E_l(e) of cubic splines has four functions
-along each axis that differ from 0 at a place.
+Contacts follow Hertz' law for spheres without adhesion on an incompressible layer: a³ = 9 F R/(16 E), L = F/(R² E).
+A tensor product s(a, x, ρ, e) = Σ c_ijkl A_i(a) X_j(x) P_k(ln ρ) E_l(e) of cubic splines (coefficients of
+`sigma_curves`) has four non-zero functions along each axis at a point. Arrays are (points, rows), where either may
+be 1 and is then broadcast; derivatives have the variables along their first axis.
 """
 
 import numpy as np
@@ -68,7 +62,7 @@ _SMALL = 0.05  # of x, below which Hertz' transform is its series
 
 @compiled()
 def four_functions(at: float, low: float, high: float, knots: Floats, cubics: Floats, functions: Floats) -> int:
-    """The cell that a place lies in; its functions' values and slopes go to `functions` (8,).
+    """Index of the cell that holds `at`; values and slopes of its four functions are written to `functions` (8,).
 
     Beyond the nodes, from `low` to `high`, every function is continued along its tangent.
     """
@@ -151,15 +145,15 @@ def table_sigma(
         inverse = 1 / rho[of_rho, 0]
         third = four_functions(np.log(rho[of_rho, 0]), ends[2, 0], ends[2, 1], knots_rho, cubics_rho, in_rho)
         for row in range(rows):
-            own_a, own_x = min(contact[row], a.shape[1] - 1), min(contact[row], x.shape[1] - 1)
-            own_e = min(row, e.shape[1] - 1)
-            if e[of_e, own_e] > ends[3, 1]:
+            column_a, column_x = min(contact[row], a.shape[1] - 1), min(contact[row], x.shape[1] - 1)
+            column_e = min(row, e.shape[1] - 1)
+            if e[of_e, column_e] > ends[3, 1]:
                 value[point, row] = 0.0
                 slopes[:, point, row] = 0.0
                 continue
-            first = four_functions(a[of_a, own_a], ends[0, 0], ends[0, 1], knots_a, cubics_a, in_a)
-            second = four_functions(x[of_x, own_x], ends[1, 0], ends[1, 1], knots_x, cubics_x, in_x)
-            fourth = four_functions(e[of_e, own_e], ends[3, 0], ends[3, 1], knots_e, cubics_e, in_e)
+            first = four_functions(a[of_a, column_a], ends[0, 0], ends[0, 1], knots_a, cubics_a, in_a)
+            second = four_functions(x[of_x, column_x], ends[1, 0], ends[1, 1], knots_x, cubics_x, in_x)
+            fourth = four_functions(e[of_e, column_e], ends[3, 0], ends[3, 1], knots_e, cubics_e, in_e)
             s = by_a = by_x = by_rho = by_e = 0.0
             for i in range(4):
                 s_x = slope_x = rho_x = e_x = 0.0
@@ -185,22 +179,22 @@ def table_sigma(
             value[point, row] = s
             for number in range(slopes.shape[0]):
                 slopes[number, point, row] = (
-                    by_a * a_slopes[number, of_a, own_a]
-                    + by_x * x_slopes[number, of_x, own_x]
+                    by_a * a_slopes[number, of_a, column_a]
+                    + by_x * x_slopes[number, of_x, column_x]
                     + by_rho * rho_slopes[number, of_rho, 0]
-                    + by_e * e_slopes[number, of_e, own_e]
+                    + by_e * e_slopes[number, of_e, column_e]
                 )
 
 
 @compiled()
-def _product(one: Floats, other: Floats) -> float:
-    """Σ one · other, in four sums that a processor works out side by side; there is a multiple of four terms."""
+def _product(a: Floats, b: Floats) -> float:
+    """Σ a · b in four sums, which a processor computes in parallel; the number of terms is a multiple of four."""
     s0 = s1 = s2 = s3 = 0.0
-    for k in range(0, len(one), 4):
-        s0 += one[k] * other[k]
-        s1 += one[k + 1] * other[k + 1]
-        s2 += one[k + 2] * other[k + 2]
-        s3 += one[k + 3] * other[k + 3]
+    for k in range(0, len(a), 4):
+        s0 += a[k] * b[k]
+        s1 += a[k + 1] * b[k + 1]
+        s2 += a[k + 2] * b[k + 2]
+        s3 += a[k + 3] * b[k + 3]
     return (s0 + s1) + (s2 + s3)
 
 
@@ -213,7 +207,7 @@ def linear_sigma(
     contact: NDArray[np.int64],
     transforms: Floats,
     e: Floats,
-    whole: Floats,
+    result: Floats,
 ) -> None:
     """Hankel integrals of transforms at offsets, and the first one's derivative by the offset.
 
@@ -233,32 +227,35 @@ def linear_sigma(
         (quantities + 1, points, rows), to be filled.
     """
     functions, kernel, slope = np.empty(8), np.empty(bessel.shape[1]), np.empty(bessel.shape[1])
-    _, points, rows = whole.shape
+    _, points, rows = result.shape
     count, of_points, of_contacts, _ = transforms.shape
     for point in range(points):
-        own, of_e = min(point, of_points - 1), min(point, e.shape[0] - 1)
+        transform_point, of_e = min(point, of_points - 1), min(point, e.shape[0] - 1)
         for row in range(rows):
             at = e[of_e, min(row, e.shape[1] - 1)]
             if at > ends[1]:
-                whole[:, point, row] = 0.0
+                result[:, point, row] = 0.0
                 continue
             first = four_functions(at, ends[0], ends[1], knots, cubics, functions)
             for k in range(bessel.shape[1]):
                 b0, b1, b2, b3 = bessel[first, k], bessel[first + 1, k], bessel[first + 2, k], bessel[first + 3, k]
                 kernel[k] = b0 * functions[0] + b1 * functions[1] + b2 * functions[2] + b3 * functions[3]
                 slope[k] = b0 * functions[4] + b1 * functions[5] + b2 * functions[6] + b3 * functions[7]
-            mine = min(contact[row], of_contacts - 1)
+            transform_contact = min(contact[row], of_contacts - 1)
             for quantity in range(count):
-                whole[quantity, point, row] = _product(transforms[quantity, own, mine], kernel)
-            whole[count, point, row] = _product(transforms[0, own, mine], slope)
+                result[quantity, point, row] = _product(
+                    transforms[quantity, transform_point, transform_contact], kernel
+                )
+            result[count, point, row] = _product(transforms[0, transform_point, transform_contact], slope)
 
 
 @compiled("void(float64[::1], int64, float64[:, ::1], float64[:, :, ::1])")
 def sphere_and_punch(k: Floats, panel: int, alpha: Floats, shapes: Floats) -> None:
     """Transforms of Hertz' and of a flat punch's pressure and their derivatives by a/h, at k (wave numbers).
 
-    With x = k a/h: p̂_sphere = 3 (sin x − x cos x)/x³ and p̂_punch = sin x/x. The wave numbers are panels of so many
-    nodes, all `panel`-th of which are equally far apart, so that sines follow from panel to panel by a rotation.
+    With x = k a/h: p̂_sphere = 3 (sin x − x cos x)/x³ and p̂_punch = sin x/x. The wave numbers are in panels of `panel`
+    nodes; those at the same position of successive panels are equally spaced, so sines follow from panel to panel by a
+    rotation.
 
     Parameters
     ----------
@@ -274,15 +271,15 @@ def sphere_and_punch(k: Floats, panel: int, alpha: Floats, shapes: Floats) -> No
         turn_sin, turn_cos = np.sin(stride * a), np.cos(stride * a)
         for node in range(panel):
             sine, cosine = np.sin(k[node] * a), np.cos(k[node] * a)
-            for place in range(node, len(k), panel):
-                x = k[place] * a
+            for index in range(node, len(k), panel):
+                x = k[index] * a
                 punch = sine / x
                 series = 1 - x * x / 10 + x**4 / 280
                 sphere = series if x < _SMALL else 3 * (punch - cosine) / (x * x)
-                shapes[0, number, place] = sphere
-                shapes[1, number, place] = punch
-                shapes[2, number, place] = 3 * (punch - sphere) / a
-                shapes[3, number, place] = (cosine - punch) / a
+                shapes[0, number, index] = sphere
+                shapes[1, number, index] = punch
+                shapes[2, number, index] = 3 * (punch - sphere) / a
+                shapes[3, number, index] = (cosine - punch) / a
                 sine, cosine = sine * turn_cos + cosine * turn_sin, cosine * turn_cos - sine * turn_sin
 
 
@@ -297,7 +294,7 @@ def disc_averages(
     cubics: Floats,
     total: Floats,
 ) -> None:
-    """Averages of a radial profile's basis functions over discs beside its centre, ∫ f(√(e² + s² + 2 e s cos φ)) dA/A.
+    """Averages of a radial profile's basis functions over offset discs, ∫ f(√(e² + s² + 2 e s cos φ)) dA/A.
 
     Parameters
     ----------

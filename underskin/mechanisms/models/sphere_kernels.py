@@ -1,12 +1,12 @@
-"""Compiled: the contact of a sphere as a function of its radius, and the radius at a travel (indentation.py).
+"""Compiled functions for the contact of a sphere: force and depth by the contact radius, and the radius at a travel.
 
-Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 9) holds the reduced modulus E', the
-sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of stiffening c (−1: none), q and m, 1
-where the sphere is pressed so deep that it is no paraboloid (else 0), and the share of finite strain's correction.
+Arrays are (points, curves, samples); see indentation.py for the equations. A `body` (points, curves, samples or 1, 9)
+holds the reduced modulus E', the sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of
+stiffening c (−1: none), q and m, 1 for deep indentation (else 0), and the share of the finite-strain correction.
 `cubics` (layers, cells, powers, 7) are a layer's four ratios and the three coefficients of that correction over a/h
-from 0 to `LARGEST_A_OVER_H`, highest power first, of each point or one for all; a half space has those of one cell.
+from 0 to `LARGEST_A_OVER_H`, highest power first, of each point or one for all; a half space has one cell.
 
-Also fading memories, and the edge of a contact that recedes on a body that relaxes: memories have the pairs on a last
+Also fading memories, and the edge of a receding contact on a relaxing body: memories have the Prony pairs on a last
 axis; g and τ are (points, pairs).
 """
 
@@ -19,17 +19,17 @@ from underskin.physics.contact_curves import LARGEST_A_OVER_H
 from underskin.physics.sphere_law import LOAD_OF_REDUCED, WHOLE_OF_LOAD
 from underskin.units import Floats, Indices, Mask
 
-_STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and where the law ends
-_EXPONENTIAL = 1e-6  # |q| below which the stiffening is
+_STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and its upper limit
+_EXPONENTIAL = 1e-6  # |q| below which the stiffening is exponential
 _LARGEST_RATIO = math.log(100.0)  # of stiffening: Gent's law ends at its limit
 _STEPS = 60
-_TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is about its square
-_NO_CONTACT = 1e-15  # m, which stands for no radius
+_TOLERANCE = 3e-7  # of the contact radius, of the last step: the remaining error is about its square
+_NO_CONTACT = 1e-15  # m, the radius without contact
 _EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
-_BENT = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
-LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) where the correction ends, which then stays
+_LARGEST_CORRECTION = 0.25  # of a tangent's step, by which curvature may correct the next start
+LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) beyond which the correction is constant
 
-Own = tuple[float, float, float, float, float, float, float, float, float]  # a body's numbers
+Constants = tuple[float, float, float, float, float, float, float, float, float]  # the nine numbers of a body
 Four = tuple[float, float, float, float]
 
 _ROWS = "float64[:, :, ::1]"
@@ -38,7 +38,7 @@ _BODY = "float64[:, :, :, ::1], float64[:, :, :, ::1]"
 
 @compiled()
 def _stiffened(strain: float, coefficient: float, form: float, exponent: float) -> tuple[float, float]:
-    """Nominal stress at a compressive strain over that of a neo-Hookean solid, and its logarithm's slope.
+    """Nominal stress at a compressive strain over that of a neo-Hookean solid, and the slope of its logarithm.
 
     (1 + q c J)^(1/q), J = 3 (I/3)^(m/2) of the invariant I = I1 − 3.
     """
@@ -46,11 +46,11 @@ def _stiffened(strain: float, coefficient: float, form: float, exponent: float) 
     stretch = 1.0 - strain
     stress = 1.0 / stretch**2 - stretch
     third = max(stretch * stretch + 2.0 / stretch - 3.0, 1e-18) / 3.0
-    growth = 3.0 * coefficient * third ** (0.5 * exponent)
-    slope = growth * exponent * stress / (3.0 * third)
-    logarithm = growth
+    excess = 3.0 * coefficient * third ** (0.5 * exponent)
+    slope = excess * exponent * stress / (3.0 * third)
+    logarithm = excess
     if abs(form) >= _EXPONENTIAL:
-        total = max(1.0 + form * growth, 1e-9)
+        total = max(1.0 + form * excess, 1e-9)
         logarithm = math.log(total) / form
         slope /= total
     if logarithm > _LARGEST_RATIO:
@@ -59,16 +59,16 @@ def _stiffened(strain: float, coefficient: float, form: float, exponent: float) 
 
 
 @compiled()
-def _of(body: Floats, point: int, curve: int, sample: int) -> Own:
-    own = body[point, curve, min(sample, body.shape[2] - 1)]
-    return own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7], own[8]
+def _constants(body: Floats, point: int, curve: int, sample: int) -> Constants:
+    values = body[point, curve, min(sample, body.shape[2] - 1)]
+    return values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7], values[8]
 
 
 @compiled()
-def _whole_sphere(a: float, radius: float) -> tuple[float, float, float]:
-    """F/E', δ and dδ/da of a sphere that is no paraboloid (Sneddon 1965): δ = a artanh(a/R), dF = 2E'a dδ.
+def _deep_sphere(a: float, radius: float) -> tuple[float, float, float]:
+    """F/E', δ and dδ/da of a sphere in deep indentation (Sneddon 1965): δ = a artanh(a/R), dF = 2E'a dδ.
 
-    Where a is nearly R the depth goes on in a straight line: no contact is wider.
+    Near a = R the depth is continued linearly: no contact is wider.
     """
     x = min(a / radius, _EQUATOR)
     if x < _PARABOLIC:
@@ -84,7 +84,7 @@ def _whole_sphere(a: float, radius: float) -> tuple[float, float, float]:
 
 @compiled()
 def _strain_ratio(
-    load: float, by_load: float, whole: float, cubics: Floats, u: float, per_h: float
+    load: float, by_load: float, deep: float, cubics: Floats, u: float, per_h: float
 ) -> tuple[float, float]:
     """δ of the solved contact over the linear one's at the same force, less 1, and its derivative by a.
 
@@ -94,7 +94,7 @@ def _strain_ratio(
     by_x = by_load * x / 3.0 if x < LARGEST_CBRT_LOAD else 0.0
     c3, c2, c1, c0 = cubics[0], cubics[1], cubics[2], cubics[3]
     p0 = ((c3[4] * u + c2[4]) * u + c1[4]) * u + c0[4]
-    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - whole * WHOLE_OF_LOAD
+    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - deep * WHOLE_OF_LOAD
     p2 = ((c3[6] * u + c2[6]) * u + c1[6]) * u + c0[6]
     by_p0 = (3.0 * c3[4] * u + 2.0 * c2[4]) * u + c1[4]
     by_p1 = (3.0 * c3[5] * u + 2.0 * c2[5]) * u + c1[5]
@@ -105,29 +105,33 @@ def _strain_ratio(
 
 
 @compiled()
-def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
+def _contact(a: float, constants: Constants, cubics: Floats) -> tuple[Four, Four]:
     """F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; and their logarithms' derivatives
     by a."""
-    modulus, radius, _, thickness, coefficient, form, exponent, whole, share = own
-    cell, u, per_h, growth, inverse = 0, 0.0, 0.0, 0.0, 1.0 / a
+    modulus, radius, _, thickness, coefficient, form, exponent, deep, share = constants
+    cell, u, per_h, log_modulus_slope, inverse = 0, 0.0, 0.0, 0.0, 1.0 / a
     if coefficient >= 0:
         strain = _STRAIN * a / radius
         ratio, slope = _stiffened(min(strain, _LARGEST_STRAIN), coefficient, form, exponent)
         modulus *= ratio
-        growth = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
+        log_modulus_slope = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
     depth, stiffness = a * a / radius, 2.0 * modulus * a
     force, stretch = 2.0 / 3.0 * stiffness * depth, math.sqrt(2.0 * math.pi * a / modulus)
-    by_force, by_depth, by_stiffness = 3.0 * inverse + growth, 2.0 * inverse, inverse + growth
-    by_stretch = 0.5 * (inverse - growth)
-    if whole > 0:
-        force, depth, slope = _whole_sphere(a, radius)
-        force, by_force, by_depth = modulus * force, stiffness * slope / (modulus * force) + growth, slope / depth
+    by_force, by_depth, by_stiffness = 3.0 * inverse + log_modulus_slope, 2.0 * inverse, inverse + log_modulus_slope
+    by_stretch = 0.5 * (inverse - log_modulus_slope)
+    if deep > 0:
+        force, depth, slope = _deep_sphere(a, radius)
+        force, by_force, by_depth = (
+            modulus * force,
+            stiffness * slope / (modulus * force) + log_modulus_slope,
+            slope / depth,
+        )
     if thickness > 0:
         cells = cubics.shape[0]
-        place = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
-        cell = min(int(place), cells - 1)
-        u = (place - cell) * LARGEST_A_OVER_H / cells
-        per_h = 1.0 / thickness if place < cells else 0.0
+        position = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
+        cell = min(int(position), cells - 1)
+        u = (position - cell) * LARGEST_A_OVER_H / cells
+        per_h = 1.0 / thickness if position < cells else 0.0
         c3, c2, c1, c0 = cubics[cell, 0], cubics[cell, 1], cubics[cell, 2], cubics[cell, 3]
         of_force = ((c3[0] * u + c2[0]) * u + c1[0]) * u + c0[0]
         of_depth = ((c3[1] * u + c2[1]) * u + c1[1]) * u + c0[1]
@@ -145,7 +149,7 @@ def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
         )
     if share != 0:
         ratio, by_a = _strain_ratio(
-            LOAD_OF_REDUCED * force / (modulus * radius**2), by_force - growth, whole, cubics[cell], u, per_h
+            LOAD_OF_REDUCED * force / (modulus * radius**2), by_force - log_modulus_slope, deep, cubics[cell], u, per_h
         )
         total = 1.0 + share * ratio
         depth, by_depth = depth * total, by_depth + share * by_a / total
@@ -153,32 +157,32 @@ def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
 
 
 @compiled()
-def _travel(a: float, root_work: float, own: Own, cubics: Floats) -> tuple[float, float]:
+def _travel(a: float, root_work: float, constants: Constants, cubics: Floats) -> tuple[float, float]:
     """δ + F/k in equilibrium, where δ and F fall by ℓ and K ℓ, and its derivative by a."""
-    (force, depth, stiffness, unit), (by_force, by_depth, by_stiffness, by_stretch) = _contact(a, own, cubics)
+    (force, depth, stiffness, unit), (by_force, by_depth, by_stiffness, by_stretch) = _contact(a, constants, cubics)
     stretch = unit * root_work
     lost = stiffness * stretch
-    travel = depth - stretch + own[2] * (force - lost)
+    travel = depth - stretch + constants[2] * (force - lost)
     of_force = force * by_force - lost * (by_stiffness + by_stretch)
-    return travel, depth * by_depth - stretch * by_stretch + own[2] * of_force
+    return travel, depth * by_depth - stretch * by_stretch + constants[2] * of_force
 
 
 @compiled()
-def _solved(aim: float, start: float, lowest: float, root_work: float, own: Own, cubics: Floats) -> Four:
-    """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: where, its travel and slope.
+def _solved(target: float, start: float, lowest: float, root_work: float, constants: Constants, cubics: Floats) -> Four:
+    """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: its radius, travel and slope.
 
-    Newton's steps, and halvings where one leaves the bracket known so far.
+    Newton steps, and halvings where one leaves the current bracket.
     """
     radius, below, above, bounded = start, lowest, math.inf, False
     touching = at_touching = slope = 0.0
     for _ in range(_STEPS):
         touching = radius
-        at_touching, slope = _travel(radius, root_work, own, cubics)
-        if at_touching > aim:
+        at_touching, slope = _travel(radius, root_work, constants, cubics)
+        if at_touching > target:
             above = radius
         else:
             below, bounded = radius, True
-        step = (at_touching - aim) / slope if slope > 0 else 0.5 * radius
+        step = (at_touching - target) / slope if slope > 0 else 0.5 * radius
         radius = max(radius - min(max(step, -radius), 0.9 * radius), lowest)
         if slope > 0 and abs(radius - touching) <= _TOLERANCE * touching:
             break
@@ -197,53 +201,58 @@ def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> No
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
             for sample in range(samples):
-                here, _ = _contact(a[point, curve, sample], _of(body, point, curve, sample), layer)
+                here, _ = _contact(a[point, curve, sample], _constants(body, point, curve, sample), layer)
                 for number in range(4):
                     contact[number, point, curve, sample] = here[number]
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, {_BODY})")
 def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Floats, cubics: Floats) -> None:
-    """Solve travel(a) = travel by Newton's steps from radii `a` above, in place.
+    """Solve travel(a) = travel by Newton steps from radii `a` above, in place.
 
-    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). The parabola through the last
-    two samples' tangents leads so near the radius of the next that one step is mostly enough.
+    `work` and `least`, the lower bound of the radius, are (points, curves, samples or 1). The parabola through the
+    last two samples' tangents gives a start for the next from which one step is mostly enough.
     """
     points, curves, samples = travel.shape
-    alike = work.shape[2] == 1 and body.shape[2] == 1
+    is_uniform = work.shape[2] == 1 and body.shape[2] == 1
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
-            own, root_work = _of(body, point, curve, 0), math.sqrt(work[point, curve, 0])
-            touching, at_touching, slope, bend = 0.0, 0.0, 0.0, 0.0
+            constants, root_work = _constants(body, point, curve, 0), math.sqrt(work[point, curve, 0])
+            touching, at_touching, slope, curvature = 0.0, 0.0, 0.0, 0.0
             for sample in range(samples):
-                if not alike:
-                    own = _of(body, point, curve, sample)
+                if not is_uniform:
+                    constants = _constants(body, point, curve, sample)
                     root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
                 lowest = least[point, curve, min(sample, least.shape[2] - 1)]
-                aim, radius = travel[point, curve, sample], a[point, curve, sample]
-                if root_work == 0 and aim <= 0:  # not in contact, where Newton's steps would shrink without end
+                target, radius = travel[point, curve, sample], a[point, curve, sample]
+                if root_work == 0 and target <= 0:  # not in contact, where Newton's steps would shrink without end
                     a[point, curve, sample], slope = max(lowest, _NO_CONTACT), 0.0
                     continue
-                if alike and slope > 0:
-                    tangent = (aim - at_touching) / slope
-                    bent = 0.5 * bend * tangent / slope
-                    radius = min(radius, touching + tangent * (1.0 - min(max(bent, -_BENT), _BENT)))
+                if is_uniform and slope > 0:
+                    tangent = (target - at_touching) / slope
+                    correction = 0.5 * curvature * tangent / slope
+                    radius = min(
+                        radius,
+                        touching + tangent * (1.0 - min(max(correction, -_LARGEST_CORRECTION), _LARGEST_CORRECTION)),
+                    )
                 before, former = touching, slope
-                radius, touching, at_touching, slope = _solved(aim, max(radius, lowest), lowest, root_work, own, layer)
-                bend = (slope - former) / (touching - before) if former > 0 and touching != before else 0.0
+                radius, touching, at_touching, slope = _solved(
+                    target, max(radius, lowest), lowest, root_work, constants, layer
+                )
+                curvature = (slope - former) / (touching - before) if former > 0 and touching != before else 0.0
                 a[point, curve, sample] = radius
 
 
 @compiled()
-def _least_travel(low: float, high: float, root_work: float, own: Own, cubics: Floats) -> float:
-    """The radius between two at which the travel's slope is 0; the bound that is nearer where it keeps its sign.
+def _least_travel(low: float, high: float, root_work: float, constants: Constants, cubics: Floats) -> float:
+    """The radius between two at which the slope of the travel is 0; the nearer bound where it does not change sign.
 
-    Regula falsi (Illinois) of slope √a over a^(3/2), which is straight for JKR's contact with a half space.
+    Regula falsi (Illinois) of slope √a over a^(3/2), which is linear for JKR's contact with a half space.
     """
     below, above = low**1.5, high**1.5
-    at_below = _travel(low, root_work, own, cubics)[1] * math.sqrt(low)
-    at_above = _travel(high, root_work, own, cubics)[1] * math.sqrt(high)
+    at_below = _travel(low, root_work, constants, cubics)[1] * math.sqrt(low)
+    at_above = _travel(high, root_work, constants, cubics)[1] * math.sqrt(high)
     if at_below >= 0:
         return low
     if at_above <= 0:
@@ -254,49 +263,49 @@ def _least_travel(low: float, high: float, root_work: float, own: Own, cubics: F
         radius, before = power ** (2 / 3), radius
         if abs(radius - before) <= _TOLERANCE * radius:
             break
-        found = _travel(radius, root_work, own, cubics)[1] * math.sqrt(radius)
-        if found > 0:
-            above, at_above, at_below = power, found, 0.5 * at_below
+        scaled_slope = _travel(radius, root_work, constants, cubics)[1] * math.sqrt(radius)
+        if scaled_slope > 0:
+            above, at_above, at_below = power, scaled_slope, 0.5 * at_below
         else:
-            below, at_below, at_above = power, found, 0.5 * at_above
+            below, at_below, at_above = power, scaled_slope, 0.5 * at_above
     return radius
 
 
 @compiled(f"void({_ROWS}, {_BODY}, {_ROWS}, {_ROWS})")
 def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, travel: Floats) -> None:
-    """Fill the radius and the travel at which the travel is least in equilibrium."""
+    """Fill the radius and the travel at which the equilibrium travel is least."""
     points, curves, samples = radius.shape
     for point in range(points):
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
             for sample in range(samples):
-                own = _of(body, point, curve, sample)
+                constants = _constants(body, point, curve, sample)
                 root_work = math.sqrt(work[point, curve, sample])
-                unit = (2.0 * math.pi * root_work**2 * own[1] ** 2 / own[0]) ** (1 / 3)
-                low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
+                unit = (2.0 * math.pi * root_work**2 * constants[1] ** 2 / constants[0]) ** (1 / 3)
+                low, high, thickness = 0.02 * unit, 4.0 * unit, constants[3]
                 if thickness > 0:
                     low, high = min(low, 0.1 * LARGEST_A_OVER_H * thickness), min(high, LARGEST_A_OVER_H * thickness)
-                high = _least_travel(low, high, root_work, own, layer) if low < high else high
+                high = _least_travel(low, high, root_work, constants, layer) if low < high else high
                 radius[point, curve, sample] = high
-                travel[point, curve, sample] = _travel(high, root_work, own, layer)[0]
+                travel[point, curve, sample] = _travel(high, root_work, constants, layer)[0]
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, boolean[:, :, ::1], {_ROWS})")
-def edge_rows(advancing: Floats, receding: Floats, held: Mask, a: Floats) -> None:
-    """Fill the radius of an edge that advances to `advancing`, recedes to `receding`, and rests in between; it begins
-    anew after a sample out of contact."""
+def edge_rows(advancing: Floats, receding: Floats, contact_mask: Mask, a: Floats) -> None:
+    """Fill the radius of an edge that advances to `advancing`, recedes to `receding`, and rests in between; it restarts
+    after a sample out of contact."""
     points, curves, samples = a.shape
     for point in range(points):
         for curve in range(curves):
             edge = 0.0
             for sample in range(samples):
                 forward = advancing[point, curve, sample]
-                if held[point, curve, sample] and edge > 0:
+                if contact_mask[point, curve, sample] and edge > 0:
                     edge = min(max(edge, forward), receding[point, curve, sample])
                 else:
                     edge = forward
                 a[point, curve, sample] = edge
-                if not held[point, curve, sample]:
+                if not contact_mask[point, curve, sample]:
                     edge = 0.0
 
 
@@ -313,48 +322,48 @@ _PAIRS = "float64[:, ::1], float64[:, ::1]"
 
 @compiled()
 def _lagging(x: float) -> float:
-    """(1 − e^(−x))/x: what is left of a steady change at its end, x of its duration over τ."""
+    """(1 − e^(−x))/x: the remaining fraction of a steady change at its end, x its duration over τ."""
     return 1 - x / 2 + x**2 / 6 if x < _SERIES else -math.expm1(-x) / x
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, float64[:, ::1], {_MEMORY})")
 def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) -> None:
-    """Fill Y = ∫ e^(−(t−s)/τ) du(s) of histories u, straight between samples; what u is at the first came at once."""
+    """Fill Y = ∫ e^(−(t−s)/τ) du(s) of histories u, linear between samples; u at the first sample is a step."""
     points, curves, samples = history.shape
     for point in range(points):
         for curve in range(curves):
-            u, t, own = history[point, curve], time[point, curve], memory[point, curve]
+            u, t, memories = history[point, curve], time[point, curve], memory[point, curve]
             for pair in range(times.shape[1]):
-                own[0, pair] = u[0]
+                memories[0, pair] = u[0]
                 for sample in range(1, samples):
                     x = max(t[sample] - t[sample - 1], 0.0) / times[point, pair]
                     step = _lagging(x) * (u[sample] - u[sample - 1])
-                    own[sample, pair] = math.exp(-x) * own[sample - 1, pair] + step
+                    memories[sample, pair] = math.exp(-x) * memories[sample - 1, pair] + step
 
 
 @compiled()
-def _carried(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) -> tuple[float, float]:
-    """H(s,t) of a ring that was reached at a depth and time, with the memory of depths then, and e(t−s)."""
+def _relaxed_depth(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) -> tuple[float, float]:
+    """H(s,t) of a ring reached at a depth and time, with the memory of depths then, and e(t−s)."""
     age = max(now[1] - time, 0.0)
-    carried, remaining = now[0] - depth, 1.0
+    relaxed_depth, remaining = now[0] - depth, 1.0
     for pair in range(len(pairs[0])):
         fraction, decay = pairs[0][pair], math.exp(-age / pairs[1][pair])
-        carried += fraction * (now[2][pair] - decay * memory[pair] - now[0] + depth)
+        relaxed_depth += fraction * (now[2][pair] - decay * memory[pair] - now[0] + depth)
         remaining -= fraction * (1.0 - decay)
-    return carried, remaining
+    return relaxed_depth, remaining
 
 
 @compiled()
 def _excess(ring: int, rings: Rings, pairs: Pairs, now: Now) -> float:
-    """H(s,t) + ℓ_s − ℓ e(t−s) of a ring, above 0 where it holds."""
-    depth, time, memory, slack, parting = rings
-    carried, remaining = _carried(depth[ring], time[ring], memory[ring], pairs, now)
-    return float(carried + parting[ring] - slack[ring] * remaining)
+    """H(s,t) + ℓ_s − ℓ e(t−s) of a ring: at least 0 while it holds."""
+    depth, time, memory, advancing_stretch, receding_stretch = rings
+    relaxed_depth, remaining = _relaxed_depth(depth[ring], time[ring], memory[ring], pairs, now)
+    return float(relaxed_depth + receding_stretch[ring] - advancing_stretch[ring] * remaining)
 
 
 @compiled()
 def _between(low: int, high: int, share: float, rings: Rings, pairs: Pairs, memory: Floats) -> None:
-    """Fill the memory of depths of a ring that was reached at a share of the way between two samples."""
+    """Fill the memory of depths for a ring reached at a fraction `share` of the way between two samples."""
     for pair in range(len(memory)):
         x = share * max(rings[1][high] - rings[1][low], 0.0) / pairs[1][pair]
         change = share * (rings[0][high] - rings[0][low])
@@ -363,7 +372,7 @@ def _between(low: int, high: int, share: float, rings: Rings, pairs: Pairs, memo
 
 @compiled()
 def _last_sample(low: int, high: int, record: Indices, rings: Rings, pairs: Pairs, now: Now) -> int:
-    """The last of the samples from `low`, which holds, to `high` that does."""
+    """The last of the samples from `low`, whose ring holds, to `high` whose ring holds."""
     if _excess(high, rings, pairs, now) >= 0:
         return high
     while high - low > 1:
@@ -378,8 +387,8 @@ def _last_sample(low: int, high: int, record: Indices, rings: Rings, pairs: Pair
 
 @compiled()
 def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Floats) -> float:
-    """The share of the way between two samples up to which rings hold: regula falsi, the end that stays halved."""
-    depth, time, _, slack, parting = rings
+    """The fraction of the way between two samples up to which rings hold (regula falsi, Illinois)."""
+    depth, time, _, advancing_stretch, receding_stretch = rings
     at_near, at_far = _excess(low, rings, pairs, now), _excess(high, rings, pairs, now)
     inner, outer, share = 0.0, 1.0, 0.0
     for _ in range(_SECANTS):
@@ -390,10 +399,16 @@ def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Fl
         if settled:
             break
         _between(low, high, share, rings, pairs, memory)
-        place = depth[low] + share * (depth[high] - depth[low])
-        carried, remaining = _carried(place, time[low] + share * (time[high] - time[low]), memory, pairs, now)
-        stretch = parting[low] + share * (parting[high] - parting[low])
-        value = carried + stretch - (slack[low] + share * (slack[high] - slack[low])) * remaining
+        position = depth[low] + share * (depth[high] - depth[low])
+        relaxed_depth, remaining = _relaxed_depth(
+            position, time[low] + share * (time[high] - time[low]), memory, pairs, now
+        )
+        stretch = receding_stretch[low] + share * (receding_stretch[high] - receding_stretch[low])
+        value = (
+            relaxed_depth
+            + stretch
+            - (advancing_stretch[low] + share * (advancing_stretch[high] - advancing_stretch[low])) * remaining
+        )
         if value >= 0:
             inner, at_near, at_far = share, value, 0.5 * at_far
         else:
@@ -409,23 +424,23 @@ def creep_edge_rows(
     depth: Floats,
     time: Floats,
     depth_memory: Floats,
-    slack: Floats,
-    parting: Floats,
+    advancing_stretch: Floats,
+    receding_stretch: Floats,
     force: Floats,
     force_memory: Floats,
     record: Indices,
-    begins: Indices,
+    first_contact: Indices,
     fractions: Floats,
     times: Floats,
     edge: Floats,
-    carried: Floats,
-    kept: Floats,
+    relaxed_depth: Floats,
+    memory_force: Floats,
     stuck: Mask,
 ) -> None:
-    """Of samples after the last deeper one (`record`) fill whether any ring holds, and of the outermost that does the
-    depth δ it was reached at, H(s,t), and Σ g e^(−(t−s)/τ) Y of the force then.
+    """For samples after the last deeper one (`record`) fill whether any ring holds, and of the outermost ring that does
+    the depth δ at which it was reached, H(s,t), and Σ g e^(−(t−s)/τ) Y of the force then.
 
-    Rings let go one after another from the outermost; the one about to lies between two samples.
+    Rings let go one after another from the outermost; the next one lies between two samples.
     """
     points, curves, samples = depth.shape
     memory = np.empty(fractions.shape[1])
@@ -433,8 +448,8 @@ def creep_edge_rows(
         pairs = fractions[point], times[point]
         for curve in range(curves):
             here = point, curve
-            rings = depth[here], time[here], depth_memory[here], slack[here], parting[here]
-            first = begins[here]
+            rings = depth[here], time[here], depth_memory[here], advancing_stretch[here], receding_stretch[here]
+            first = first_contact[here]
             for sample in range(first, samples):
                 high = record[point, curve, sample]
                 now = depth[point, curve, sample], time[point, curve, sample], depth_memory[point, curve, sample]
@@ -444,15 +459,15 @@ def creep_edge_rows(
                 high = min(low + 1, high)
                 share = _share(low, high, rings, pairs, now, memory) if high > low else 0.0
                 _between(low, high, share, rings, pairs, memory)
-                place = rings[0][low] + share * (rings[0][high] - rings[0][low])
-                reached = rings[1][low] + share * (rings[1][high] - rings[1][low])
+                position = rings[0][low] + share * (rings[0][high] - rings[0][low])
+                ring_time = rings[1][low] + share * (rings[1][high] - rings[1][low])
                 stuck[point, curve, sample] = True
-                edge[point, curve, sample] = place
-                carried[point, curve, sample] = _carried(place, reached, memory, pairs, now)[0]
-                of_force = force[here], time[here], force_memory[here], slack[here], parting[here]
+                edge[point, curve, sample] = position
+                relaxed_depth[point, curve, sample] = _relaxed_depth(position, ring_time, memory, pairs, now)[0]
+                of_force = force[here], time[here], force_memory[here], advancing_stretch[here], receding_stretch[here]
                 _between(low, high, share, of_force, pairs, memory)
                 total = 0.0
                 for pair in range(len(memory)):
-                    age = max(now[1] - reached, 0.0)
+                    age = max(now[1] - ring_time, 0.0)
                     total += pairs[0][pair] * math.exp(-age / pairs[1][pair]) * memory[pair]
-                kept[point, curve, sample] = total
+                memory_force[point, curve, sample] = total

@@ -1,1 +1,1 @@
-"""Laws that nobody listed: where one enters the model × what it follows × its form, each a mechanism like any other."""
+"""Unlisted laws: quantity acted on × axis × form, each a mechanism like any other."""

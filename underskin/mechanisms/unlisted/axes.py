@@ -1,7 +1,7 @@
-"""What a law that nobody listed may follow, from recording to recording: fields, times, places, order, `conditions`.
+"""The axes that an unlisted law may follow from recording to recording: fields, times, positions, order, `conditions`.
 
-An axis holds one number a recording, by the recording's id: laws are bound to it, so that a campaign of which some
-recordings are left out has the same order, the same preload before, and the same range.
+An axis holds one number per recording, by the recording's id: laws are bound to it, so that a subset of a campaign
+has the same order, the same previous preload, and the same range.
 """
 
 from collections import Counter
@@ -39,9 +39,9 @@ BUILT_IN = tuple(UNITS)
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One number a recording. `relative`: to that of the recording itself (the preload before over its own).
+    """One number per recording. `relative`: divided by that of the recording itself (previous preload over its own).
 
-    `words`: what the numbers 0, 1, … stand for, of an axis of words.
+    `words`: the words that the numbers 0, 1, … stand for.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Axis:
 
     @property
     def unit(self) -> str:
-        """Of its values, as in UNITS of mechanisms."""
+        """The unit of its values, one of UNITS of mechanisms."""
         return "-" if self.relative else UNITS.get(self.name, "-")
 
     @cached_property
     def levels(self) -> Floats:
-        """The distinct values, rising."""
+        """The distinct values, ascending."""
         values = np.unique(list(self.values.values()))
         step = _SAME * max(float(np.ptp(values)), 1e-300)
         return np.asarray(values[np.append(True, np.diff(values) > step)])
@@ -80,18 +80,18 @@ class Axis:
 
     @property
     def positive(self) -> bool:
-        """Whether a power of it makes sense: positive, and over a factor of 1.5 at least."""
+        """Whether a power law of it makes sense: positive, over a factor of 1.5 at least."""
         return not self.words and self.low > 0 and self.high > 1.5 * self.low
 
     def of(self, ids: Sequence[str]) -> Floats:
-        """The values of these recordings (recordings,)."""
+        """The values for these recordings (recordings,)."""
         return np.array([self.values[name] for name in ids])
 
 
 def axes_of(conditions: Conditions) -> list[Axis]:
     """The axes on which the FRF recordings differ; a field that one of them lacks is none.
 
-    A column of `conditions` is one as well, where at least two thirds of the recordings have it.
+    A column of `conditions` is an axis where at least two thirds of the recordings have it.
     """
     axes = [axis for axis in every_axis(conditions) if len(axis.levels) > 1]
     days = {int(value // 24) for axis in axes if axis.name == "recorded_at" for value in axis.values.values()}
@@ -99,62 +99,61 @@ def axes_of(conditions: Conditions) -> list[Axis]:
 
 
 def every_axis(conditions: Conditions, origin: datetime | None = None) -> list[Axis]:
-    """The axes that the FRF recordings have, whether or not they differ; times count from the `origin` where one is
-    given, else from the first midnight."""
-    entries = frf_of(conditions)
+    """All axes of the FRF recordings, constant ones too; times count from `origin`, else from the first midnight."""
+    recordings = frf_of(conditions)
     columns: dict[str, list[float | None]] = {
-        name: [getattr(entry, name) for entry in entries]
+        name: [getattr(recording, name) for recording in recordings]
         for name in ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s")
     }
-    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors}
-    position = np.array([entry.position_mm or places[entry.sensor] for entry in entries])
+    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors}
+    position = np.array([recording.position_mm or positions[recording.sensor] for recording in recordings])
     columns |= {"x_mm": position[:, 0].tolist(), "y_mm": position[:, 1].tolist()}
-    times = _times(entries)
+    times = _times(recordings)
     if times is not None:
         origin = origin or min(times).replace(hour=0, minute=0, second=0, microsecond=0)
         columns["recorded_at"] = [(time - origin).total_seconds() / 3600 for time in times]
         columns["time_of_day"] = [(time.hour * 3600 + time.minute * 60 + time.second) / 3600 for time in times]
-    rank = recording_order(entries)
+    rank = recording_order(recordings)
     columns["order"] = rank.tolist()
-    ids = [entry.id for entry in entries]
+    ids = [recording.id for recording in recordings]
     axes = [
-        Axis(name, dict(zip(ids, known, strict=True)), origin=origin if name == "recorded_at" else None)
+        Axis(name, dict(zip(ids, present, strict=True)), origin=origin if name == "recorded_at" else None)
         for name, column in columns.items()
-        if len(known := [value for value in column if value is not None]) == len(ids)
+        if len(present := [value for value in column if value is not None]) == len(ids)
     ]
-    axes += _previous(entries, rank)
-    axes.append(_worded("sensor", ids, [entry.sensor for entry in entries]))
-    axes += _further(entries)
+    axes += _previous(recordings, rank)
+    axes.append(_worded("sensor", ids, [recording.sensor for recording in recordings]))
+    axes += _further(recordings)
     return axes
 
 
-def recording_order(entries: Sequence[FrfConditions]) -> Floats:
-    """Which recording came how late, from 0 (recordings,): by its time, else by its load cycles, else as listed."""
-    times = _times(entries)
+def recording_order(recordings: Sequence[FrfConditions]) -> Floats:
+    """The rank of each recording, from 0 (recordings,): by time, else by load cycles, else as listed."""
+    times = _times(recordings)
     seconds = None if times is None else [time.timestamp() for time in times]
-    cycles = [float(entry.load_cycles) for entry in entries if entry.load_cycles is not None]
+    cycles = [float(recording.load_cycles) for recording in recordings if recording.load_cycles is not None]
     for column in (seconds, cycles):
-        if column is not None and len(set(column)) == len(entries):
+        if column is not None and len(set(column)) == len(recordings):
             return np.argsort(np.argsort(np.array(column))).astype(float)
-    return np.arange(len(entries), dtype=float)
+    return np.arange(len(recordings), dtype=float)
 
 
-def _times(entries: Sequence[FrfConditions]) -> list[datetime] | None:
-    """Local times; None where one is lacking."""
-    if any(entry.recorded_at is None for entry in entries):
+def _times(recordings: Sequence[FrfConditions]) -> list[datetime] | None:
+    """Local times; None where one is missing."""
+    if any(recording.recorded_at is None for recording in recordings):
         return None
     zone = time_zone()
-    read = [datetime.fromisoformat(str(entry.recorded_at).replace("Z", "+00:00")) for entry in entries]
-    return [time.astimezone(zone) if time.tzinfo else time.replace(tzinfo=zone) for time in read]
+    times = [datetime.fromisoformat(str(recording.recorded_at).replace("Z", "+00:00")) for recording in recordings]
+    return [time.astimezone(zone) if time.tzinfo else time.replace(tzinfo=zone) for time in times]
 
 
-def _previous(entries: Sequence[FrfConditions], rank: Floats) -> list[Axis]:
-    """The preload of the recording before, and over the recording's own; the first has its own as the one before."""
-    place = np.argsort(rank)
-    preload = np.array([entry.preload_n for entry in entries])
+def _previous(recordings: Sequence[FrfConditions], rank: Floats) -> list[Axis]:
+    """The preload of the previous recording, and over the recording's own; for the first recording its own."""
+    order = np.argsort(rank)
+    preload = np.array([recording.preload_n for recording in recordings])
     before = preload.copy()
-    before[place[1:]] = preload[place[:-1]]
-    ids = [entry.id for entry in entries]
+    before[order[1:]] = preload[order[:-1]]
+    ids = [recording.id for recording in recordings]
     return [
         Axis("previous_preload_n", dict(zip(ids, before.tolist(), strict=True))),
         Axis("previous_preload_n", dict(zip(ids, (before / preload).tolist(), strict=True)), relative=True),
@@ -162,25 +161,26 @@ def _previous(entries: Sequence[FrfConditions], rank: Floats) -> list[Axis]:
 
 
 def _worded(name: str, ids: Sequence[str], words: Sequence[str]) -> Axis:
-    known = sorted(set(words))
-    number = {word: float(place) for place, word in enumerate(known)}
-    return Axis(name, {key: number[word] for key, word in zip(ids, words, strict=True)}, tuple(known))
+    distinct = sorted(set(words))
+    number = {word: float(index) for index, word in enumerate(distinct)}
+    return Axis(name, {key: number[word] for key, word in zip(ids, words, strict=True)}, tuple(distinct))
 
 
-def _further(entries: Sequence[FrfConditions]) -> list[Axis]:
-    """The columns of `conditions`, numbers or words; where a value is missing, the middle one stands for it."""
+def _further(recordings: Sequence[FrfConditions]) -> list[Axis]:
+    """The columns of `conditions`, numbers or words; a missing value is replaced by the median or the commonest
+    word."""
     axes = []
-    for name in sorted({name for entry in entries for name in entry.conditions or {}}):
-        given = {entry.id: (entry.conditions or {}).get(name) for entry in entries}
-        known = {key: value for key, value in given.items() if value is not None}
-        if 3 * len(known) < 2 * len(entries):
+    for name in sorted({name for recording in recordings for name in recording.conditions or {}}):
+        stated = {recording.id: (recording.conditions or {}).get(name) for recording in recordings}
+        present = {key: value for key, value in stated.items() if value is not None}
+        if 3 * len(present) < 2 * len(recordings):
             continue
-        if any(isinstance(value, str) for value in known.values()):
-            words = [str(value) for value in known.values()]
+        if any(isinstance(value, str) for value in present.values()):
+            words = [str(value) for value in present.values()]
             counts = Counter(words)
-            common = max(sorted(counts), key=counts.__getitem__)
-            axes.append(_worded(name, list(given), [str(known.get(key, common)) for key in given]))
+            usual = max(sorted(counts), key=counts.__getitem__)
+            axes.append(_worded(name, list(stated), [str(present.get(key, usual)) for key in stated]))
         else:
-            middle = float(np.median([float(value) for value in known.values()]))
-            axes.append(Axis(name, {key: float(known.get(key, middle)) for key in given}))
+            middle = float(np.median([float(value) for value in present.values()]))
+            axes.append(Axis(name, {key: float(present.get(key, middle)) for key in stated}))
     return axes

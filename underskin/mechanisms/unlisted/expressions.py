@@ -1,13 +1,10 @@
-"""Laws of the grammar on curves, and laws written as expressions.
+"""Unlisted laws of indentation curves, and all unlisted laws as written expressions and as functions of their axis.
 
-Laws that nobody listed, of indentation curves: what they change from sample to sample, over depth, force or time.
-
-Where they enter: the force of the contact, F (1 + u), as the modulus has it where nothing sticks and no stage gives;
-the gain of the cell, F (1 + u); the force that the cell reads, F + u; the place of the surface along the travel, d + u.
-What they follow: the depth beyond the contact point, the force of the contact, the time since a recording began. Forms
-are those of laws over recordings (forms.py), with powers and with a step where the sphere turns back.
-
-A law as an expression with numbers and units, and as a course over its axis.
+A law of curves changes each sample over depth, force or time. It acts on: the contact force, F (1 + u), equivalent
+to the modulus without adhesion and stage compliance; the gain of the cell, F (1 + u); the reading of the cell, F +
+u; the position of the surface along the travel, d + u. It follows the depth beyond the contact point, the contact
+force, or the time since a recording began. Forms are those of laws over recordings (forms.py), with powers, and with
+a step where the sphere turns back.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +26,7 @@ from underskin.mechanisms.unlisted.laws import PREFIX, LagLaw, LawDescription, R
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, AXES, ActsOn, Form
 from underskin.units import Array, Floats
 
-_ENTERS: tuple[tuple[ActsOn, str, tuple[Form, ...]], ...] = (  # where, what it follows, and the forms it may have there
+_ENTERS: tuple[tuple[ActsOn, str, tuple[Form, ...]], ...] = (  # quantity, axis, and forms
     ("modulus", "displacement_mm", ("linear", "power", "saturating", "threshold")),
     ("modulus", "time_s", ("linear", "power", "saturating", "threshold", "step")),
     ("gain", "force_n", ("linear", "power", "saturating", "threshold")),
@@ -42,7 +39,7 @@ _FORMS: Mapping[Form, float] = {
     "linear": 0.25, "power": 0.25, "saturating": 0.2, "threshold": 0.1, "step": 0.1, "periodic": 0.1, "peak": 0.1,
 }  # fmt: skip
 _RELATIVE, _OF_LARGEST = 0.2, 0.1  # sds of the prior: of a relative change; of the largest force or depth
-_MOST = 0.9  # what they are bounded by
+_MOST = 0.9  # bound of these changes
 _LEVELS = 31  # at which an axis is looked at
 _LEAST = 1e-6  # of the range: powers begin at 0
 TURN = "turn"  # the variant of a step
@@ -51,54 +48,54 @@ _REASON = "how a change grows over the measured range: 0.5 with its root, 2 with
 
 @dataclass(frozen=True)
 class Extent:
-    """How far the curves of a campaign reach: depth [mm], force [N], and time [s] since each recording began; when each
-    recording begins and when it turns back [s], by its id."""
+    """The ranges of a campaign's curves: depth [mm], force [N], and time [s] since each recording began; start and
+    turning time of each recording [s], by its id."""
 
     depth_mm: float
     force_n: float
     time_s: float
-    begins: Mapping[str, float]
-    turns: Mapping[str, float]
+    start_times: Mapping[str, float]
+    turn_times: Mapping[str, float]
 
 
 class CurveLaw(UnlistedLaw):
-    """A law that changes what each sample of a curve shows."""
+    """An unlisted law that changes each sample of a curve."""
 
     kinds: ClassVar[tuple[Kind, ...]] = ("indentation",)
     stage = Stage.CURVE
     order = 200
 
     def __init__(self, acts_on: ActsOn, axis: Axis, shape: Shape, extent: Extent) -> None:
-        """Bind the form to how far the curves of a campaign reach."""
+        """Bind the form to the ranges of the campaign's curves."""
         self.name = PREFIX + "__".join(filter(None, (acts_on, axis.name, shape.form, shape.variant)))
         self.description = LawDescription(acts_on, axis.name, shape.form)
         self.axis, self.shape = axis, shape
         self._extent = extent
-        unit, share, whole = {
+        unit, share, largest = {
             "force": ("N", _OF_LARGEST, extent.force_n),
             "position": ("mm", _OF_LARGEST, extent.depth_mm),
         }.get(acts_on, ("-", _RELATIVE, 1.0))
-        amplitudes = changes("law_change", unit, share * whole, shape.count, _MOST / share)
-        self.amplitudes = tuple(entry.name for entry in amplitudes)
-        self.parameters_bound = (*amplitudes, *shape.bending)
+        amplitudes = changes("law_change", unit, share * largest, shape.count, _MOST / share)
+        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
+        self.parameters_bound = (*amplitudes, *shape.shape_parameters)
         self.grid = shape.points
 
     def on_curve(self, curve: Curve, values: Values) -> None:
-        """Change its samples."""
-        own = {name: of_samples(value) for name, value in values.items()}
-        curve.laws.append(_Bound(self, own))
+        """Add the law at these parameter values to the curve's laws."""
+        sample_values = {name: of_samples(value) for name, value in values.items()}
+        curve.laws.append(_Bound(self, sample_values))
 
     def features(self, samples: Samples, force: Floats, values: Values) -> Sequence[Feature]:
-        """Of samples (points, curves, samples) where the contact bears the `force` [N]."""
-        return self.shape.features(self._along(samples, force), values)
+        """The features at samples (points, curves, samples) where the contact force is `force` [N]."""
+        return self.shape.features(self._axis_values(samples, force), values)
 
-    def _along(self, samples: Samples, force: Floats) -> Floats:
+    def _axis_values(self, samples: Samples, force: Floats) -> Floats:
         """The axis at each sample."""
         if self.axis.name == "displacement_mm":
             return np.asarray(1e3 * np.maximum(samples.travel, 0.0))
         if self.axis.name == "force_n":
             return np.maximum(force, 0.0)
-        origin = self._extent.turns if self.shape.variant == TURN else self._extent.begins
+        origin = self._extent.turn_times if self.shape.variant == TURN else self._extent.start_times
         return np.asarray(samples.time - np.array([origin[name] for name in samples.ids])[:, None])
 
 
@@ -109,14 +106,14 @@ class _Bound:
     law: CurveLaw
     values: Values
 
-    def moved(self, samples: Samples, travel: Floats) -> Floats:
+    def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
         """The travel [m] at which a sphere presses."""
         if self.law.description.acts_on != "position":
             return travel
         return travel + 1e-3 * self._change(samples, np.zeros_like(travel))
 
-    def read(self, samples: Samples, force: Floats) -> Floats:
-        """The force [N] that is read where the contact bears `force`."""
+    def measured_force(self, samples: Samples, force: Floats) -> Floats:
+        """The measured force [N] where the contact force is `force`."""
         if self.law.description.acts_on == "position":
             return force
         change = self._change(samples, force)
@@ -125,38 +122,41 @@ class _Bound:
     def _change(self, samples: Samples, force: Floats) -> Floats:
         features = self.law.features(samples, force, self.values)
         parts = [
-            self.values[name].value * (one.value if isinstance(one, Differentiated) else one)
-            for name, one in zip(self.law.amplitudes, features, strict=True)
+            self.values[name].value * (feature.value if isinstance(feature, Differentiated) else feature)
+            for name, feature in zip(self.law.amplitudes, features, strict=True)
         ]
         return np.asarray(reduce(add, parts))
 
 
 def curve_laws(extent: Extent, *, timed: bool) -> list[tuple[CurveLaw, float]]:
-    """The laws of a campaign of indentations, each with its log share of the prior; `timed` where the samples have
+    """The laws for a campaign of indentations, each with its log share of the prior; `timed`: the samples have
     times."""
     ranges = {"displacement_mm": extent.depth_mm, "force_n": extent.force_n, "time_s": extent.time_s}
     axes = {
-        name: Axis(name, {str(place): value for place, value in enumerate(np.linspace(0, high, _LEVELS).tolist())})
+        name: Axis(name, {str(index): value for index, value in enumerate(np.linspace(0, high, _LEVELS).tolist())})
         for name, high in ranges.items()
         if high > 0 and (timed or name != "time_s")
     }
-    entries = [(acts_on, axes[name], forms) for acts_on, name, forms in _ENTERS if name in axes]
+    combinations = [(acts_on, axes[name], forms) for acts_on, name, forms in _ENTERS if name in axes]
     laws: list[tuple[CurveLaw, float]] = []
-    for acts_on, axis, forms in entries:
+    for acts_on, axis, forms in combinations:
         for form in forms:
-            own = _shapes(form, axis, extent)
-            share = _FORMS[form] / sum(_FORMS[one] for one in forms) / len(entries)
-            laws += [(CurveLaw(acts_on, axis, shape, extent), float(np.log(share / len(own)))) for shape in own]
+            form_shapes = _shapes(form, axis, extent)
+            share = _FORMS[form] / sum(_FORMS[other_form] for other_form in forms) / len(combinations)
+            laws += [
+                (CurveLaw(acts_on, axis, shape, extent), float(np.log(share / len(form_shapes))))
+                for shape in form_shapes
+            ]
     return laws
 
 
 def _shapes(form: Form, axis: Axis, extent: Extent) -> list[Shape]:
     if form == "power":
         return [_power(axis)]
-    if form == "step":  # a step elsewhere is none that a curve could show beside its contact point
-        return [Shape("step", lambda x, _: [(x > 0).astype(float)], variant=TURN)] if extent.turns else []
-    own = [shape for shape in shapes(axis) if shape.form == form]
-    return own if form == "periodic" else own[:1]
+    if form == "step":  # a step elsewhere cannot be distinguished from the contact point
+        return [Shape("step", lambda x, _: [(x > 0).astype(float)], variant=TURN)] if extent.turn_times else []
+    matching = [shape for shape in shapes(axis) if shape.form == form]
+    return matching if form == "periodic" else matching[:1]
 
 
 def _power(axis: Axis) -> Shape:
@@ -166,11 +166,13 @@ def _power(axis: Axis) -> Shape:
     def growing(x: Floats, values: Values) -> list[Feature]:
         return [exp(values["law_exponent"] * np.log(np.maximum(x / axis.high, _LEAST)))]
 
-    return Shape("power", growing, bending=(exponent,), grid=tuple((float(np.log(n)),) for n in (0.5, 2.0, 3.0)))
+    return Shape(
+        "power", growing, shape_parameters=(exponent,), grid=tuple((float(np.log(n)),) for n in (0.5, 2.0, 3.0))
+    )
 
 
 def of_samples(value: Differentiated) -> Differentiated:
-    """A number of each point (points, 1), as samples take it: (points, 1, 1)."""
+    """A value at each point (points, 1) with an axis for samples: (points, 1, 1)."""
     return Differentiated(value.value[..., None], np.zeros((0, *value.value.shape, 1)))
 
 
@@ -183,14 +185,14 @@ def number(value: float) -> str:
 
 
 def symbol(axis: Axis | str) -> str:
-    """An axis as formulas have it."""
+    """The symbol of an axis in formulas."""
     name = axis if isinstance(axis, str) else axis.name
-    own = AXES[name][1] if name in AXES else name
-    return f"{own}/F" if isinstance(axis, Axis) and axis.relative else own
+    letter = AXES[name][1] if name in AXES else name
+    return f"{letter}/F" if isinstance(axis, Axis) and axis.relative else letter
 
 
 def expression(law: UnlistedLaw, values: Numbers) -> str:
-    """What the law is."""
+    """The formula of a law."""
     if isinstance(law, RecordingLaw):
         return _of_recordings(law, values)
     if isinstance(law, LagLaw):
@@ -201,15 +203,16 @@ def expression(law: UnlistedLaw, values: Numbers) -> str:
     return _of_frequency(law, values)
 
 
-def course(law: UnlistedLaw, values: Numbers, x: Floats) -> Array:
-    """The change at values x of the axis: relative, of a force in N, of a place in mm (rows, 1 or 2), of a lag in rad
-    or as an exponent; over frequency the complex factor less 1."""
+def change_along(law: UnlistedLaw, values: Numbers, x: Floats) -> Array:
+    """The change at values x of the axis: relative, of a force in N, of a position in mm (rows, 1 or 2), of a lag in
+    rad or as an exponent; over frequency the complex factor less 1."""
     seeds = {name: Differentiated(np.array([[value]]), np.zeros((0, 1, 1))) for name, value in values.items()}
     if isinstance(law, FrequencyLaw):
         return law.factor(x, seeds).value[0] - 1
     assert isinstance(law, RecordingLaw | LagLaw | CurveLaw)
     features = [
-        one.value[0] if isinstance(one, Differentiated) else np.asarray(one) for one in law.shape.features(x, seeds)
+        feature.value[0] if isinstance(feature, Differentiated) else np.asarray(feature)
+        for feature in law.shape.features(x, seeds)
     ]
     amplitudes = [values[name] for name in law.amplitudes]
     if isinstance(law, LagLaw) and law.shape.logarithmic:
@@ -241,7 +244,7 @@ def _signed(value: float) -> tuple[str, str]:
 
 
 def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitudes: list[float]) -> str:
-    """What is added to 1, with its sign first; of a power the factor."""
+    """The change added to 1, with its sign first; of a power the factor."""
     axis, shape = law.axis, law.shape
     a = amplitudes[0]
     sign, size = _signed(a)
@@ -303,10 +306,10 @@ def _of_recordings(law: RecordingLaw, values: Numbers) -> str:
         half = len(amplitudes) // 2
         if law.shape.form == "power":
             middle = _with_unit(float(np.sqrt(axis.low * axis.high)), axis.unit)
-            each = [" ".join(_signed(a)) + f" mm·ln({symbol(axis)}/{middle})" for a in amplitudes]
+            parts = [" ".join(_signed(a)) + f" mm·ln({symbol(axis)}/{middle})" for a in amplitudes]
         else:
-            each = [change_text(law, values, part) + " mm" for part in (amplitudes[:half], amplitudes[half:])]
-        return f"x = x0 {each[0]}, y = y0 {each[1]}"
+            parts = [change_text(law, values, part) + " mm" for part in (amplitudes[:half], amplitudes[half:])]
+        return f"x = x0 {parts[0]}, y = y0 {parts[1]}"
     if law.shape.logarithmic:
         middle = _with_unit(float(np.sqrt(axis.low * axis.high)), axis.unit)
         return f"{quantity} = {quantity}0·({symbol(axis)}/{middle})^{number(values[law.amplitudes[0]])}"
@@ -353,34 +356,34 @@ def _of_curves(law: CurveLaw, values: Numbers) -> str:
 
 
 def _of_frequency(law: FrequencyLaw, values: Numbers) -> str:
-    def said(name: str) -> str:
+    def text(name: str) -> str:
         return number(values[name])
 
     if law.description.form == "peak":
         change = values["law_change"]
-        numerator = {"inertia": "u²", "loss": f"2i·{said('law_damping')}·u", "spring": "1"}[law.variant]
+        numerator = {"inertia": "u²", "loss": f"2i·{text('law_damping')}·u", "spring": "1"}[law.variant]
         sign, size = _signed(change)
         return (
-            f"FRF = FRF0·(1 {sign} {size}·{numerator}/(1 − u² + 2i·{said('law_damping')}·u)), "
-            f"u = f/{said('law_centre')} Hz"
+            f"FRF = FRF0·(1 {sign} {size}·{numerator}/(1 − u² + 2i·{text('law_damping')}·u)), "
+            f"u = f/{text('law_centre')} Hz"
         )
     match law.variant:
         case "phase":
-            return f"FRF = FRF0·exp(−i·{said('law_lag')}·(f/{number(law.middle_hz)} Hz)^{said('law_exponent')})"
+            return f"FRF = FRF0·exp(−i·{text('law_lag')}·(f/{number(law.middle_hz)} Hz)^{text('law_exponent')})"
         case "delay":
-            return f"FRF = FRF0·exp(−i·{said('law_lag')}·f/{number(law.middle_hz)} Hz)"
+            return f"FRF = FRF0·exp(−i·{text('law_lag')}·f/{number(law.middle_hz)} Hz)"
         case "high_pass":
             power = number(-values["law_exponent"])
-            return f"FRF = FRF0·(1 + {said('law_corner')} Hz/(i·f))^({power})"
+            return f"FRF = FRF0·(1 + {text('law_corner')} Hz/(i·f))^({power})"
         case "magnitude":
-            return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^{said('law_exponent')}"
+            return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^{text('law_exponent')}"
         case "step":
             sign, size = _signed(values["law_change"])
-            return f"FRF = FRF0·(1 {sign} {size}·iv/(1 + iv)), v = f/{said('law_corner')} Hz"
+            return f"FRF = FRF0·(1 {sign} {size}·iv/(1 + iv)), v = f/{text('law_corner')} Hz"
         case "corner":
-            return f"FRF = FRF0·(1 + i·f/{said('law_corner')} Hz)^{said('law_exponent')}"
+            return f"FRF = FRF0·(1 + i·f/{text('law_corner')} Hz)^{text('law_exponent')}"
         case "echo":
             sign, size = _signed(values["law_change"])
-            return f"FRF = FRF0·(1 {sign} {size}·exp(−2πi·f/{said('law_period')} Hz))"
+            return f"FRF = FRF0·(1 {sign} {size}·exp(−2πi·f/{text('law_period')} Hz))"
         case _:
             return "FRF = FRF0·exp(s(f)), a smooth course of magnitude, with the phase that belongs to it"

@@ -1,7 +1,7 @@
-"""Forms of a law over one axis of the recordings: a few features, each times an amplitude, and what bends them.
+"""Forms of a law over one axis of the recordings: features, each times an amplitude, and shape parameters.
 
-At amplitude 0 every law is the base model. A feature is 1 where the form's whole change over the measured range has
-happened, so that an amplitude is that change. Edges of steps and periods are tried one by one, each as a shape of its
+At amplitude 0 every law is the base model. A feature is 1 where the form's full change over the measured range is
+reached, so that an amplitude is that change. Edges of steps and periods are tried one by one, each as a shape of its
 own, since a fit does not move from one to the next.
 """
 
@@ -35,14 +35,15 @@ _LATE, _SHARP = "how soon it sets in, over the measured range", "anywhere within
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """One form over an axis. `variant` tells shapes of a form apart; `share` of the form's prior is the shape's."""
+    """One form over an axis. `variant` distinguishes shapes of a form; `share` is the shape's share of the form's
+    prior."""
 
     form: Form
     features: Features
     count: int = 1  # of features
     variant: str = ""
     share: float = 1.0
-    bending: tuple[Parameter, ...] = ()  # not amplitudes
+    shape_parameters: tuple[Parameter, ...] = ()  # not amplitudes
     grid: tuple[tuple[float, ...], ...] = ((),)  # their values that a screening tries
     logarithmic: bool = False  # the feature is that of the logarithm: a power
     needs_peak: bool = False
@@ -54,14 +55,14 @@ class Shape:
 
 
 def shapes(axis: Axis) -> list[Shape]:
-    """All that an axis with so many levels can show."""
+    """All shapes that an axis with this many levels can show."""
     if axis.words:
         return _of_words(axis)
     count = len(axis.levels)
-    each: list[Shape] = [*_linear(axis), *_step(axis)]
+    result: list[Shape] = [*_linear(axis), *_step(axis)]
     if axis.positive and count >= _LEAST_LEVELS["power"]:
-        each.append(_power(axis))
-    for form, make in (
+        result.append(_power(axis))
+    for form, builder in (
         ("exponential", _exponential),
         ("saturating", _saturating),
         ("threshold", _threshold),
@@ -70,12 +71,12 @@ def shapes(axis: Axis) -> list[Shape]:
         ("free", _free),
     ):
         if count >= _LEAST_LEVELS[form]:
-            each += make(axis)
-    return each
+            result += builder(axis)
+    return result
 
 
 def reference(axis: Axis, variant: str) -> float:
-    """Where a linear law does nothing: at the least value, or in the middle."""
+    """The value at which a linear law does nothing: the least value, or the middle."""
     return (axis.low + axis.high) / 2 if variant == "middle" else axis.low
 
 
@@ -90,7 +91,7 @@ def _linear(axis: Axis) -> list[Shape]:
 
 
 def constant(share: float) -> Shape:
-    """The same at all values of the axis."""
+    """A constant change over the axis."""
     return Shape("linear", lambda x, _: [np.ones_like(x)], variant=EVERYWHERE, share=share)
 
 
@@ -101,24 +102,24 @@ def _power(axis: Axis) -> Shape:
 
 def _exponential(axis: Axis) -> list[Shape]:
     """(e^(u/ξ) − 1)/(e^(1/ξ) − 1), u from 0 to 1 over the range; and the same from the other end."""
-    length = _bend("law_growth_length", axis, 0.08, 0.8, 0.3, _LATE)
+    length = _length("law_growth_length", axis, 0.08, 0.8, 0.3, _LATE)
 
     def growing(x: Floats, values: Values) -> list[Feature]:
         rate = axis.span / values["law_growth_length"]
         return [(exp(((x - axis.low) / axis.span) * rate) - 1.0) / (exp(rate) - 1.0)]
 
-    return [Shape("exponential", growing, bending=(length,), grid=_over(axis, (0.15, 0.4)))]
+    return [Shape("exponential", growing, shape_parameters=(length,), grid=_over(axis, (0.15, 0.4)))]
 
 
 def _saturating(axis: Axis) -> list[Shape]:
     """(1 − e^(−u/τ))/(1 − e^(−1/τ)), u from 0 to 1 over the range."""
-    length = _bend("law_approach", axis, 0.02, 1.2, 0.25, _LATE)
+    length = _length("law_approach", axis, 0.02, 1.2, 0.25, _LATE)
 
     def approaching(x: Floats, values: Values) -> list[Feature]:
         rate = axis.span / values["law_approach"]
         return [(1.0 - exp(((axis.low - x) / axis.span) * rate)) / (1.0 - exp(-rate))]
 
-    return [Shape("saturating", approaching, bending=(length,), grid=_over(axis, (0.06, 0.2, 0.6)))]
+    return [Shape("saturating", approaching, shape_parameters=(length,), grid=_over(axis, (0.06, 0.2, 0.6)))]
 
 
 def _threshold(axis: Axis) -> list[Shape]:
@@ -136,19 +137,21 @@ def _threshold(axis: Axis) -> list[Shape]:
     grid = tuple((axis.low + share * axis.span,) for share in (0.15, 0.3, 0.5, 0.7, 0.85))
 
     def above(x: Floats, values: Values) -> list[Feature]:
-        ahead = (x - values["law_onset"]) / (axis.high - values["law_onset"])
-        return [where(ahead.value > 0, ahead, 0.0)]
+        relative = (x - values["law_onset"]) / (axis.high - values["law_onset"])
+        return [where(relative.value > 0, relative, 0.0)]
 
     def below(x: Floats, values: Values) -> list[Feature]:
-        behind = (values["law_onset"] - x) / (values["law_onset"] - axis.low)
-        return [where(behind.value > 0, behind, 0.0)]
+        relative = (values["law_onset"] - x) / (values["law_onset"] - axis.low)
+        return [where(relative.value > 0, relative, 0.0)]
 
-    each = (("above", above), ("below", below))
-    return [Shape("threshold", law, variant=name, share=0.5, bending=(onset,), grid=grid) for name, law in each]
+    laws = (("above", above), ("below", below))
+    return [
+        Shape("threshold", law, variant=name, share=0.5, shape_parameters=(onset,), grid=grid) for name, law in laws
+    ]
 
 
 def _step(axis: Axis) -> list[Shape]:
-    """0 up to an edge, 1 beyond; an edge lies between neighbouring levels."""
+    """0 up to an edge, 1 beyond; edges lie between neighbouring levels."""
     levels = axis.levels
     if len(levels) < 3:
         return []
@@ -171,7 +174,7 @@ def _periodic(axis: Axis) -> list[Shape]:
         turns = np.arange(0.75, max(most, 0.75) + 1e-9, max(0.5, (most - 0.75) / _MOST_PERIODS))  # resolved: 0.5
         periods, half_width = (axis.span / turns).tolist(), 0.0
 
-    def of(place: int, period: float) -> Shape:
+    def of(index: int, period: float) -> Shape:
         turn = axis.span / period
         ends = (period * (1 - half_width), period * (1 + half_width))
         if not half_width:
@@ -188,19 +191,19 @@ def _periodic(axis: Axis) -> list[Shape]:
             "periodic",
             turning,
             count=2,
-            variant=str(place),
+            variant=str(index),
             share=1 / len(periods),
-            bending=(length,),
+            shape_parameters=(length,),
             grid=((float(np.log(period)),),),
         )
 
-    return [of(place, period) for place, period in enumerate(periods)]
+    return [of(index, period) for index, period in enumerate(periods)]
 
 
 def _peak(axis: Axis) -> list[Shape]:
     """1/(1 + ((x − x1)/w)²)."""
     centre = Parameter("law_centre", axis.unit, axis.low, axis.high, Uniform(), "linear", limit=None, reason=_SHARP)
-    width = _bend("law_width", axis, 0.03, 0.35, 0.12, "from a few levels to a third of the measured range")
+    width = _length("law_width", axis, 0.03, 0.35, 0.12, "from a few levels to a third of the measured range")
     grid = tuple(
         (axis.low + share * axis.span, float(np.log(wide * axis.span)))
         for wide in (0.08, 0.2)
@@ -211,7 +214,7 @@ def _peak(axis: Axis) -> list[Shape]:
         away = (x - values["law_centre"]) / values["law_width"]
         return [1.0 / (1.0 + away * away)]
 
-    return [Shape("peak", peaking, bending=(centre, width), grid=grid, needs_peak=True)]
+    return [Shape("peak", peaking, shape_parameters=(centre, width), grid=grid, needs_peak=True)]
 
 
 def _free(axis: Axis) -> list[Shape]:
@@ -233,7 +236,7 @@ def _free(axis: Axis) -> list[Shape]:
 
 
 def _of_words(axis: Axis) -> list[Shape]:
-    """One word's recordings are off, or those of each word; nothing of as many words as serial numbers are, of which
+    """A step for each word, and a free value per word; nothing for axes with as many words as serial numbers, whose
     laws would grow with the square of the recordings."""
     if len(axis.words) > _MOST_WORDS:
         return []
@@ -247,14 +250,14 @@ def _of_words(axis: Axis) -> list[Shape]:
         )
 
     words = range(len(axis.words))
-    each = [of(word) for word in (words if len(axis.words) > 2 else words[1:])]
+    laws = [of(word) for word in (words if len(axis.words) > 2 else words[1:])]
     if len(axis.words) > 2:
-        each.append(Shape("free", lambda x, _: [(x == word).astype(float) for word in words], count=len(axis.words)))
-    return each
+        laws.append(Shape("free", lambda x, _: [(x == word).astype(float) for word in words], count=len(axis.words)))
+    return laws
 
 
-def _bend(name: str, axis: Axis, low: float, high: float, middle: float, reason: str) -> Parameter:
-    """A length along an axis, these shares of its range."""
+def _length(name: str, axis: Axis, low: float, high: float, middle: float, reason: str) -> Parameter:
+    """A length along an axis, with these fractions of its range as bounds and median."""
     ends = low * axis.span, high * axis.span
     prior = Normal(float(np.log(middle * axis.span)), 0.9)
     return Parameter(name, axis.unit, *ends, prior, "log", limit=None, reason=reason)

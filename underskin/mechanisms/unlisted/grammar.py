@@ -1,17 +1,14 @@
-"""The grammar of laws that nobody listed.
+"""The grammar of unlisted laws: all laws that a campaign could show, with the prior share of each.
 
-Laws over frequency, the same in all recordings.
+Laws over frequency are the same in all recordings: minimum phase, where the phase follows from the magnitude by the
+Kramers–Kronig relations (Bode 1945), since the system is causal; or a pure phase: a dispersive delay, a loss angle over
+the measured band.
 
-Minimum phase: the phase follows from the magnitude by Kramers and Kronig's relations (Bode 1945), since what is
-measured is caused by what came before. Or a pure phase: a delay that disperses, a loss angle over the measured band.
+The share of a law is that of the quantity it acts on, times that of its axis, times that of its form; shapes of one
+form (edges of a step, periods) divide its share. All columns of `conditions` together have the share of one axis and a
+half, so that many columns are penalised.
 
-All laws of the grammar that a campaign could show, and the share of each in the prior of something unnamed.
-
-The share is that of where a law enters, times that of what it follows, times that of its form; shapes of one form
-(edges of a step, periods) divide its share. All columns of `conditions` together have the share of one axis and a half,
-so that many of them are paid for.
-
-A law that was found on one campaign, on other recordings of the skin: within its range, and nowhere else.
+A law found on one campaign applies to other recordings of the skin within its range only.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -54,14 +51,14 @@ class _Law:
     form: Form
     variant: str
     amplitudes: tuple[Parameter, ...]
-    bending: tuple[Parameter, ...]
+    shape_parameters: tuple[Parameter, ...]
     grid: Sequence[Sequence[float]]
     factor: Factor
     share: float = 1.0
 
 
 class FrequencyLaw(UnlistedLaw):
-    """One of them, with the band that it was found in."""
+    """A law over frequency, with the band in which it was found."""
 
     stage = Stage.LINES
     order = 210
@@ -72,8 +69,8 @@ class FrequencyLaw(UnlistedLaw):
         self.description = LawDescription("frequency_response", "frequency_hz", law.form)
         self.variant = law.variant
         self.share = law.share
-        self.amplitudes = tuple(entry.name for entry in law.amplitudes)
-        self.parameters_bound = (*law.amplitudes, *law.bending)
+        self.amplitudes = tuple(parameter.name for parameter in law.amplitudes)
+        self.parameters_bound = (*law.amplitudes, *law.shape_parameters)
         self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
         self.factor = law.factor
         self.middle_hz = middle
@@ -83,30 +80,30 @@ class FrequencyLaw(UnlistedLaw):
         return self.factor(design.line_frequency, values)
 
     def tangents(self, frequency: Floats) -> Array:
-        """∂ ln factor by each amplitude at 0, at the grid of what bends it (points, frequencies, amplitudes)."""
+        """∂ ln factor by each amplitude at 0, at the grid of the shape parameters (points, frequencies, amplitudes)."""
         points, count = len(self.grid), len(self.amplitudes)
         values: dict[str, Differentiated] = {}
-        for number, entry in enumerate(self.parameters_bound):
+        for number, parameter in enumerate(self.parameters_bound):
             slopes = np.zeros((count, points, 1))
             value = np.zeros((points, 1))
             if number < count:
                 slopes[number] = 1.0
             else:
                 at = self.grid[:, number - count, None]
-                value = np.exp(at) if entry.scale == "log" else at
-            values[entry.name] = Differentiated(value, slopes)
+                value = np.exp(at) if parameter.scale == "log" else at
+            values[parameter.name] = Differentiated(value, slopes)
         answer = self.factor(frequency, values)
         return np.moveaxis(answer.slopes / answer.value, 0, -1)
 
 
 def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
-    """All over a band of lines [Hz]."""
+    """All laws over a band of lines [Hz]."""
     low, high = float(frequency.min()), float(frequency.max())
     if high < 1.5 * low or len(frequency) < 6:
         return []
     middle = float(np.sqrt(low * high))
-    each = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
-    return [FrequencyLaw(law, middle) for law in each]
+    laws = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
+    return [FrequencyLaw(law, middle) for law in laws]
 
 
 def _amplitude(sd: float, name: str = "law_change") -> Parameter:
@@ -122,7 +119,7 @@ def _over_band(low: float, high: float, count: int) -> list[float]:
 
 
 def _phases(middle: float) -> list[_Law]:
-    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a delay that disperses; a delay alone is one more."""
+    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a dispersive delay; and a pure delay."""
     exponent = Parameter(
         "law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴", closed=(0.0,)
     )
@@ -167,7 +164,7 @@ def _powers(low: float, high: float, middle: float) -> list[_Law]:
 
 
 def _peaks(low: float, high: float) -> list[_Law]:
-    """A resonance at one frequency in all recordings, beside the response: 1 + A u²/(1 − u² + 2iζu), and its like."""
+    """A resonance at one frequency in all recordings, added to the response: 1 + A u²/(1 − u² + 2iζu), and variants."""
     corner = _corner(0.8 * low, 1.25 * high, "law_centre")
     damping = Parameter("law_damping", "-", 5e-3, 1.0, Normal(-2.8, 1.0), "log", None, "sharp to broad")
     grid = [
@@ -230,7 +227,7 @@ def _phase_table(width: float) -> tuple[Floats, Floats]:
     stride = width / 60
     x = np.arange(-6 * width, 6 * width, stride) + stride / 2
     slope = -x / width**2 * np.exp(-0.5 * (x / width) ** 2)
-    at = np.linspace(-12 * width, 12 * width, 481)  # halfway between those, so that none meets the logarithm's pole
+    at = np.linspace(-12 * width, 12 * width, 481)  # midpoints, off the logarithm's pole
     kernel = -np.log(np.tanh(np.abs(x - at[:, None]) / 2))
     return at / width, np.asarray(kernel @ slope * stride / np.pi)
 
@@ -263,9 +260,11 @@ _FORMS: Mapping[Form, float] = {
 }
 _CONSTANT = 4.0  # a constant is looked for along one axis of several
 _COLUMNS = 1.5  # axes that all columns of `conditions` count for
-_FREQUENCY = 0.5  # of the frequency response: laws over frequency alone
-_PLACES_FOLLOW = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
-_CONSTANTS: Mapping[ActsOn, tuple[str, tuple[str, ...]]] = {  # what does it by name, and the axes that show it best
+_FREQUENCY = 0.5  # of the frequency response: laws over frequency only
+_POSITION_AXES = ("order", "recorded_at", "time_of_day", "previous_preload_n", "preload_n", "load_cycles")
+_CONSTANTS: Mapping[
+    ActsOn, tuple[str, tuple[str, ...]]
+] = {  # the mechanism of the catalogue, and the axes that show it best
     "modulus": ("modulus_error", ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")),
     "thickness": ("thickness_error", ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")),
     "position": ("misalignment", ("x_mm", "y_mm", "preload_n", "indenter_radius_mm")),
@@ -276,7 +275,7 @@ _OF_LEVELS: tuple[ActsOn, ...] = ("gain", "modulus", "thickness", "contact_radiu
 
 @dataclass(frozen=True, eq=False)
 class Grammar:
-    """The laws of one campaign, by combination of where, what and form, and the log prior share of each law."""
+    """The laws of one campaign and the log prior share of each."""
 
     laws: Sequence[UnlistedLaw]
     log_shares: Floats  # (laws,)
@@ -287,31 +286,34 @@ class Grammar:
         conditions: Conditions,
         frequency: Floats,
         table: SigmaTable,
-        beside: Sequence[Mechanism],
-        named: Collection[str],
+        further_mechanisms: Sequence[Mechanism],
+        listed: Collection[str],
     ) -> "Grammar":
-        """Of FRFs at these distinct lines [Hz]; `beside` mechanisms for which σ has room. What one of those `named`
-        does exactly is no law."""
+        """The laws for FRFs at these distinct lines [Hz].
+
+        `further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well. `listed`: names of
+        mechanisms; a law that one of them describes exactly is left out.
+        """
         laws: list[UnlistedLaw] = []
         shares: list[float] = []
         axes = axes_of(conditions) if len(conditions.recordings) >= _LEAST_RECORDINGS else []
         columns = [axis for axis in axes if axis.name not in BUILT_IN]
-        tables = LevelTables(conditions, table, beside)
+        tables = LevelTables(conditions, table, further_mechanisms)
         lines = np.unique(frequency)
         for axis in axes:
             share = 1.0 if axis.name in BUILT_IN else _COLUMNS / len(columns)
-            for law in [*_over_recordings(axis, lines, tables, named), *_constants(axis, axes, tables, named)]:
+            for law in [*_over_recordings(axis, lines, tables, listed), *_constants(axis, axes, tables, listed)]:
                 laws.append(law)
                 shares.append(share * _share(law))
         total = sum(1.0 for axis in axes if axis.name in BUILT_IN) + (_COLUMNS if columns else 0.0)
         log_shares = np.log(np.array(shares) / max(total, 1.0)) if shares else np.zeros(0)
         over_frequency = frequency_laws(lines) if len(lines) >= _LEAST_LINES else []
-        own = [_FREQUENCY * _share(law) for law in over_frequency]
-        return cls([*laws, *over_frequency], np.append(log_shares, np.log(own)))
+        frequency_shares = [_FREQUENCY * _share(law) for law in over_frequency]
+        return cls([*laws, *over_frequency], np.append(log_shares, np.log(frequency_shares)))
 
 
 def combination(law: UnlistedLaw) -> tuple[str, str, str]:
-    """Where it enters, what it follows, and its form."""
+    """The quantity it acts on, the axis it follows, and its form."""
     return law.description.acts_on, law.description.axis, law.description.form
 
 
@@ -319,84 +321,84 @@ def _share(law: UnlistedLaw) -> float:
     return _ACTS_ON[law.description.acts_on] * _FORMS[law.description.form] * law.share
 
 
-def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, named: Collection[str]) -> list[UnlistedLaw]:
-    each: list[UnlistedLaw] = []
+def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, listed: Collection[str]) -> list[UnlistedLaw]:
+    laws: list[UnlistedLaw] = []
     for shape in shapes(axis):
-        each += [
+        laws += [
             RecordingLaw(acts_on, axis, shape, tables)
             for acts_on in _OF_LEVELS
-            if _makes_sense(acts_on, axis, shape, named)
+            if _makes_sense(acts_on, axis, shape, listed)
         ]
         if len(lines) >= 2 and shape.form != "free":
-            each += [LagLaw(kind, axis, shape, lines) for kind in LAG_KINDS]
+            laws += [LagLaw(kind, axis, shape, lines) for kind in LAG_KINDS]
     if axis.name == "preload_n":
         lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost", share=_CONSTANT)
-        each.append(RecordingLaw("force", axis, lost, tables))
-    return each
+        laws.append(RecordingLaw("force", axis, lost, tables))
+    return laws
 
 
-def _constants(axis: Axis, axes: Sequence[Axis], tables: LevelTables, named: Collection[str]) -> list[UnlistedLaw]:
+def _constants(axis: Axis, axes: Sequence[Axis], tables: LevelTables, listed: Collection[str]) -> list[UnlistedLaw]:
     """Changes that are the same in all recordings, on the axis that shows them best."""
-    available = {entry.name for entry in axes}
+    available = {other.name for other in axes}
     return [
         RecordingLaw(acts_on, axis, constant(_CONSTANT), tables)
         for acts_on, (mechanism, best) in _CONSTANTS.items()
-        if mechanism not in named and axis.name == next((name for name in best if name in available), None)
+        if mechanism not in listed and axis.name == next((name for name in best if name in available), None)
     ]
 
 
-def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, named: Collection[str]) -> bool:
-    """Whether the combination is one that a rig can have and no other combination is."""
+def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[str]) -> bool:
+    """Whether a rig can have this combination and no other combination is equivalent."""
     if axis.name == "sensor":
-        return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in named)
+        return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in listed)
     if acts_on == "position":
-        return axis.name in _PLACES_FOLLOW or axis.name not in BUILT_IN
+        return axis.name in _POSITION_AXES or axis.name not in BUILT_IN
     if acts_on == "force":  # a force that is scaled is a modulus that is
         return not shape.logarithmic and axis.name not in ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")
     return True
 
 
 _ROUNDING = 1e-9  # of the range, by which a value may lie beyond it
-OF_ONE_CAMPAIGN = ("order",)  # axes that say nothing of other recordings
+CAMPAIGN_SPECIFIC_AXES = ("order",)  # axes without meaning for other recordings
 
 
 def bound_to(
-    law: UnlistedLaw, conditions: Conditions, table: SigmaTable, beside: Sequence[Mechanism]
+    law: UnlistedLaw, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]
 ) -> tuple[UnlistedLaw, Mask]:
     """The law on these recordings, and which of them (recordings,) lie in its range.
 
-    A recording beyond the range, or that does not say where it lies, is predicted at the range's end.
+    A recording beyond the range, or without a value on its axis, is predicted at the end of the range.
     """
-    ids = [entry.id for entry in frf_of(conditions)]
+    ids = [recording.id for recording in frf_of(conditions)]
     if not isinstance(law, RecordingLaw | LagLaw):
         return law, np.ones(len(ids), dtype=bool)
     axis, inside = _on(law.axis, conditions, ids)
     if isinstance(law, LagLaw):
         return law.on(axis), inside
-    return law.on(axis, LevelTables(conditions, table, beside)), inside
+    return law.on(axis, LevelTables(conditions, table, further_mechanisms)), inside
 
 
 def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, Mask]:
-    known = {
-        (entry.name, entry.relative): entry
-        for entry in every_axis(conditions, axis.origin)
-        if entry.name not in OF_ONE_CAMPAIGN
+    axes = {
+        (candidate.name, candidate.relative): candidate
+        for candidate in every_axis(conditions, axis.origin)
+        if candidate.name not in CAMPAIGN_SPECIFIC_AXES
     }
-    found = known.get((axis.name, axis.relative))
-    if found is not None and axis.name == "previous_preload_n":
-        timed = all(entry.recorded_at is not None for entry in frf_of(conditions))
-        found = found if timed else None  # nothing says which came before
-    if found is None:
+    current = axes.get((axis.name, axis.relative))
+    if current is not None and axis.name == "previous_preload_n":
+        timed = all(recording.recorded_at is not None for recording in frf_of(conditions))
+        current = current if timed else None  # the order is unknown
+    if current is None:
         return replace(axis, values=dict.fromkeys(ids, axis.low), range=(axis.low, axis.high)), np.zeros(
             len(ids), dtype=bool
         )
     if axis.words:
-        words = [found.words[round(value)] for value in found.of(ids)]
+        words = [current.words[round(value)] for value in current.of(ids)]
         inside = np.array([word in axis.words for word in words])
-        places = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
-        return replace(axis, values=dict(zip(ids, places, strict=True)), range=(axis.low, axis.high)), inside
-    values = found.of(ids)
-    slack = _ROUNDING * axis.span
-    inside = (values >= axis.low - slack) & (values <= axis.high + slack)
+        indices = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
+        return replace(axis, values=dict(zip(ids, indices, strict=True)), range=(axis.low, axis.high)), inside
+    values = current.of(ids)
+    tolerance = _ROUNDING * axis.span
+    inside = (values >= axis.low - tolerance) & (values <= axis.high + tolerance)
     clipped = np.clip(values, axis.low, axis.high).tolist()
     return replace(axis, values=dict(zip(ids, clipped, strict=True)), range=(axis.low, axis.high)), inside

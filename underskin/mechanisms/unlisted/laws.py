@@ -1,13 +1,12 @@
-"""Laws of the grammar that act on recordings.
+"""Unlisted laws that act on recordings, and the level of each recording as a function of what they change.
 
-How the level of each recording follows its modulus, thickness, contact radius, force, or the place of its contact.
+The level's dependence on modulus, thickness, contact radius, force and contact position is tabulated once under the
+base model, as declared, and interpolated: a law is then a factor on each recording, level(quantity ·
+e^s)/level(quantity). The effect of other mechanisms on that factor is neglected, which is of second order. Under the
+base model a force F e^s is a modulus E e^(−s): both enter through F/E alone. A contact radius a e^s at the same L is
+that of a sphere R e^s on a modulus E e^(−2s).
 
-Worked out once under the base model, as declared, and interpolated: a law that acts there is then a factor on each
-recording, level(quantity · e^s)/level(quantity). What other mechanisms of a set do to that factor is left out, which is
-of second order. Under the base model a force F e^s is a modulus E e^(−s): both enter through F/E alone. A contact
-radius a e^s at the same L is that of a sphere R e^s on a modulus E e^(−2s).
-
-Laws that nobody listed, bound to the recordings of a campaign: mechanisms like any other.
+Laws are bound to the recordings of a campaign; they are mechanisms like any other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,8 +37,8 @@ _LOGS: Mapping[str, tuple[float, float]] = {  # s that are tabulated
     "contact_radius": (-0.9, 0.7),
 }
 _NODES, _NODES_OF_RADIUS = 22, 12
-_FURTHEST_MM, _PLACES = 2.0, 41  # beyond the largest offset; how many places from the sensor's centre
-_FAINT = 1e-3  # of the largest level, below which a factor on it says nothing
+_FURTHEST_MM, _DISTANCES = 2.0, 41  # beyond the largest offset; number of distances from the centre
+_FAINT = 1e-3  # of the largest level, below which a factor on it is ignored
 _ANY_LINE = np.array([1.0])  # Hz
 
 
@@ -61,49 +60,49 @@ class Curve:
     def at(self, rows: Indices, x: Floats) -> tuple[Floats, Floats]:
         """Values and slopes of these rows at x (…, rows)."""
         last = self.values.shape[1] - 1
-        place = np.clip((x - self.first) / self.stride, 0.0, last)
+        position = np.clip((x - self.first) / self.stride, 0.0, last)
         inside = (x >= self.first) & (x <= self.first + last * self.stride)
-        left = np.minimum(place.astype(np.intp), last - 1)
-        t = place - left
-        v0, v1 = self.values[rows, left], self.values[rows, left + 1]
-        d0, d1 = self.slopes[rows, left] * self.stride, self.slopes[rows, left + 1] * self.stride
+        cell = np.minimum(position.astype(np.intp), last - 1)
+        t = position - cell
+        v0, v1 = self.values[rows, cell], self.values[rows, cell + 1]
+        d0, d1 = self.slopes[rows, cell] * self.stride, self.slopes[rows, cell + 1] * self.stride
         a, b = 2 * (v0 - v1) + d0 + d1, 3 * (v1 - v0) - 2 * d0 - d1
         slope = np.where(inside, (d0 + t * (2 * b + 3 * a * t)) / self.stride, 0.0)
         return v0 + t * (d0 + t * (b + a * t)), slope
 
 
 class LevelTables:
-    """Of one campaign's recordings, by their ids; each table is worked out when it is first asked for."""
+    """Tables for the recordings of one campaign, by their ids; each is computed on first use."""
 
-    def __init__(self, conditions: Conditions, table: SigmaTable, beside: Sequence[Mechanism]) -> None:
-        """`beside`: mechanisms for which σ has room as well."""
-        entries = [entry.without_measurements(frequency_hz=_ANY_LINE) for entry in frf_of(conditions)]
-        self._conditions = Conditions(conditions.name, conditions.skin, tuple(entries))
-        self._table, self._beside = table, tuple(beside)
-        self._places = {entry.id: number for number, entry in enumerate(entries)}
-        self.force = {entry.id: entry.preload_n for entry in entries}
-        self._known: dict[str, Curve] = {}
+    def __init__(self, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]) -> None:
+        """`further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well."""
+        recordings = [recording.without_measurements(frequency_hz=_ANY_LINE) for recording in frf_of(conditions)]
+        self._conditions = Conditions(conditions.name, conditions.skin, tuple(recordings))
+        self._table, self._further_mechanisms = table, tuple(further_mechanisms)
+        self._row_numbers = {recording.id: number for number, recording in enumerate(recordings)}
+        self.force = {recording.id: recording.preload_n for recording in recordings}
+        self._curves: dict[str, Curve] = {}
 
     def rows(self, ids: Sequence[str]) -> Indices:
-        """Where in the tables these recordings are."""
-        return np.array([self._places[name] for name in ids], dtype=np.intp)
+        """Row indices of these recordings in the tables."""
+        return np.array([self._row_numbers[name] for name in ids], dtype=np.intp)
 
     def factor(self, acts_on: str, rows: Indices, log: Differentiated) -> Differentiated:
         """level(quantity · e^s)/level(quantity) of recordings, from s (…, recordings)."""
         if acts_on == "force":
             acts_on, log = "modulus", -log
-        if acts_on not in self._known:
-            self._known[acts_on] = self._tabulated(acts_on)
-        value, slope = self._known[acts_on].at(rows, log.value)
+        if acts_on not in self._curves:
+            self._curves[acts_on] = self._tabulated(acts_on)
+        value, slope = self._curves[acts_on].at(rows, log.value)
         return chain(value, (slope, log))
 
     def moved(self, rows: Indices, x: Differentiated, y: Differentiated) -> Differentiated:
-        """The same where contacts lie elsewhere by x and y [mm] (…, recordings)."""
+        """The same factor for contacts displaced by x and y [mm] (…, recordings)."""
         x, y = x + self._offset[rows, 0], y + self._offset[rows, 1]
         distance = np.hypot(x.value, y.value)
         away = np.where(distance > 0, distance, 1.0)
         radius = chain(distance, (x.value / away, x), (y.value / away, y))
-        value, slope = self._over_places.at(rows, radius.value)
+        value, slope = self._over_distance.at(rows, radius.value)
         return chain(value, (slope, radius))
 
     @cached_property
@@ -113,11 +112,11 @@ class LevelTables:
 
     @cached_property
     def _model(self) -> FrfModel:
-        return FrfModel((), self._conditions, self._table, self._beside)
+        return FrfModel((), self._conditions, self._table, self._further_mechanisms)
 
     @cached_property
     def _start(self) -> Floats:
-        return np.array([entry.start for entry in self._model.parameters])
+        return np.array([parameter.start for parameter in self._model.parameters])
 
     def _tabulated(self, acts_on: str) -> Curve:
         s = np.linspace(*_LOGS[acts_on], _NODES_OF_RADIUS if acts_on == "contact_radius" else _NODES)
@@ -126,18 +125,20 @@ class LevelTables:
         else:
             fits = np.tile(self._start, (len(s), 1))
             name = "youngs_modulus" if acts_on == "modulus" else "thickness"
-            fits[:, self._model.places_of_nuisances[name]] += s
+            fits[:, self._model.nuisance_indices[name]] += s
             levels = self._model.respond(fits, slopes=False).level.value
         return Curve.of(s, _over(levels, self._base))
 
     def _of_radius(self, s: float) -> Floats:
-        entries = [
-            replace(entry, indenter_radius_mm=entry.indenter_radius_mm * float(np.exp(s)))
-            for entry in frf_of(self._conditions)
+        recordings = [
+            replace(recording, indenter_radius_mm=recording.indenter_radius_mm * float(np.exp(s)))
+            for recording in frf_of(self._conditions)
         ]
-        model = FrfModel((), Conditions("radius", self._conditions.skin, tuple(entries)), self._table, self._beside)
+        model = FrfModel(
+            (), Conditions("radius", self._conditions.skin, tuple(recordings)), self._table, self._further_mechanisms
+        )
         fit = self._start.copy()
-        fit[model.places_of_nuisances["youngs_modulus"]] -= 2 * s
+        fit[model.nuisance_indices["youngs_modulus"]] -= 2 * s
         return model.respond(fit, slopes=False).level.value
 
     @cached_property
@@ -146,40 +147,42 @@ class LevelTables:
 
     @cached_property
     def _offset(self) -> Floats:
-        """Of each contact from its sensor's centre (recordings, 2) [mm]."""
+        """The offset of each contact from its sensor's centre (recordings, 2) [mm]."""
         design = self._model.design
         return 1e3 * np.column_stack([design.point_x, design.point_y])[design.point]
 
     @cached_property
-    def _over_places(self) -> Curve:
-        """Over the distance from the sensor's centre [mm]."""
-        entries = frf_of(self._conditions)
+    def _over_distance(self) -> Curve:
+        """The level over the distance from the sensor's centre [mm]."""
+        recordings = frf_of(self._conditions)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in self._conditions.skin.sensors}
-        keys = [(entry.indenter_radius_mm, entry.preload_n) for entry in entries]
+        keys = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
         distinct = list(dict.fromkeys(keys))
-        radii = np.linspace(0.0, float(np.hypot(*self._offset.T).max()) + _FURTHEST_MM, _PLACES)
-        sensor = entries[0].sensor
+        radii = np.linspace(0.0, float(np.hypot(*self._offset.T).max()) + _FURTHEST_MM, _DISTANCES)
+        sensor = recordings[0].sensor
         x, y = centres[sensor]
         placed = [
-            replace(entries[keys.index(key)], sensor=sensor, position_mm=(x + radius, y), id=f"{number} {place}")
+            replace(recordings[keys.index(key)], sensor=sensor, position_mm=(x + radius, y), id=f"{number} {index}")
             for number, key in enumerate(distinct)
-            for place, radius in enumerate(radii.tolist())
+            for index, radius in enumerate(radii.tolist())
         ]
-        model = FrfModel((), Conditions("places", self._conditions.skin, tuple(placed)), self._table, self._beside)
+        model = FrfModel(
+            (), Conditions("places", self._conditions.skin, tuple(placed)), self._table, self._further_mechanisms
+        )
         levels = model.respond(self._start, slopes=False).level.value.reshape(len(distinct), -1)
         return Curve.of(radii, _over(levels[[distinct.index(key) for key in keys]].T, self._base))
 
 
 def _over(levels: Floats, base: Floats) -> Floats:
-    """levels/base (recordings, nodes), where the base shows anything."""
-    shows = np.abs(base) > _FAINT * np.abs(base).max()
-    return np.where(shows, levels / np.where(shows, base, 1.0), 1.0).T
+    """levels/base (recordings, nodes) where the base is not faint, else 1."""
+    is_significant = np.abs(base) > _FAINT * np.abs(base).max()
+    return np.where(is_significant, levels / np.where(is_significant, base, 1.0), 1.0).T
 
 
 PREFIX = "unnamed_"
 LagKind = Literal["angle", "delay", "power", "corner"]
 LAG_KINDS: tuple[LagKind, ...] = get_args(LagKind)
-_USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a place in mm, of a lag in rad
+_USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a position in mm, of a lag in rad
     "gain": 0.2,
     "modulus": 0.4,
     "thickness": 0.2,
@@ -197,7 +200,7 @@ _EXPONENTS = np.array([[-2.0], [-1.0], [-0.5], [0.0], [0.5], [1.0], [2.0]])
 
 @dataclass(frozen=True, eq=False)
 class LawDescription:
-    """What a report says of a law: where it enters, what it follows, its form."""
+    """A law in a report: the quantity it acts on, the axis it follows, its form."""
 
     acts_on: ActsOn
     axis: str
@@ -210,8 +213,8 @@ class LawDescription:
 
 
 class UnlistedLaw(Mechanism):
-    """What all laws share. Attributes: `description`, `share` of the prior of its combination, `grid` of values of
-    what bends it (points, parameters), and `amplitudes`, the names of its other parameters."""
+    """Base of all unlisted laws. Attributes: `description`, `share` of the prior of its combination, `grid` of
+    values of its shape parameters (points, parameters), and `amplitudes`, the names of its other parameters."""
 
     plain = "Nobody listed it."
     source = "None."
@@ -224,30 +227,30 @@ class UnlistedLaw(Mechanism):
     share: float
     grid: Floats
     amplitudes: tuple[str, ...]
-    log_share: float = 0.0  # in the prior of something unnamed
-    found: tuple[Floats, ...] = ()  # fit coordinates where screenings found it
+    log_share: float = 0.0  # in the prior of an unlisted law
+    screened_fits: tuple[Floats, ...] = ()  # fit coordinates from screenings
 
     def parameters(self, conditions: object, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The same for all campaigns: they are bound to one."""
+        """The bound parameters, whatever the campaign."""
         return self.parameters_bound
 
     parameters_bound: tuple[Parameter, ...]
 
     def guesses(self, conditions: object, kind: Kind) -> Sequence[Sequence[float]]:
-        """Where screenings found it."""
+        """The fits of screenings that found it."""
         return [
-            [entry.from_fit(at) for entry, at in zip(self.parameters_bound, found.tolist(), strict=True)]
-            for found in self.found
+            [parameter.from_fit(at) for parameter, at in zip(self.parameters_bound, fit.tolist(), strict=True)]
+            for fit in self.screened_fits
         ]
 
 
 def in_plain_words(mechanism: Mechanism) -> str:
-    """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
+    """A mechanism's name; for an unlisted law the quantity it acts on, its axis and its form."""
     return mechanism.description.words if isinstance(mechanism, UnlistedLaw) else mechanism.name
 
 
 class RecordingLaw(UnlistedLaw):
-    """A law that changes the level of each recording: by its gain, what is pressed, how hard, or where."""
+    """An unlisted law that changes the level of each recording: gain, pressed material, force or position."""
 
     stage = Stage.RECORDING
     order = 200
@@ -267,8 +270,8 @@ class RecordingLaw(UnlistedLaw):
         if shape.form == "free":
             usual = usual / 2
         amplitudes = changes("law_change", self._unit, usual, count)
-        self.amplitudes = tuple(entry.name for entry in amplitudes)
-        self.parameters_bound = (*amplitudes, *shape.bending)
+        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
+        self.parameters_bound = (*amplitudes, *shape.shape_parameters)
         self.grid = shape.points
 
     def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
@@ -288,11 +291,11 @@ class RecordingLaw(UnlistedLaw):
         if self._acts_on == "position":
             half = len(self.amplitudes) // 2
             x, y = (
-                _summed([values[name] * one for name, one in zip(names, features, strict=True)])
+                _summed([values[name] * feature for name, feature in zip(names, features, strict=True)])
                 for names in (self.amplitudes[:half], self.amplitudes[half:])
             )
             return self.tables.moved(rows, x, y)
-        change = _summed([values[name] * one for name, one in zip(self.amplitudes, features, strict=True)])
+        change = _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
         if self.shape.logarithmic:
             log = change
         elif self._acts_on == "force":
@@ -305,11 +308,11 @@ class RecordingLaw(UnlistedLaw):
         return self.tables.factor(self._acts_on, rows, log)
 
     def sensitivity(self, ids: tuple[str, ...]) -> Floats:
-        """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a place by x and y (…, 2)."""
+        """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a position by x and y (…, 2)."""
         rows = self._rows(ids)
         if self._acts_on == "position":
             none = Differentiated(np.zeros((1, 1)), np.zeros((2, 1, 1)))
-            x, y = (Differentiated(none.value, np.eye(2)[place][:, None, None]) for place in (0, 1))
+            x, y = (Differentiated(none.value, np.eye(2)[index][:, None, None]) for index in (0, 1))
             moved = self.tables.moved(rows, x, y)
             return np.asarray((moved.slopes / moved.value)[:, 0].T)
         if self._acts_on == "gain":
@@ -329,7 +332,7 @@ def _rows(tables: LevelTables, ids: tuple[str, ...]) -> Indices:
 
 
 def log_positive(change: Differentiated) -> Differentiated:
-    """ln(1 + change), below a quantity of 0.1 continued by its tangent's exponential."""
+    """ln(1 + change); below a quantity of 0.1 continued along its tangent."""
     return log_of(1.0 + change)
 
 
@@ -350,10 +353,10 @@ def _summed(parts: Sequence[Differentiated]) -> Differentiated:
 
 @lru_cache(maxsize=64)
 def changes(name: str, unit: str, usual: float, count: int, most: float = _MOST) -> tuple[Parameter, ...]:
-    """So many changes, each as large as usual; bounded by `most` times that."""
+    """This many changes, each with the typical size as prior sd; bounded by `most` times that."""
     names = [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
     prior = Normal(0.0, usual)
-    return tuple(Parameter(one, unit, -most * usual, most * usual, prior, "linear", 0.0, _REASON) for one in names)
+    return tuple(Parameter(label, unit, -most * usual, most * usual, prior, "linear", 0.0, _REASON) for label in names)
 
 
 def _unit_of_change(acts_on: ActsOn) -> str:
@@ -366,10 +369,10 @@ def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
 
 
 class LagLaw(UnlistedLaw):
-    """A response that lags, or whose lines fall off, by something that follows an axis of the recordings.
+    """A phase lag, or a fall-off over the lines, that follows an axis of the recordings.
 
-    `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. Of the lag φ
-    they make exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
+    `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. For a lag
+    φ the factors are exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
     """
 
     stage = Stage.LINES
@@ -387,8 +390,8 @@ class LagLaw(UnlistedLaw):
         usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(kind, 1.0)
         power = shape.logarithmic
         lags = changes("law_lag", "-", usual, shape.count)
-        self.amplitudes = tuple(entry.name for entry in lags)
-        self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.bending)
+        self.amplitudes = tuple(parameter.name for parameter in lags)
+        self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.shape_parameters)
         self.grid = _EXPONENTS if power else shape.points
 
     def on(self, axis: Axis) -> "LagLaw":
@@ -402,7 +405,7 @@ class LagLaw(UnlistedLaw):
         features = self.shape.features(self.axis.of(ids), values)
         if self.shape.logarithmic:
             features = [exp(values["law_exponent"] * features[0])]
-        return _summed([values[name] * one for name, one in zip(self.amplitudes, features, strict=True)])
+        return _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """The factor on each distinct line."""

@@ -1,10 +1,10 @@
-"""The words of the grammar, as reports have them."""
+"""The words of the grammar, as used in reports."""
 
 from typing import Literal
 
 ActsOn = Literal["gain", "modulus", "thickness", "contact_radius", "force", "position", "frequency_response"]
 Form = Literal["linear", "power", "exponential", "saturating", "threshold", "step", "periodic", "peak", "notch", "free"]
-ACTS_ON: dict[ActsOn, tuple[str, str]] = {  # what it is called, and its symbol
+ACTS_ON: dict[ActsOn, tuple[str, str]] = {  # name and symbol
     "gain": ("gain of the charge", "Q"),
     "modulus": ("modulus", "E"),
     "thickness": ("thickness", "h"),
@@ -32,7 +32,7 @@ AXES: dict[str, tuple[str, str]] = {  # of built-in axes the words and the symbo
     "time_s": ("the time", "t"),
 }
 OF_SAMPLES = ("displacement_mm", "force_n", "time_s")  # axes of laws on curves
-OF_CURVES: dict[str, str] = {  # what laws act on there, and what it is called
+OF_CURVES: dict[str, str] = {  # quantities that laws of curves act on, with their names
     "modulus": "modulus",
     "gain": "gain of the cell",
     "force": "force that is read",
@@ -41,12 +41,12 @@ OF_CURVES: dict[str, str] = {  # what laws act on there, and what it is called
 
 
 def acted_on(acts_on: str, axis: str) -> str:
-    """What a law acts on, in words; of one over an axis of samples what that is on a curve."""
+    """The quantity a law acts on, in words; for an axis of samples the quantity on a curve."""
     if axis in OF_SAMPLES and acts_on in OF_CURVES:
         return OF_CURVES[acts_on]
     return next((words for name, (words, _) in ACTS_ON.items() if name == acts_on), acts_on.replace("_", " "))
 
 
 def followed(axis: str) -> str:
-    """The axis that a law follows, in words; a column of a lab's own by its heading."""
+    """The axis that a law follows, in words; a lab's own column by its heading."""
     return AXES[axis][0] if axis in AXES else axis
