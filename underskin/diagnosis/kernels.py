@@ -60,7 +60,7 @@ _THREE, _FOUR = "float64[:, :, ::1]", "float64[:, :, :, ::1]"
 
 
 @compiled(f"void(complex128[:, :, ::1], {_THREE}, {_THREE}, {_THREE})")
-def line_products(each: Array, products: Floats, real: Floats, imag: Floats) -> None:
+def line_products(values: Array, products: Floats, real: Floats, imag: Floats) -> None:
     """Re x*y of all pairs of functions on the lines.
 
     Parameters
@@ -72,19 +72,19 @@ def line_products(each: Array, products: Floats, real: Floats, imag: Floats) -> 
     real, imag
         (points, functions, lines) the functions' parts, to be filled.
     """
-    points, functions, lines = each.shape
+    points, functions, lines = values.shape
     for point in range(points):
-        for one in range(functions):
+        for first in range(functions):
             for line in range(lines):
-                real[point, one, line] = each[point, one, line].real
-                imag[point, one, line] = each[point, one, line].imag
+                real[point, first, line] = values[point, first, line].real
+                imag[point, first, line] = values[point, first, line].imag
         pair = 0
-        for one in range(functions):
-            re, im = real[point, one], imag[point, one]
-            for other in range(one, functions):
-                own, re_other, im_other = products[point, pair], real[point, other], imag[point, other]
+        for first in range(functions):
+            re, im = real[point, first], imag[point, first]
+            for second in range(first, functions):
+                product, re_other, im_other = products[point, pair], real[point, second], imag[point, second]
                 for line in range(lines):
-                    own[line] = re[line] * re_other[line] + im[line] * im_other[line]
+                    product[line] = re[line] * re_other[line] + im[line] * im_other[line]
                 pair += 1
 
 
@@ -107,15 +107,15 @@ def spread_sums(both: Floats, with_y: Floats, moving: NDArray[np.int64], uv: Flo
     points, _, recordings = both.shape
     count = len(moving)
     for point in range(points):
-        for one in range(count):
-            p = moving[one]
+        for first in range(count):
+            p = moving[first]
             for recording in range(recordings):
-                uv[point, recording, p] = both[point, 1 + one, recording]
-                vy[point, recording, p] = with_y[point, 1 + one, recording]
+                uv[point, recording, p] = both[point, 1 + first, recording]
+                vy[point, recording, p] = with_y[point, 1 + first, recording]
         pair = 1 + count
-        for one in range(count):
-            for other in range(one, count):
-                p, q = moving[one], moving[other]
+        for first in range(count):
+            for second in range(first, count):
+                p, q = moving[first], moving[second]
                 for recording in range(recordings):
                     vv[point, recording, p, q] = vv[point, recording, q, p] = both[point, pair, recording]
                 pair += 1
@@ -130,17 +130,17 @@ _ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
 
 
 @compiled()
-def _take(taken: Floats, uu: Floats, uy: Floats, yy: Floats, point: int, recording: int) -> None:
+def _subtract_losses(losses: Floats, uu: Floats, uy: Floats, yy: Floats, point: int, recording: int) -> None:
     """Take what a recording's rows lose (3, sets) from its sums, and begin anew."""
-    for number in range(taken.shape[1]):
-        uu[point, number, recording] -= taken[0, number]
-        uy[point, number, recording] -= taken[1, number]
-        yy[point, number, recording] -= taken[2, number]
-    taken[:] = 0.0
+    for number in range(losses.shape[1]):
+        uu[point, number, recording] -= losses[0, number]
+        uy[point, number, recording] -= losses[1, number]
+        yy[point, number, recording] -= losses[2, number]
+    losses[:] = 0.0
 
 
 @compiled(f"void(float64[:, :, ::1], {_ROWS}, complex128[:, ::1], {_SUMS}, {_SUMS}, {_SUMS}, float64[:, ::1])")
-def lost(
+def subtract_pickup(
     pickup: Floats,
     alike: NDArray[np.int64],
     precision: Floats,
@@ -166,29 +166,29 @@ def lost(
         The direction (points, lines).
     """
     points, distinct, sets = pickup.shape
-    factors, total, taken, largest = np.empty(sets), np.empty(sets), np.zeros((3, sets)), np.empty(distinct)
+    factors, total, losses, largest = np.empty(sets), np.empty(sets), np.zeros((3, sets)), np.empty(distinct)
     for point in range(points):
         factors[:], total[:] = 1.0, 0.0
-        count, of = 0, 0
+        count, current_recording = 0, 0
         for number in range(distinct):
             largest[number] = pickup[point, number].max()
         for row in range(len(y)):
-            kind, weight = alike[row], precision[row]
-            if largest[kind] * weight <= _NONE:
+            deviation_index, weight = alike[row], precision[row]
+            if largest[deviation_index] * weight <= _NONE:
                 continue
-            if recording[row] != of:
-                _take(taken, uu, uy, yy, point, of)
-                of = recording[row]
-            at, measured = u[point, line[row]], y[row]
-            uu_row = at.real * at.real + at.imag * at.imag
-            uy_row = at.real * measured.real + at.imag * measured.imag
+            if recording[row] != current_recording:
+                _subtract_losses(losses, uu, uy, yy, point, current_recording)
+                current_recording = recording[row]
+            direction, measured = u[point, line[row]], y[row]
+            uu_row = direction.real * direction.real + direction.imag * direction.imag
+            uy_row = direction.real * measured.real + direction.imag * measured.imag
             yy_row = measured.real * measured.real + measured.imag * measured.imag
             for number in range(sets):
-                x = pickup[point, kind, number] * weight
-                less = x / (1 + x) * weight
-                taken[0, number] += less * uu_row
-                taken[1, number] += less * uy_row
-                taken[2, number] += less * yy_row
+                x = pickup[point, deviation_index, number] * weight
+                loss = x / (1 + x) * weight
+                losses[0, number] += loss * uu_row
+                losses[1, number] += loss * uy_row
+                losses[2, number] += loss * yy_row
                 factors[number] *= 1 + x
             count += 1
             if count == _ROWS_TOGETHER:
@@ -196,7 +196,7 @@ def lost(
                     total[number] += np.log(factors[number])
                     factors[number] = 1.0
                 count = 0
-        _take(taken, uu, uy, yy, point, of)
+        _subtract_losses(losses, uu, uy, yy, point, current_recording)
         for number in range(sets):
             log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
 
@@ -205,7 +205,7 @@ def lost(
     f"void(float64[:, ::1], {_ROWS}, complex128[:, ::1], complex128[:, :, ::1], {_SUMS}, {_SUMS}, "
     "float64[:, :, :, ::1])"
 )
-def slopes_lost(
+def subtract_pickup_slopes(
     pickup: Floats,
     alike: NDArray[np.int64],
     precision: Floats,
@@ -242,17 +242,17 @@ def slopes_lost(
         for row in range(len(y)):
             x = pickup[point, alike[row]] * precision[row]
             if x > _NONE and moves:
-                less, of, at = x / (1 + x) * precision[row], recording[row], line[row]
+                loss, recording_index, at = x / (1 + x) * precision[row], recording[row], line[row]
                 direction, measured = u[point, at], y[row]
-                for one in range(moves):
-                    p = moving[one]
+                for first in range(moves):
+                    p = moving[first]
                     of_p = v[point, p, at]
-                    uv[point, of, p] -= less * (direction.real * of_p.real + direction.imag * of_p.imag)
-                    vy[point, of, p] -= less * (measured.real * of_p.real + measured.imag * of_p.imag)
-                    for other in range(moves):
-                        q = moving[other]
+                    uv[point, recording_index, p] -= loss * (direction.real * of_p.real + direction.imag * of_p.imag)
+                    vy[point, recording_index, p] -= loss * (measured.real * of_p.real + measured.imag * of_p.imag)
+                    for second in range(moves):
+                        q = moving[second]
                         of_q = v[point, q, at]
-                        vv[point, of, p, q] -= less * (of_p.real * of_q.real + of_p.imag * of_q.imag)
+                        vv[point, recording_index, p, q] -= loss * (of_p.real * of_q.real + of_p.imag * of_q.imag)
 
 
 _PIVOTS_TOGETHER = (

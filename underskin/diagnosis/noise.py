@@ -164,7 +164,7 @@ class CurveError:
     """Of all rows of a campaign's curves, one curve after another."""
 
     scale: Floats  # (rows,) [N]: the deviation is η times this
-    place: Floats  # (rows,) along the curve, 0 to 1
+    path_fraction: Floats  # (rows,) along the curve, 0 to 1
     columns: Floats  # (rows, columns) [N] of each curve's own coefficients
     count: Floats  # (rows,) raw samples that each row is the mean of
     slope: Floats  # (rows,) [N per sample] of the straight line through these
@@ -180,13 +180,16 @@ class CurveError:
             return np.concatenate([*(getattr(part, name) for part in parts), np.zeros(0)])
 
         return cls(
-            of("scale"), of("place"), np.concatenate(columns), *map(of, ("count", "slope", "about_line", "slow"))
+            of("scale"),
+            of("path_fraction"),
+            np.concatenate(columns),
+            *map(of, ("count", "slope", "about_line", "slow")),
         )
 
     def part(self, order: Indices) -> Self:
         """Of some of the rows."""
-        rows = (self.scale, self.place, self.columns, self.count, self.slope, self.about_line, self.slow)
-        return type(self)(*(entry[order] for entry in rows))
+        rows = (self.scale, self.path_fraction, self.columns, self.count, self.slope, self.about_line, self.slow)
+        return type(self)(*(values[order] for values in rows))
 
     def within(self, force: Floats, curves: Sequence[slice]) -> float:
         """The sum of squares [N²] of raw samples about a law beyond that of their means, of whole curves.
@@ -194,22 +197,22 @@ class CurveError:
         The law's force (rows,) is straight between rows, and so are the samples of a row but for their noise.
         """
         middle = np.cumsum(self.count) - self.count / 2
-        slope = np.concatenate([np.gradient(force[own], middle[own]) for own in curves])
+        slope = np.concatenate([np.gradient(force[span], middle[span]) for span in curves])
         square = self.count * (self.count**2 - 1) / 12
         return float((self.about_line + square * (self.slope - slope) ** 2).sum())
 
     def covariance(self, size: float) -> Floats:
         """Of rows that are one curve's, with η = `size` (rows, rows)."""
-        return np.asarray(size**2 * np.outer(self.scale, self.scale) * _likeness(self.place))
+        return np.asarray(size**2 * np.outer(self.scale, self.scale) * _correlation(self.path_fraction))
 
 
 def instrument_columns(displacement: Floats, time: Floats, zero: float, drift: float) -> Floats:
     """P of one curve (rows, 3): zero, drift in time, drift along the travel; `zero` and `drift` are deviations [N]."""
     columns = np.zeros((len(displacement), _COLUMNS))
     columns[:, 0] = zero
-    for place, axis in ((1, time), (2, displacement)):
+    for column, axis in ((1, time), (2, displacement)):
         if np.ptp(axis) > 0:
-            columns[:, place] = drift * ((axis - axis[0]) / np.ptp(axis))
+            columns[:, column] = drift * ((axis - axis[0]) / np.ptp(axis))
     return columns
 
 
@@ -224,7 +227,7 @@ class Whitening:
         self._turns, sizes = [], []
         for span in self._spans:
             relative = error.scale[span] / deviation[span]
-            size, turn = np.linalg.eigh(relative[:, None] * _likeness(error.place[span]) * relative)
+            size, turn = np.linalg.eigh(relative[:, None] * _correlation(error.path_fraction[span]) * relative)
             self._turns.append(turn.T)
             sizes.append(np.maximum(size, 0.0))
         self._size = np.concatenate(sizes)
@@ -245,11 +248,11 @@ class Whitening:
         return np.concatenate(parts, axis=-1)
 
 
-def _likeness(place: Floats) -> Floats:
+def _correlation(path_fraction: Floats) -> Floats:
     """k between all places of a curve."""
-    total = np.zeros((len(place), len(place)))
+    total = np.zeros((len(path_fraction), len(path_fraction)))
     for length in _LENGTHS:
-        distance = np.sqrt(3.0) * np.abs(place[:, None] - place) / length
+        distance = np.sqrt(3.0) * np.abs(path_fraction[:, None] - path_fraction) / length
         total += (1 + distance) * np.exp(-distance) / len(_LENGTHS)
     return total
 
@@ -298,9 +301,11 @@ def line_noise(
     rough /= scale**2
     size2 = (amplitude / scale) ** 2
     weighed2 = size2 * uneven**2
-    known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
-    from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
-    certainty = 1 / (_COHERENCE_VARIANCE + _OF_ALL_VARIANCE * np.bincount(line[known], minlength=1)[line[known]])
+    has_coherence = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
+    from_coherence = np.log((1 - coherence[has_coherence]) / coherence[has_coherence]) if has_coherence.any() else None
+    certainty = 1 / (
+        _COHERENCE_VARIANCE + _OF_ALL_VARIANCE * np.bincount(line[has_coherence], minlength=1)[line[has_coherence]]
+    )
 
     def variance(p: Floats) -> Floats:
         return np.exp(hats @ p[:-2])[line] * weighed2 + np.exp(p[-2])
@@ -312,17 +317,19 @@ def line_noise(
         cost = roughness_cost(d2, middle, share, rough, _FREEDOM, by_d2)
         if from_coherence is not None:
             # Noisy, and with an unknown n: loose Gaussians; p[-1] is log(1/2n).
-            gap = np.log(d2[known] / size2[known]) - from_coherence - p[-1]
+            gap = np.log(d2[has_coherence] / size2[has_coherence]) - from_coherence - p[-1]
             cost += 0.5 * np.sum(certainty * gap**2)
-            by_d2[known] += certainty * gap / d2[known]
-        bend = np.diff(p[:-2], 2) / _SMOOTH
-        cost += 0.5 * bend @ bend + 0.5 * np.sum(((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2)
+            by_d2[has_coherence] += certainty * gap / d2[has_coherence]
+        second_difference = np.diff(p[:-2], 2) / _SMOOTH
+        cost += 0.5 * second_difference @ second_difference + 0.5 * np.sum(
+            ((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2
+        )
         cost += 0.5 * ((p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2 + 0.5 * (p[-1] + 3.5) ** 2
         by_p = np.zeros(len(p))
         by_p[:-2] = (
             hats.T @ np.bincount(line, by_d2 * relative, len(distinct)) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
         )
-        by_p[:-2] += np.convolve(bend, [1, -2, 1]) / _SMOOTH if len(bend) else 0.0
+        by_p[:-2] += np.convolve(second_difference, [1, -2, 1]) / _SMOOTH if len(second_difference) else 0.0
         by_p[-2] = by_d2.sum() * floor + (p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
         by_p[-1] = (p[-1] + 3.5) - (certainty @ gap if from_coherence is not None else 0.0)
         return float(cost), by_p
@@ -354,8 +361,8 @@ def local_amplitude(value: Complexes, recording: Indices) -> Floats:
     if len(size) >= _WINDOW:
         windows = np.lib.stride_tricks.sliding_window_view(size, _WINDOW)
         for low in range(0, len(windows), _BLOCK):
-            some = windows[low : low + _BLOCK]
-            smooth[half + low : half + low + len(some)] = np.partition(some, half, axis=1)[:, half]
+            batch = windows[low : low + _BLOCK]
+            smooth[half + low : half + low + len(batch)] = np.partition(batch, half, axis=1)[:, half]
     edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
     for low, high in itertools.pairwise(edges.tolist()):
         if high - low < _WINDOW:
@@ -409,5 +416,5 @@ def _hats(log_f: Floats, knots: Floats) -> Floats:
     """The piecewise linear functions (rows, knots) that are 1 at one knot and 0 at the others."""
     if len(knots) == 1:
         return np.ones((len(log_f), 1))
-    place = (log_f - knots[0]) / (knots[1] - knots[0])
-    return np.clip(1 - np.abs(place[:, None] - np.arange(len(knots))), 0, None)
+    position = (log_f - knots[0]) / (knots[1] - knots[0])
+    return np.clip(1 - np.abs(position[:, None] - np.arange(len(knots))), 0, None)

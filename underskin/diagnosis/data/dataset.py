@@ -74,20 +74,20 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
     [mm], `recorded_at` is in hours from the first. An axis that a recording lacks is left out, and one on which all
     agree, on a logarithmic scale within a percent.
     """
-    entries = campaign.recordings
+    recordings = campaign.recordings
     columns_by_axis: dict[str, Floats] = {}
     for name in (*_LOGARITHMIC, *_FROM_ZERO):
-        values: list[Any] = [getattr(entry, name, None) for entry in entries]
+        values: list[Any] = [getattr(recording, name, None) for recording in recordings]
         if None in values:
             continue
         if not agree(name, values):
             columns_by_axis[name] = _scaled(name, values)[:, None]
-    frf = [entry for entry in entries if isinstance(entry, FrfRecording)]
+    frf = [recording for recording in recordings if isinstance(recording, FrfRecording)]
     if frf:
         columns_by_axis["position_mm"] = 1e3 * offsets(campaign)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-        columns_by_axis["sensor"] = np.array([centres[entry.sensor] for entry in frf])
-    times = [entry.recorded_at for entry in entries]
+        columns_by_axis["sensor"] = np.array([centres[recording.sensor] for recording in frf])
+    times = [recording.recorded_at for recording in recordings]
     if None not in times:
         columns_by_axis["recorded_at"] = hours(times)[:, None]
     return {name: column for name, column in columns_by_axis.items() if np.ptp(column, axis=0).max() > 1e-9}
@@ -96,8 +96,8 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
 def agree(name: str, values: Sequence[float | None]) -> bool:
     """Whether values on an axis of a logarithmic scale were meant to be one: they lie within a percent, or none is
     known."""
-    known = [value for value in values if value is not None]
-    return len(known) in (0, len(values)) and (not known or float(np.ptp(_scaled(name, known))) <= _SAME)
+    present = [value for value in values if value is not None]
+    return len(present) in (0, len(values)) and (not present or float(np.ptp(_scaled(name, present))) <= _SAME)
 
 
 def _scaled(name: str, values: Sequence[float]) -> Floats:
@@ -108,8 +108,8 @@ def _scaled(name: str, values: Sequence[float]) -> Floats:
 def hours(times: list[str | None]) -> Floats:
     """Hours since the first of these times (ISO 8601; UTC where they do not say)."""
     read = [datetime.fromisoformat(str(time).replace("Z", "+00:00")) for time in times]
-    known = [time if time.tzinfo else time.replace(tzinfo=UTC) for time in read]
-    since = np.array([(time - known[0]).total_seconds() for time in known])
+    zoned = [time if time.tzinfo else time.replace(tzinfo=UTC) for time in read]
+    since = np.array([(time - zoned[0]).total_seconds() for time in zoned])
     return (since - since.min()) / 3600
 
 
@@ -136,7 +136,7 @@ _LEAST_NOISE = 2e-5  # of the range of force: what numbers written with five dig
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which changes of force are summed, standard deviations of noise
 _NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # from it, where blocks begin: in samples, or in
 # as many of them as hide the travel, since a law of single displacements that are noisy is biased where it bends
-_BESIDE = 5  # samples on either side of the deepest one
+_SIDE_SAMPLES = 5  # samples on either side of the deepest one
 _STEP = 0.2  # of the larger step of both ways, which the smaller must exceed for their lines to meet in a corner
 _RESTS = 1e-3  # of that step: where the deepest samples differ by less, the sphere was held
 _SURE = 4.0  # standard deviations
@@ -152,24 +152,24 @@ def thinned(
     unsteady = roughness(columns[0])
     columns = _with_corner(_with_still_hold(columns, seen), seen.turn)
     displacement, force = columns[:2]
-    way = way_along(displacement, force, seen.noise)
-    even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
+    path_fraction = path_fractions(displacement, force, seen.noise)
+    even = np.searchsorted(path_fraction, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
     unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
     straight = ((force, seen.noise), (displacement, max(unsteady, unseen)))
-    starts = _split(np.union1d(even, _around(seen, displacement, force, kind)), straight)
-    counts = np.diff(np.append(starts, len(way)))
-    *means, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
-    unsure = np.zeros(len(starts))
+    starts = _split(np.union1d(even, _starts_near_corners(seen, displacement, force, kind)), straight)
+    counts = np.diff(np.append(starts, len(path_fraction)))
+    *means, position = [np.add.reduceat(column, starts) / counts for column in (*columns, path_fraction)]
+    sag_deviation = np.zeros(len(starts))
     for number in range(len(columns)):
         sag, doubt = _sag(columns[number], starts, _corners(seen))
         means[number] = means[number] - sag
-        unsure = doubt if number == 1 else unsure
+        sag_deviation = doubt if number == 1 else sag_deviation
     held = (starts >= seen.arrive) & (starts <= seen.leave) & (seen.arrive < seen.turn)
     slope = np.where(held, 0.0, _slopes(means[0], means[1], unsteady / np.sqrt(counts), starts >= seen.turn))
     least = _LEAST_NOISE * float(np.ptp(force))
-    deviation = np.sqrt((seen.noise**2 + (slope * unsteady) ** 2) / counts + least**2 + unsure**2 + slow**2)
-    return means, deviation, place, counts.astype(float)
+    deviation = np.sqrt((seen.noise**2 + (slope * unsteady) ** 2) / counts + least**2 + sag_deviation**2 + slow**2)
+    return means, deviation, position, counts.astype(float)
 
 
 def _slopes(displacement: Floats, force: Floats, noise: Floats, back: Mask) -> Floats:
@@ -185,18 +185,18 @@ def _slopes(displacement: Floats, force: Floats, noise: Floats, back: Mask) -> F
     after = distinct & (number > number[:, None])
     before = distinct & (number < number[:, None])
     slopes = []
-    for beside, other in ((after, after.argmax(axis=1)), (before, number[-1] - before[:, ::-1].argmax(axis=1))):
+    for neighbours, neighbour in ((after, after.argmax(axis=1)), (before, number[-1] - before[:, ::-1].argmax(axis=1))):
         with np.errstate(divide="ignore", invalid="ignore"):
-            slope = np.abs((force[other] - force) / (displacement[other] - displacement))
-        slopes.append(np.where(beside.any(axis=1), slope, np.inf))
+            slope = np.abs((force[neighbour] - force) / (displacement[neighbour] - displacement))
+        slopes.append(np.where(neighbours.any(axis=1), slope, np.inf))
     least = np.minimum(*slopes)
     return np.where(np.isfinite(least), least, 0.0)
 
 
 def _corners(seen: Course) -> Indices:
     """The first samples of what is not smoothly joined to what was before."""
-    places = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
-    return np.unique(np.array([place for place in places if place is not None], dtype=np.intp))
+    samples = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
+    return np.unique(np.array([sample for sample in samples if sample is not None], dtype=np.intp))
 
 
 def _sag(column: Floats, starts: Indices, corners: Indices) -> tuple[Floats, Floats]:
@@ -209,19 +209,19 @@ def _sag(column: Floats, starts: Indices, corners: Indices) -> tuple[Floats, Flo
     ends = np.append(starts[1:], len(column))
     counts = ends - starts
     middle, mean = (starts + ends - 1) / 2, np.add.reduceat(column, starts) / counts
-    sag, doubt = np.zeros(len(starts)), np.zeros(len(starts))
+    sag, uncertainty = np.zeros(len(starts)), np.zeros(len(starts))
     if len(starts) < 3:
-        return sag, doubt
+        return sag, uncertainty
     first, second = np.diff(middle[:-1]), np.diff(middle[1:])
-    bend = 2 * (np.diff(mean[1:]) / second - np.diff(mean[:-1]) / first) / (first + second)
-    beside = np.stack([np.append(bend[1:], bend[-1]), bend, np.append(bend[0], bend[:-1])])
-    alike = (np.sign(beside) == np.sign(bend)).all(axis=0)
-    limited = np.where(alike, np.sign(bend) * np.abs(beside).min(axis=0), 0.0)
+    curvature = 2 * (np.diff(mean[1:]) / second - np.diff(mean[:-1]) / first) / (first + second)
+    neighbours = np.stack([np.append(curvature[1:], curvature[-1]), curvature, np.append(curvature[0], curvature[:-1])])
+    alike = (np.sign(neighbours) == np.sign(curvature)).all(axis=0)
+    limited = np.where(alike, np.sign(curvature) * np.abs(neighbours).min(axis=0), 0.0)
     smooth = ~((corners[:, None] > starts[:-2]) & (corners[:, None] < ends[2:])).any(axis=0)
     unit = np.where(smooth, (counts[1:-1] ** 2 - 1) / 24, 0.0)
     sag[1:-1] = limited * unit
-    doubt[1:-1] = np.abs(bend - limited) * unit
-    return sag, doubt
+    uncertainty[1:-1] = np.abs(curvature - limited) * unit
+    return sag, uncertainty
 
 
 def _split(starts: Indices, columns: Sequence[tuple[Floats, float]]) -> Indices:
@@ -232,7 +232,9 @@ def _split(starts: Indices, columns: Sequence[tuple[Floats, float]]) -> Indices:
     while len(starts) < _MOST_SAMPLES:
         ends = np.append(starts[1:], len(columns[0][0]))
         blocks = list(zip(starts, ends, strict=True))
-        excess = np.array([max(_bend(one[low:high], noise) for one, noise in columns) for low, high in blocks])
+        excess = np.array(
+            [max(_curvature_excess(column[low:high], noise) for column, noise in columns) for low, high in blocks]
+        )
         worst = np.argsort(-excess)[: max(_MOST_SAMPLES - len(starts), 0)]
         worst = worst[excess[worst] > _STRAIGHT]
         if not len(worst):
@@ -241,28 +243,28 @@ def _split(starts: Indices, columns: Sequence[tuple[Floats, float]]) -> Indices:
     return starts
 
 
-def _bend(force: Floats, noise: float) -> float:
+def _curvature_excess(force: Floats, noise: float) -> float:
     """How far χ² about a straight line lies above its expectation, in its standard deviations."""
     freedom = len(force) - 2
     if freedom < 1:
         return 0.0
-    place = np.arange(len(force)) - (len(force) - 1) / 2
-    left = force - force.mean() - place * (place @ force) / (place @ place)
+    offset = np.arange(len(force)) - (len(force) - 1) / 2
+    residual = force - force.mean() - offset * (offset @ force) / (offset @ offset)
     least = max(noise, _LEAST_NOISE * float(np.abs(force).max()))
     if not least**2 > 0:
         return 0.0
-    return float((left @ left) / least**2 - freedom) / np.sqrt(2.0 * freedom)
+    return float((residual @ residual) / least**2 - freedom) / np.sqrt(2.0 * freedom)
 
 
-def _around(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> Indices:
+def _starts_near_corners(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> Indices:
     """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
     far a contact has grown is told by single samples; and where contact begins and ends without a jump: a mean over
     that kink lies above the curve."""
-    places = _corners(seen)
+    samples = _corners(seen)
     if kind == "indentation":
-        places = np.concatenate([places, _hidden_jumps(seen, force), _feet(seen, displacement, force)])
-    apart = hidden_samples(displacement) * np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])
-    near = (places[:, None] + apart).ravel()
+        samples = np.concatenate([samples, _hidden_jumps(seen, force), _feet(seen, displacement, force)])
+    sample_offsets = hidden_samples(displacement) * np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])
+    near = (samples[:, None] + sample_offsets).ravel()
     return np.unique(near[(near >= 0) & (near < len(force))])
 
 
@@ -272,8 +274,8 @@ def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
         (seen.snap_in, np.arange(seen.arrive + 1)),
         (seen.pull_off, np.arange(len(force) - 1, seen.leave - 1, -1)),
     )
-    feet = [(own, foot(displacement[own], force[own])) for jump, own in ways if jump is None]
-    return np.array([own[place] for own, place in feet if place is not None], dtype=np.intp)
+    feet = [(samples, foot(displacement[samples], force[samples])) for jump, samples in ways if jump is None]
+    return np.array([samples[index] for samples, index in feet if index is not None], dtype=np.intp)
 
 
 def _hidden_jumps(seen: Course, force: Floats) -> Indices:
@@ -281,7 +283,7 @@ def _hidden_jumps(seen: Course, force: Floats) -> Indices:
     end by a jump that noise hides, and means over it would take from the adhesion."""
     ways = (seen.snap_in, 0, seen.turn), (seen.pull_off, seen.turn, len(force))
     least = [first + int(np.argmin(force[first:end])) for jump, first, end in ways if jump is None and first < end]
-    return np.array([place for place in least if force[place] < -_SURE * seen.noise], dtype=np.intp)
+    return np.array([sample for sample in least if force[sample] < -_SURE * seen.noise], dtype=np.intp)
 
 
 def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
@@ -289,12 +291,12 @@ def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
 
     Noise of the displacement moves no contact; a law would answer to it, the more the steeper it is.
     """
-    whole = [column.copy() for column in columns]
+    corrected = [column.copy() for column in columns]
     if seen.arrive < seen.turn:
-        held = whole[0][seen.arrive : seen.leave + 1]
-        place = np.arange(len(held)) - (len(held) - 1) / 2
-        held[:] = held.mean() + place * float(place @ held) / float(place @ place)
-    return whole
+        held = corrected[0][seen.arrive : seen.leave + 1]
+        offset = np.arange(len(held)) - (len(held) - 1) / 2
+        held[:] = held.mean() + offset * float(offset @ held) / float(offset @ offset)
+    return corrected
 
 
 def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
@@ -303,27 +305,27 @@ def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
     How far the contact has grown is remembered on all of the way back. By straight lines through the samples on either
     side; as it is where the sphere was held.
     """
-    whole = [column.copy() for column in columns]
+    corrected = [column.copy() for column in columns]
     displacement = columns[0]
-    before, after = np.arange(turn - _BESIDE, turn), np.arange(turn + 1, turn + 1 + _BESIDE)
+    before, after = np.arange(turn - _SIDE_SAMPLES, turn), np.arange(turn + 1, turn + 1 + _SIDE_SAMPLES)
     if before[0] < 0 or after[-1] >= len(displacement):
-        return whole
+        return corrected
     lines = [[np.polyfit(side - turn, column[side], 1) for side in (before, after)] for column in columns]
     (rise, high), (fall, low) = lines[0]
     steep = min(rise, -fall) > _STEP * max(rise, -fall)
     rests = displacement[turn] - max(displacement[turn - 1], displacement[turn + 1]) < _RESTS * max(rise, -fall)
     if not steep or rests:
-        return whole
-    place = (low - high) / (rise - fall)
-    peak = high + rise * place
-    if abs(place) > 1 or not 0 <= peak - displacement[turn] <= max(rise, -fall):
-        return whole
-    for column, ((up, at_up), (down, at_down)) in zip(whole, lines, strict=True):
-        column[turn] = 0.5 * (at_up + up * place + at_down + down * place)
-    return whole
+        return corrected
+    corner = (low - high) / (rise - fall)
+    peak = high + rise * corner
+    if abs(corner) > 1 or not 0 <= peak - displacement[turn] <= max(rise, -fall):
+        return corrected
+    for column, ((up, at_up), (down, at_down)) in zip(corrected, lines, strict=True):
+        column[turn] = 0.5 * (at_up + up * corner + at_down + down * corner)
+    return corrected
 
 
-def way_along(displacement: Floats, force: Floats, noise: float) -> Floats:
+def path_fractions(displacement: Floats, force: Floats, noise: float) -> Floats:
     """How far along the curve each sample lies, 0 to 1: as much by displacement, by force and by count.
 
     A sphere's way through the air is long and says little; force counts where it changes by more than its noise.
@@ -415,10 +417,10 @@ class Lines:
         weight = self.deviation**-2
         total = np.add.reduceat(weight, self.first)
         mean = np.add.reduceat(weight * self.value, self.first).astype(np.complex128) / total
-        left = float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
+        square_sum = float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
         recordings = tuple(
-            FrfRecording.of_lines(entry, np.array([COLLAPSED_HZ]), mean[[number]])
-            for number, entry in enumerate(frf_recordings(self.campaign))
+            FrfRecording.of_lines(recording, np.array([COLLAPSED_HZ]), mean[[number]])
+            for number, recording in enumerate(frf_recordings(self.campaign))
         )
         return replace(
             self,
@@ -427,62 +429,62 @@ class Lines:
             deviation=total**-0.5,
             frequency=np.full(len(mean), COLLAPSED_HZ),
             recording=np.arange(len(mean)),
-            scatter=(self.scatter[0] + left, self.scatter[1] + 2 * (len(self.value) - len(mean))),
+            scatter=(self.scatter[0] + square_sum, self.scatter[1] + 2 * (len(self.value) - len(mean))),
         )
 
-    def part(self, kept: Mask) -> "Lines":
+    def part(self, rows: Mask) -> "Lines":
         """Only some of the rows, each with the noise it had; recordings without a row are left out."""
-        order = np.flatnonzero(kept)
-        recordings, first = np.unique(self.recording[order], return_index=True)
+        order = np.flatnonzero(rows)
+        indices, first = np.unique(self.recording[order], return_index=True)
         value, frequency = self.value[order], self.frequency[order]
         ends = [*first[1:].tolist(), len(order)]
-        entries: list[Recording] = []
-        for number, low, high in zip(recordings.tolist(), first.tolist(), ends, strict=True):
-            entry = self.campaign.recordings[number]
-            if isinstance(entry, FrfRecording):
-                entries.append(FrfRecording.of_lines(entry, frequency[low:high], value[low:high]))
+        recordings: list[Recording] = []
+        for number, low, high in zip(indices.tolist(), first.tolist(), ends, strict=True):
+            recording = self.campaign.recordings[number]
+            if isinstance(recording, FrfRecording):
+                recordings.append(FrfRecording.of_lines(recording, frequency[low:high], value[low:high]))
             else:
-                entries.append(samples_of(entry, order[low:high] - self.first[number]))
+                recordings.append(samples_of(recording, order[low:high] - self.first[number]))
         return replace(
             self,
-            campaign=replace(self.campaign, recordings=tuple(entries)),
+            campaign=replace(self.campaign, recordings=tuple(recordings)),
             value=value,
             deviation=self.deviation[order],
             frequency=frequency,
-            recording=np.repeat(np.arange(len(entries)), np.diff([*first, len(order)])),
-            sensor=self.sensor[recordings],
+            recording=np.repeat(np.arange(len(recordings)), np.diff([*first, len(order)])),
+            sensor=self.sensor[indices],
             scatter=(0.0, self.scatter[1] and -len(order)),
             smooth=None if self.smooth is None else self.smooth.part(order),
         )
 
 
 def lines(
-    campaign: Campaign, uneven: Mapping[str, Floats] | None = None, known: tuple[Lines, Complexes] | None = None
+    campaign: Campaign, uneven: Mapping[str, Floats] | None = None, predicted: tuple[Lines, Complexes] | None = None
 ) -> Lines:
-    """The FRF lines of a campaign, sorted by frequency, those that are not finite left out. `uneven` is, of recordings
-    by their id, the noise of each line over its course along frequency (1 where not given); `known` the same lines and
-    a prediction of the rows (rows,), whose course is not counted as noise.
+    """The finite FRF lines of a campaign, sorted by frequency.
 
-    Recordings of another kind and recordings without a finite line are left out of the `campaign` that comes with them.
+    `uneven`: of recordings by their id, the noise of each line relative to its trend along frequency (default 1).
+    `predicted`: the same lines and a prediction of the rows (rows,), whose change with frequency is not counted as
+    noise. The `campaign` of the result holds only the FRF recordings with finite lines.
     """
     measured = _measured(campaign, uneven or {})
-    recording = np.repeat(np.arange(len(measured.entries)), measured.counts).astype(np.intp)
-    expected = None if known is None else known[1]
-    of_lines = measured.frequency, recording, measured.coherence, measured.unevenness
+    recording_index = np.repeat(np.arange(len(measured.recordings)), measured.counts).astype(np.intp)
+    expected = None if predicted is None else predicted[1]
+    of_lines = measured.frequency, recording_index, measured.coherence, measured.unevenness
     noise = line_noise(measured.value, *of_lines, expected)
-    if known is not None:
-        return replace(known[0], deviation=noise.deviation, noise=noise)
-    each = zip(measured.entries, np.cumsum(measured.counts).tolist(), measured.counts, strict=True)
-    entries = tuple(
-        FrfRecording.of_lines(entry, measured.frequency[end - count : end], measured.value[end - count : end])
-        for entry, end, count in each
+    if predicted is not None:
+        return replace(predicted[0], deviation=noise.deviation, noise=noise)
+    segments = zip(measured.recordings, np.cumsum(measured.counts).tolist(), measured.counts, strict=True)
+    recordings = tuple(
+        FrfRecording.of_lines(recording, measured.frequency[end - count : end], measured.value[end - count : end])
+        for recording, end, count in segments
     )
     return Lines(
-        campaign=replace(campaign, recordings=entries),
+        campaign=replace(campaign, recordings=recordings),
         value=measured.value,
         deviation=noise.deviation,
         frequency=measured.frequency,
-        recording=recording,
+        recording=recording_index,
         sensor=measured.sensor,
         noise=noise,
     )
@@ -493,7 +495,7 @@ class _Measured:
     """The recordings with finite lines, the sensor of each and how many lines it has; and columns over all these lines
     (rows,), `coherence` NaN where not given."""
 
-    entries: list[FrfRecording]
+    recordings: list[FrfRecording]
     sensor: Indices
     counts: list[int]
     value: Complexes
@@ -504,32 +506,32 @@ class _Measured:
 
 def _measured(campaign: Campaign, uneven: Mapping[str, Floats]) -> _Measured:
     numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
-    entries: list[FrfRecording] = []
+    recordings: list[FrfRecording] = []
     values, frequencies, coherences, unevens = [], [], [], []
-    for entry in campaign.recordings:
-        if not isinstance(entry, FrfRecording):
+    for recording in campaign.recordings:
+        if not isinstance(recording, FrfRecording):
             continue
-        measured = lines_of(entry)
+        measured = lines_of(recording)
         order = np.argsort(measured.frequency, kind="stable")
         order = order[np.isfinite(measured.values[order]) & np.isfinite(measured.frequency[order])]
         if len(order) == 0:
             continue
-        entries.append(entry)
+        recordings.append(recording)
         values.append(measured.values[order])
         frequencies.append(measured.frequency[order])
         coherences.append(measured.coherence_or_nan[order])
-        unevens.append(uneven.get(entry.id, np.ones(len(measured.values)))[order])
-    sensor = np.array([numbers[entry.sensor] for entry in entries], dtype=np.intp)
+        unevens.append(uneven.get(recording.id, np.ones(len(measured.values)))[order])
+    sensor = np.array([numbers[recording.sensor] for recording in recordings], dtype=np.intp)
     counts = [len(value) for value in values]
     value = np.concatenate([*values, np.zeros(0, dtype=complex)])
-    columns = (np.concatenate([*each, np.zeros(0)]) for each in (frequencies, coherences, unevens))
-    return _Measured(entries, sensor, counts, value, *columns)
+    columns = (np.concatenate([*column, np.zeros(0)]) for column in (frequencies, coherences, unevens))
+    return _Measured(recordings, sensor, counts, value, *columns)
 
 
 _READING, _FULL_SCALE = 2e-3, 1e-3  # of a testing machine, whose samples in the air are none
 _LEVEL_SD = 0.25  # of the logarithm of the noise's level
 _LEAST_SAMPLES = 5
-_PLACE = (1.0, 10.0)  # the abscissa: displacement over a curve's range, on this scale
+_ABSCISSA_RANGE = (1.0, 10.0)  # the abscissa: displacement over a curve's range, on this scale
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
 _SURE_STEP = 4.0  # standard deviations
 _AIR_BLOCKS, _AIR_SAMPLES = 10, 4  # blocks of samples in the air, and samples of each at least
@@ -540,25 +542,25 @@ _FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known th
 
 def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     """The thinned curves of one kind; curves with fewer than five finite samples are left out."""
-    entries: list[CurveRecording] = []
-    forces, deviations, places, errors = [], [], [], []
-    for entry in campaign.recordings:
-        if not isinstance(entry, CurveRecording) or entry.kind != kind:
+    curves: list[CurveRecording] = []
+    forces, deviations, abscissae, errors = [], [], [], []
+    for curve in campaign.recordings:
+        if not isinstance(curve, CurveRecording) or curve.kind != kind:
             continue
-        columns = finite_samples(entry)
+        columns = finite_samples(curve)
         if len(columns[0]) < _LEAST_SAMPLES:
             continue
         seen = course(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0
         slow = _slow_noise(seen, columns[1]) if kind == "indentation" else 0.0
         columns[1] = columns[1] - force_zero
-        means, deviation, way, counts = thinned(columns, seen, slow, kind)
+        means, deviation, path_fraction, counts = thinned(columns, seen, slow, kind)
         displacement, force = means[:2]
         if kind == "compression":
             largest = float(np.abs(force).max())
             deviation = np.sqrt(deviation**2 + (_READING * force) ** 2 + (_FULL_SCALE * largest) ** 2)
         time = means[2] if len(means) > 2 else None
-        entries.append(replace(entry, displacement_mm=displacement, force_n=force, time_s=time))
+        curves.append(replace(curve, displacement_mm=displacement, force_n=force, time_s=time))
         forces.append(force)
         deviations.append(deviation)
         drift = _drift_in_air(seen, columns[1], columns[2] if len(columns) > 2 else None)
@@ -568,20 +570,22 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
             displacement,
             force,
             time,
-            way,
+            path_fraction,
             drift,
             (*_straight_lines(columns[1], counts), np.full(len(force), slow)),
         )
         errors.append(error)
         span = float(np.ptp(displacement)) or 1.0
-        places.append(_PLACE[0] + (_PLACE[1] - _PLACE[0]) * (displacement - displacement.min()) / span)
+        abscissae.append(
+            _ABSCISSA_RANGE[0] + (_ABSCISSA_RANGE[1] - _ABSCISSA_RANGE[0]) * (displacement - displacement.min()) / span
+        )
     value = _joined(forces)
     deviation = _joined(deviations)
     return Lines(
-        campaign=replace(campaign, recordings=tuple(entries)),
+        campaign=replace(campaign, recordings=tuple(curves)),
         value=value.astype(complex),
         deviation=deviation,
-        frequency=_joined(places),
+        frequency=_joined(abscissae),
         recording=np.repeat(np.arange(len(forces)), [len(force) for force in forces]).astype(np.intp),
         sensor=np.zeros(len(forces), dtype=np.intp),
         noise=LineNoise(deviation, _LEVEL_SD, 0.0),
@@ -590,9 +594,9 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     )
 
 
-def finite_samples(entry: CurveRecording) -> list[Floats]:
+def finite_samples(curve: CurveRecording) -> list[Floats]:
     """Displacement [mm], force [N] and, where there is one, time [s] of the samples that have all of them."""
-    columns = [entry.displacement_mm, entry.force_n, *([] if entry.time_s is None else [entry.time_s])]
+    columns = [curve.displacement_mm, curve.force_n, *([] if curve.time_s is None else [curve.time_s])]
     finite = np.isfinite(np.stack(columns)).all(axis=0)
     return [column[finite] for column in columns]
 
@@ -607,8 +611,8 @@ def _slow_noise(seen: Course, force: Floats) -> float:
     if count < _AIR_SAMPLES:
         return 0.0
     means = force[air[: count * _AIR_BLOCKS]].reshape(_AIR_BLOCKS, count).mean(axis=1)
-    place = np.arange(_AIR_BLOCKS)
-    about = means - np.polyval(np.polyfit(place, means, 2), place)
+    block = np.arange(_AIR_BLOCKS)
+    about = means - np.polyval(np.polyfit(block, means, 2), block)
     variance, expected = float(about @ about) / (_AIR_BLOCKS - 3), seen.noise**2 / count
     return float(np.sqrt(variance - expected)) if variance > _PLAINLY * expected else 0.0
 
@@ -618,10 +622,10 @@ def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floa
     squares about it [N²]."""
     starts = (np.cumsum(counts) - counts).astype(np.intp)
     block = np.repeat(np.arange(len(counts)), counts.astype(np.intp))
-    place = np.arange(len(force)) - (starts + (counts - 1) / 2)[block]
+    offset = np.arange(len(force)) - (starts + (counts - 1) / 2)[block]
     about = force - (np.add.reduceat(force, starts) / counts)[block]
-    slope = np.add.reduceat(place * about, starts) / np.maximum(np.add.reduceat(place**2, starts), 0.5)
-    return counts, slope, np.add.reduceat((about - slope[block] * place) ** 2, starts)
+    slope = np.add.reduceat(offset * about, starts) / np.maximum(np.add.reduceat(offset**2, starts), 0.5)
+    return counts, slope, np.add.reduceat((about - slope[block] * offset) ** 2, starts)
 
 
 def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
@@ -649,14 +653,14 @@ def _error(
     displacement: Floats,
     force: Floats,
     time: Floats | None,
-    way: Floats,
+    path_fraction: Floats,
     drift: float,
     samples: tuple[Floats, Floats, Floats, Floats],
 ) -> CurveError:
     """What the samples of one curve share; `drift` [N] is what the air shows, `samples` as CurveError has them."""
     largest = float(np.abs(force).max()) or 1.0
     if kind == "compression":
-        return CurveError(np.full(len(force), largest), way, np.zeros((len(force), 0)), *samples)
+        return CurveError(np.full(len(force), largest), path_fraction, np.zeros((len(force), 0)), *samples)
     in_air = np.abs(force) < 4 * seen.noise + 1e-3 * largest
     if seen.pull_off is None and seen.snap_in is None:
         in_air &= displacement < displacement[np.argmax(displacement)]
@@ -667,7 +671,7 @@ def _error(
     order = np.cumsum(counts) - counts / 2
     size = max(USUAL_DRIFT * largest, drift) if seen.has_air else 0.0
     columns = instrument_columns(displacement, order if time is None else time, zero, size)
-    return CurveError(scale, way, columns, *samples)
+    return CurveError(scale, path_fraction, columns, *samples)
 
 
 def _joined(columns: Sequence[Floats]) -> Floats:

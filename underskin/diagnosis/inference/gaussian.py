@@ -53,10 +53,12 @@ class Gaussian:
     def mixture(cls, components: Sequence[tuple[float, "Gaussian"]], centre: Floats, precision: Floats) -> Self:
         """A mixture of likelihoods, with log weights, as one: that of the evidence, mean and covariance which the
         mixture has under independent normal priors."""
-        log_weights = np.array([share + one.log_integral(centre, precision).item() for share, one in components])
+        log_weights = np.array(
+            [share + component.log_integral(centre, precision).item() for share, component in components]
+        )
         total = float(np.logaddexp.reduce(log_weights))
         weights = np.exp(log_weights - total)
-        posteriors = [one.posterior(centre, precision) for _, one in components]
+        posteriors = [component.posterior(centre, precision) for _, component in components]
         mean, covariance = moments(weights, [mean for mean, _ in posteriors], [matrix for _, matrix in posteriors])
         return cls.from_posterior(total, mean, covariance, centre, precision)
 

@@ -77,14 +77,16 @@ def log_likelihoods(
     sums = products.summed(levels)
     about_means, numbers = lines.about_means
     further = sums.log_determinant + 2 * numbers * np.log(levels.level) + about_means / levels.level**2
-    each = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
+    log_likelihood = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
     slopes = products.place_slopes
-    place = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    squared_slopes = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)
     yy = sums.yy if sums.yy.ndim == 3 else sums.yy[None, None]
-    arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, place))
-    add(*arrays, lines.sensor, contiguous(sensor_log_gain), curvature.laplacian, curvature.square, noise, each)
-    return each
+    arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, squared_slopes))
+    add(
+        *arrays, lines.sensor, contiguous(sensor_log_gain), curvature.laplacian, curvature.square, noise, log_likelihood
+    )
+    return log_likelihood
 
 
 def normal_equations(
@@ -111,7 +113,7 @@ def normal_equations(
     by_level = none if products.level_slopes is None else products.level_slopes
     turned = (none, none, none[..., None]) if slope_sums is None else (slope_sums.uv, slope_sums.vy, slope_sums.vv)
     slopes = products.place_slopes if np.any(levels.position) else None
-    place = np.zeros((points, 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    squared_slopes = np.zeros((points, 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)[:, 0]
     count = max(by_level.shape[-1], turned[0].shape[-1])
     information, gradient = np.empty((points, count, count)), np.empty((points, count))
@@ -121,15 +123,15 @@ def normal_equations(
         uu,
         uy,
         *turned,
-        place,
+        squared_slopes,
         none if log_slope_gradient is None else log_slope_gradient,
     )
-    of_place = curvature.laplacian, curvature.square
+    curvatures = curvature.laplacian, curvature.square
     fill(
         *map(contiguous, arrays),
         lines.sensor,
         contiguous(sensor_log_gain),
-        *of_place,
+        *curvatures,
         contiguous(noise),
         information,
         gradient,
@@ -146,12 +148,12 @@ class Likelihoods:
         """Levels are (points, sets, 1), `sensor_log_gain` (points, sensors)."""
         self.levels, self._products, self._curvature = levels, products, curvature
         self._sensors = lines.sensors
-        self._bend = own = sensor_log_gain[:, None, lines.sensor]
+        self._log_gains = log_gains = sensor_log_gain[:, None, lines.sensor]
         k2, p2 = levels.level**2, levels.position**2
         sums = products.summed(levels)
-        self._factor = factor = np.exp(own + 0.5 * p2 * curvature.laplacian)
+        self._factor = factor = np.exp(log_gains + 0.5 * p2 * curvature.laplacian)
         a = products.level[:, None] * factor
-        uu, ur = sums.uu / k2, (sums.uy - a * (1 - own) * sums.uu) / k2
+        uu, ur = sums.uu / k2, (sums.uy - a * (1 - log_gains) * sums.uu) / k2
         variance = (levels.gain**2 + 0.5 * p2**2 * curvature.square) * a**2
         if products.place_slopes is not None:
             variance = variance + p2 * (products.place_slopes**2).sum(axis=0)[:, None] * factor**2
@@ -166,17 +168,17 @@ class Likelihoods:
         """The most probable b of each sensor (points, sensors), at the first set of noise levels."""
         return np.asarray((self._sensor_shrink * self._sensor_mr)[:, 0])
 
-    def along(self, position: float) -> tuple[Floats, Floats, Floats]:
+    def projections(self, position: float) -> tuple[Floats, Floats, Floats]:
         """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter, with
         weights that leave out κ."""
         sums = self._products.summed(self.levels)
-        sensor_log_gain, level = self._bend[0, 0], self._products.level[0]
+        log_gain, level = self._log_gains[0, 0], self._products.level[0]
         uu, uy = np.broadcast_to(sums.uu[0, 0], level.shape), np.broadcast_to(sums.uy[0, 0], level.shape)
-        a = level * np.exp(sensor_log_gain + 0.5 * position**2 * self._curvature.laplacian)
-        return a * uu, uy - a * (1 - sensor_log_gain) * uu, uu
+        a = level * np.exp(log_gain + 0.5 * position**2 * self._curvature.laplacian)
+        return a * uu, uy - a * (1 - log_gain) * uu, uu
 
     @property
-    def slopes_along(self) -> Floats:
+    def slope_projections(self) -> Floats:
         """Re u*J of the first point's recordings (recordings, P), with the same weights."""
         uu, factor = self._products.summed(self.levels).uu[0, 0], self._factor[0, 0]
         by_level, sums = self._products.level_slopes, self._products.slope_sums(self.levels)
@@ -205,25 +207,25 @@ class CellResponse:
         return force * (1 + self.gain[lines.recording]) + self.offset
 
 
-def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, known: Mask | None = None) -> CellResponse:
-    """From the rows that are `known` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
+def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, observed: Mask | None = None) -> CellResponse:
+    """From the rows that are `observed` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
 
     `force` (rows,) is what is predicted without them.
     """
     assert lines.smooth is not None
-    known = np.ones(len(force), dtype=bool) if known is None else known
+    observed = np.ones(len(force), dtype=bool) if observed is None else observed
     offset, variance, gain = np.zeros(len(force)), np.zeros(len(force)), []
-    for own in lines.spans:
-        design = np.column_stack([levels.gain * force[own], lines.smooth.columns[own]])
-        rows = np.flatnonzero(known[own])
-        of_known = lines.smooth.part(own.start + rows)
-        noise = of_known.covariance(levels.smooth) + np.diag((levels.level * lines.deviation[own][rows]) ** 2)
+    for span in lines.spans:
+        design = np.column_stack([levels.gain * force[span], lines.smooth.columns[span]])
+        rows = np.flatnonzero(observed[span])
+        error = lines.smooth.part(span.start + rows)
+        noise = error.covariance(levels.smooth) + np.diag((levels.level * lines.deviation[span][rows]) ** 2)
         weighed = np.linalg.solve(noise, design[rows])
         information = np.eye(design.shape[1]) + design[rows].T @ weighed
-        coefficients = np.linalg.solve(information, weighed.T @ (lines.value.real[own] - force[own])[rows])
-        offset[own] = design[:, 1:] @ coefficients[1:]
+        coefficients = np.linalg.solve(information, weighed.T @ (lines.value.real[span] - force[span])[rows])
+        offset[span] = design[:, 1:] @ coefficients[1:]
         gain.append(levels.gain * coefficients[0])
-        variance[own] = np.einsum("ri,ij,rj->r", design, np.linalg.inv(information), design)
+        variance[span] = np.einsum("ri,ij,rj->r", design, np.linalg.inv(information), design)
     return CellResponse(offset, np.array(gain), variance)
 
 
@@ -239,18 +241,23 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
     step = _STEP * campaign.skin.thickness_mm
     sensors = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
     contacts: dict[tuple[float, ...], tuple[int, FrfConditions]] = {}  # alike in the base model: a place among them
-    alike = []
-    for entry in frf_of(campaign):
-        x, y = entry.position_mm or sensors[entry.sensor]
-        own_x, own_y = sensors[entry.sensor]
-        key = entry.preload_n, entry.indenter_radius_mm, round(x - own_x, _DIGITS), round(y - own_y, _DIGITS)
-        alike.append(contacts.setdefault(key, (len(contacts), entry))[0])
+    contact_indices = []
+    for conditions in frf_of(campaign):
+        x, y = conditions.position_mm or sensors[conditions.sensor]
+        sensor_x, sensor_y = sensors[conditions.sensor]
+        key = (
+            conditions.preload_n,
+            conditions.indenter_radius_mm,
+            round(x - sensor_x, _DIGITS),
+            round(y - sensor_y, _DIGITS),
+        )
+        contact_indices.append(contacts.setdefault(key, (len(contacts), conditions))[0])
     moved = []
     for number, (x, y) in enumerate(((0.0, 0.0), (step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step))):
-        for _, entry in contacts.values():
-            place = entry.position_mm or sensors[entry.sensor]
-            here = (place[0] + x, place[1] + y)
-            moved.append(entry.without_measurements(id=f"{number} {entry.id}", position_mm=here))
+        for _, conditions in contacts.values():
+            position = conditions.position_mm or sensors[conditions.sensor]
+            moved_position = (position[0] + x, position[1] + y)
+            moved.append(conditions.without_measurements(id=f"{number} {conditions.id}", position_mm=moved_position))
     model = compose((), Conditions(campaign.name, campaign.skin, tuple(moved)), table, "frf")
     prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
     assert prediction.position_slopes is not None
@@ -259,7 +266,7 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
     hessian_x, hessian_y = (right - left) / (2e-3 * step), (up - down) / (2e-3 * step)
     scale = np.where(np.abs(value) > _LEAST * np.abs(value).max(), value, np.inf)
     square = (hessian_x**2).sum(axis=0) + (hessian_y**2).sum(axis=0)
-    return Curvature(((hessian_x[0] + hessian_y[1]) / scale)[alike], (square / scale**2)[alike])
+    return Curvature(((hessian_x[0] + hessian_y[1]) / scale)[contact_indices], (square / scale**2)[contact_indices])
 
 
 @dataclass(frozen=True)
@@ -282,26 +289,26 @@ class Points:
         return Points(self.owner[points], self.fit[points], self.covariance[points], self.sensor_log_gain[points])
 
 
-def together(one: Points, other: Points) -> Points:
+def joined_points(first: Points, second: Points) -> Points:
     """The points of both, which are of one hypothesis."""
     names = "owner", "fit", "covariance", "sensor_log_gain"
-    return Points(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
+    return Points(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
 
 
-def alone(points: Points, owner: int, count: int) -> Points:
+def points_of(points: Points, owner: int, count: int) -> Points:
     """The points of one of several hypotheses, which has so many parameters, as those of it alone."""
-    own = points[points.owner == owner]
-    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.sensor_log_gain)
+    chosen = points[points.owner == owner]
+    return Points(np.zeros_like(chosen.owner), chosen.fit[:, :count], chosen.covariance, chosen.sensor_log_gain)
 
 
-def stacked(points: Sequence[Points]) -> Points:
+def stacked(parts: Sequence[Points]) -> Points:
     """Points of several hypotheses, of the first, the second and so on, in this order."""
-    owner = np.repeat(np.arange(len(points)), [len(entry) for entry in points])
-    fit = np.zeros((len(owner), max(entry.fit.shape[1] for entry in points)))
-    for number, entry in enumerate(points):
-        fit[owner == number, : entry.fit.shape[1]] = entry.fit
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    fit = np.zeros((len(owner), max(part.fit.shape[1] for part in parts)))
+    for number, part in enumerate(parts):
+        fit[owner == number, : part.fit.shape[1]] = part.fit
     covariance, sensor_log_gain = (
-        np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "sensor_log_gain")
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("covariance", "sensor_log_gain")
     )
     return Points(owner, fit, covariance, sensor_log_gain)
 
@@ -322,7 +329,7 @@ class Evaluated:
     def __len__(self) -> int:
         return len(self.points)
 
-    def some(self, points: Indices) -> "Evaluated":
+    def subset(self, points: Indices) -> "Evaluated":
         """At some of the points, in their order: itself where that is all of them."""
         return self if len(points) == len(self) else self[points]
 
@@ -342,21 +349,24 @@ class Evaluated:
 class GaussianBatch:
     """That of several hypotheses, whose parameters are padded to equally many."""
 
-    def __init__(self, each: Sequence[Gaussian | None], most: int) -> None:
+    def __init__(self, gaussians: Sequence[Gaussian | None], parameters: int) -> None:
         """None where nothing is known beside the recordings themselves."""
-        self._precision, self._linear = np.zeros((len(each), most, most)), np.zeros((len(each), most))
-        self._height = np.zeros(len(each))
-        for number, one in enumerate(each):
-            if one is not None:
-                count = len(one.linear)
-                self._precision[number, :count, :count] = one.precision
-                self._linear[number, :count], self._height[number] = one.linear, one.height
+        self._precision, self._linear = (
+            np.zeros((len(gaussians), parameters, parameters)),
+            np.zeros((len(gaussians), parameters)),
+        )
+        self._height = np.zeros(len(gaussians))
+        for number, gaussian in enumerate(gaussians):
+            if gaussian is not None:
+                count = len(gaussian.linear)
+                self._precision[number, :count, :count] = gaussian.precision
+                self._linear[number, :count], self._height[number] = gaussian.linear, gaussian.height
 
     def log_densities(self, points: Points) -> Floats:
         """ln L at points (points,)."""
         owner, fit = points.owner, points.fit
-        bent = np.einsum("np,npq,nq->n", fit, self._precision[owner], fit)
-        return np.asarray(self._height[owner] + (self._linear[owner] * fit).sum(axis=1) - 0.5 * bent)
+        quadratic = np.einsum("np,npq,nq->n", fit, self._precision[owner], fit)
+        return np.asarray(self._height[owner] + (self._linear[owner] * fit).sum(axis=1) - 0.5 * quadratic)
 
     def equations(self, points: Points) -> tuple[Floats, Floats]:
         """Information (points, parameters, parameters) and gradient (points, parameters) of ln L."""
@@ -392,9 +402,9 @@ class Hypothesis:
     knowledge: Gaussian | None = None  # from recordings of other kinds
 
     @cached_property
-    def mean_places(self) -> list[int]:
+    def mean_indices(self) -> list[int]:
         """The places of the model's parameters that move the mean."""
-        return [index for index, entry in enumerate(self.model.parameters) if not entry.moves_covariance]
+        return [index for index, parameter in enumerate(self.model.parameters) if not parameter.moves_covariance]
 
     @cached_property
     def covariance(self) -> tuple[CovarianceParameter, ...]:
@@ -410,38 +420,38 @@ class Hypothesis:
             common.append(CovarianceParameter("position", np.log(2e-5), highest, self.position))
         if self.lines.curves:
             common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth))
-        own = [
-            CovarianceParameter(entry.name, *entry.bounds, _as_plateau(entry))
-            for entry in self.model.parameters
-            if entry.moves_covariance
+        of_model = [
+            CovarianceParameter(parameter.name, *parameter.bounds, _as_plateau(parameter))
+            for parameter in self.model.parameters
+            if parameter.moves_covariance
         ]
-        return (*common, *own)
+        return (*common, *of_model)
 
     @cached_property
     def bounds(self) -> Floats:
         """Lowest and highest coordinates of the model's parameters (2, parameters)."""
-        return np.array([entry.bounds for entry in self.model.parameters]).T
+        return np.array([parameter.bounds for parameter in self.model.parameters]).T
 
     @cached_property
     def priors(self) -> Floats:
         """Of the model's parameters' priors precision and centre (see `curvature_of_prior`), the logarithm of their
         height, and the degrees of freedom of their tails (4, parameters)."""
         rows = []
-        for entry in self.model.parameters:
-            freedom = entry.prior.freedom if isinstance(entry.prior, Normal) else np.inf
-            rows.append((*curvature_of_prior(entry), entry.log_height, freedom))
+        for parameter in self.model.parameters:
+            freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
+            rows.append((*curvature_of_prior(parameter), parameter.log_height, freedom))
         return np.array(rows).T
 
     @cached_property
-    def own_parameters(self) -> int:
+    def mechanism_parameter_count(self) -> int:
         """How many of the model's parameters are its mechanisms' own; they come first."""
         mechanisms = [self.lines.mechanisms[name] for name in self.model.names]
         return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
 
     def group(self, number: int) -> object:
         """The same for hypotheses that can be evaluated together; `number` tells those apart that cannot."""
-        own = tuple(entry.name for entry in self.covariance)
-        return number if self.lines.curves else (self.gain, self.position, own)
+        names = tuple(parameter.name for parameter in self.covariance)
+        return number if self.lines.curves else (self.gain, self.position, names)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:
@@ -480,37 +490,37 @@ class FitPoint:
     sensor_log_gain: Floats
 
 
-def _as_plateau(entry: Parameter) -> Plateau:
+def _as_plateau(parameter: Parameter) -> Plateau:
     """A parameter's prior within its bounds, normalised there."""
-    if isinstance(entry.prior, Normal):
-        area = float(np.exp(-entry.log_height))
-        return Plateau(entry.prior.mean, entry.prior.mean, entry.prior.sd, entry.prior.sd, area)
-    low, high = entry.bounds
+    if isinstance(parameter.prior, Normal):
+        area = float(np.exp(-parameter.log_height))
+        return Plateau(parameter.prior.mean, parameter.prior.mean, parameter.prior.sd, parameter.prior.sd, area)
+    low, high = parameter.bounds
     return Plateau(low, high, 1.0, 1.0, high - low)
 
 
-def curvature_of_prior(entry: Parameter) -> tuple[float, float]:
+def curvature_of_prior(parameter: Parameter) -> tuple[float, float]:
     """Precision and centre of a parameter's prior; 0 where it is uniform."""
-    if isinstance(entry.prior, Normal):
-        return entry.prior.sd**-2, entry.prior.mean
+    if isinstance(parameter.prior, Normal):
+        return parameter.prior.sd**-2, parameter.prior.mean
     return 0.0, 0.0
 
 
-def quadratic_of_prior(entry: Parameter, fit: float) -> tuple[float, float]:
+def quadratic_of_prior(parameter: Parameter, fit: float) -> tuple[float, float]:
     """Precision and centre of a quadratic that has the gradient of a parameter's prior at a fit coordinate, as the
     covariance of a fit counts it; 0 where the prior is uniform."""
-    precision, centre = curvature_of_prior(entry)
-    freedom = entry.prior.freedom if isinstance(entry.prior, Normal) else np.inf
+    precision, centre = curvature_of_prior(parameter)
+    freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
     if np.isfinite(freedom):
         precision *= (freedom + 1) / (freedom + precision * (fit - centre) ** 2)
     return precision, centre
 
 
-def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
+def parameter_slices(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     """Where in a composed model's parameters each mechanism's are."""
     mechanisms = [mechanism for name, mechanism in lines.mechanisms.items() if name in names]
-    places, first = {}, 0
-    for name, own in parameters_together(mechanisms, lines.campaign, lines.kind).items():
-        places[name] = slice(first, first + len(own))
-        first += len(own)
-    return places
+    slices, first = {}, 0
+    for name, parameters in parameters_together(mechanisms, lines.campaign, lines.kind).items():
+        slices[name] = slice(first, first + len(parameters))
+        first += len(parameters)
+    return slices

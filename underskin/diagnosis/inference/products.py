@@ -71,33 +71,33 @@ class PickupRows:
         self._alike = np.arange(len(rows)) if pickup.alike is None else pickup.alike
         self.lines, line = np.unique(design.line[rows], return_inverse=True)
         self.line: Indices = line.reshape(-1)
-        self.every: Indices = np.arange(len(rows))
+        self.row_numbers: Indices = np.arange(len(rows))
 
-    def less(self, sums: Sums, line: Indices, u: Array, pickup: Floats, level: Floats) -> Sums:
+    def without_pickup(self, sums: Sums, line: Indices, u: Array, pickup: Floats, level: Floats) -> Sums:
         """The sums less what rows lose to pick-up of these distinct deviations (points, sets, distinct), at the
         directions u (points, lines) of the rows on these lines (rows,)."""
-        from underskin.diagnosis.kernels import lost
+        from underskin.diagnosis.kernels import subtract_pickup
 
         shape = *level.shape[:2], self._recordings
         uu, uy, yy = (np.broadcast_to(x, shape).copy() for x in (sums.uu, sums.uy, sums.yy))
         log_determinant = np.zeros(shape[:2])
         square = np.ascontiguousarray(np.swapaxes((pickup / level) ** 2, 1, 2))
-        of_rows = self._alike, self._precision, self._recording, self._value, line
-        lost(square, *of_rows, contiguous(u.astype(complex, copy=False)), uu, uy, yy, log_determinant)
+        row_arrays = self._alike, self._precision, self._recording, self._value, line
+        subtract_pickup(square, *row_arrays, contiguous(u.astype(complex, copy=False)), uu, uy, yy, log_determinant)
         return Sums(uu, uy, yy, log_determinant[..., None])
 
-    def slopes_less(
+    def slopes_without_pickup(
         self, sums: SlopeSums, line: Indices, u: Array, v: Array, pickup: Floats, level: Floats
     ) -> SlopeSums:
         """The sums with derivatives v (points, parameters, lines) less what rows lose, likewise; deviations are
         (points, distinct), levels (points,)."""
-        from underskin.diagnosis.kernels import slopes_lost
+        from underskin.diagnosis.kernels import subtract_pickup_slopes
 
         square = contiguous((pickup / level[:, None]) ** 2)
-        of_rows = self._alike, self._precision, self._recording, self._value, line
+        row_arrays = self._alike, self._precision, self._recording, self._value, line
         directions = (contiguous(x.astype(complex, copy=False)) for x in (u, v))
         uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
-        slopes_lost(square, *of_rows, *directions, uv, vy, vv)
+        subtract_pickup_slopes(square, *row_arrays, *directions, uv, vy, vv)
         return SlopeSums(uv, vy, vv)
 
 
@@ -159,36 +159,36 @@ class CurveProducts:
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
-        taken = _Taken(self.lines, levels)
+        woodbury = _WoodburyProducts(self.lines, levels)
         force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
-        by_force, by_measured = taken.along(force), taken.along(measured)
-        uu = taken.products(force, force, by_force, by_force)
-        uy = taken.products(force, measured, by_force, by_measured)
-        yy = taken.products(measured, measured, by_measured, by_measured)
-        return Sums(uu, uy, yy, taken.log_determinant)
+        by_force, by_measured = woodbury.projections(force), woodbury.projections(measured)
+        uu = woodbury.products(force, force, by_force, by_force)
+        uy = woodbury.products(force, measured, by_force, by_measured)
+        yy = woodbury.products(measured, measured, by_measured, by_measured)
+        return Sums(uu, uy, yy, woodbury.log_determinant)
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives, at the first of the sets of noise levels."""
         slopes = self.force_slopes
         assert slopes is not None
-        taken = _Taken(self.lines, levels.at_first)
+        woodbury = _WoodburyProducts(self.lines, levels.at_first)
         force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
-        by_slopes = taken.along(slopes)  # (points, parameters, recordings, columns)
-        uv = taken.products(slopes, force, by_slopes, taken.along(force))
-        vy = taken.products(slopes, measured, by_slopes, taken.along(measured))
-        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), taken.squares(slopes, by_slopes))
+        by_slopes = woodbury.projections(slopes)  # (points, parameters, recordings, columns)
+        uv = woodbury.products(slopes, force, by_slopes, woodbury.projections(force))
+        vy = woodbury.products(slopes, measured, by_slopes, woodbury.projections(measured))
+        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), woodbury.squares(slopes, by_slopes))
 
-    def of_rows(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
+    def with_force_changes(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
         """Re u*J (recordings, P) and Re JᵀJ (P, P) of changes of the force J (P, samples), at the first point and set
         of noise levels."""
-        taken = _Taken(self.lines, levels.at_first)
+        woodbury = _WoodburyProducts(self.lines, levels.at_first)
         turned, force = self.lines.whitening.turned(rows)[None], self.force[:1, None]
-        by_rows = taken.along(turned)
-        along = taken.products(turned, force, by_rows, taken.along(force))
-        return along[0].T, taken.squares(turned, by_rows)[0].sum(axis=0)
+        by_rows = woodbury.projections(turned)
+        by_force_changes = woodbury.products(turned, force, by_rows, woodbury.projections(force))
+        return by_force_changes[0].T, woodbury.squares(turned, by_rows)[0].sum(axis=0)
 
 
-class _Taken:
+class _WoodburyProducts:
     """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity; what P takes out of them."""
 
     def __init__(self, lines: CurveLines, levels: SeveralLevels) -> None:
@@ -197,17 +197,17 @@ class _Taken:
         self._lines = lines
         self.weight = lines.whitening.weight(ratio)  # (points, sets, rows)
         count = len(lines.columns)
-        one, other = np.triu_indices(count)
-        square = lines.sums(self.weight[..., None, :] * (lines.columns[one] * lines.columns[other]))
+        first, second = np.triu_indices(count)
+        square = lines.sums(self.weight[..., None, :] * (lines.columns[first] * lines.columns[second]))
         matrix = np.empty((*square.shape[:-2], square.shape[-1], count, count))
-        matrix[..., one, other] = matrix[..., other, one] = np.moveaxis(square, -2, -1)
+        matrix[..., first, second] = matrix[..., second, first] = np.moveaxis(square, -2, -1)
         level = levels.level[..., None, None] ** 2
-        whole = matrix + level * np.eye(count)
-        self.inverse = np.linalg.inv(whole)  # (points, sets, recordings, columns, columns)
-        _, log = np.linalg.slogdet(whole / level)
+        capacitance = matrix + level * np.eye(count)
+        self.inverse = np.linalg.inv(capacitance)  # (points, sets, recordings, columns, columns)
+        _, log = np.linalg.slogdet(capacitance / level)
         self.log_determinant = lines.whitening.log_determinant(ratio) + log.sum(axis=-1, keepdims=True)
 
-    def along(self, rows: Floats) -> Floats:
+    def projections(self, rows: Floats) -> Floats:
         """Pᵀ times turned rows (points, sets, rows): (points, sets, recordings, columns)."""
         weighed = (self.weight * rows)[..., None, :] * self._lines.columns
         return np.moveaxis(self._lines.sums(weighed), -2, -1)
@@ -216,15 +216,15 @@ class _Taken:
         """Of turned rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
         edges = [*self._lines.first, rows.shape[-1]]
         weighed = self.weight * rows
-        whole = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
+        unprojected = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
         columns = np.moveaxis(by_rows, 1, 2)  # (points, recordings, P, columns)
-        return np.asarray(np.stack(whole, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
+        return np.asarray(np.stack(unprojected, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
 
     def products(self, rows: Floats, others: Floats, by_rows: Floats, by_others: Floats) -> Floats:
         """Of turned rows (points, sets, rows) of each recording."""
-        whole = self._lines.sums(self.weight * rows * others)
-        less = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
-        return np.asarray(whole - less)
+        unprojected = self._lines.sums(self.weight * rows * others)
+        projected = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
+        return np.asarray(unprojected - projected)
 
 
 _LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, from which on a block is dense
@@ -262,12 +262,17 @@ class RowSums:
         self._recordings = lines.recordings
         self._blocks: list[tuple[Indices, slice, Floats]] = []
         contact = design.line_contact[design.line[lines.first]]
-        own = [np.flatnonzero(contact == number) for number in np.unique(contact)]
+        members = [np.flatnonzero(contact == number) for number in np.unique(contact)]
         edges = np.searchsorted(design.line_contact, [*np.unique(contact), contact.max() + 1])
         spans = [slice(low, high) for low, high in pairwise(edges.tolist())]
-        numbers = sum(len(some) * (span.stop - span.start) for some, span in zip(own, spans, strict=True))
-        if len(weight) > max(_LARGE * len(own), _FULL * numbers):
-            self._blocks = [(some, span, _block(sparse, some, span)) for some, span in zip(own, spans, strict=True)]
+        numbers = sum(
+            len(recordings) * (span.stop - span.start) for recordings, span in zip(members, spans, strict=True)
+        )
+        if len(weight) > max(_LARGE * len(members), _FULL * numbers):
+            self._blocks = [
+                (recordings, span, _block(sparse, recordings, span))
+                for recordings, span in zip(members, spans, strict=True)
+            ]
         else:
             self._sparse = sparse
 
@@ -314,7 +319,7 @@ class FrfProducts:
         uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
         turning = None
         if factor is not None:
-            uu, uy, turning = _turned(lines, factor.value, factor.slopes.transpose(1, 0, 2))
+            uu, uy, turning = _products_of_factor(lines, factor.value, factor.slopes.transpose(1, 0, 2))
             turning = None if slopes is None else turning
         of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
         return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
@@ -345,7 +350,7 @@ class FrfProducts:
     @classmethod
     def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
         """At the points of several, one after another, with so many parameters in all."""
-        filled = [part.filled(parameters, turning=any(one.turning for one in parts)) for part in parts]
+        filled = [part.filled(parameters, turning=any(other.turning for other in parts)) for part in parts]
 
         def of(name: str, axis: int = 0) -> Any:
             values = [getattr(part, name) for part in filled]
@@ -370,17 +375,17 @@ class FrfProducts:
             return self
         further = parameters - slopes.shape[-1]
         slopes = np.pad(slopes, ((0, 0), (0, 0), (0, further))) if further else slopes
-        own = self.turning
-        if own is None:
+        slope_sums = self.turning
+        if slope_sums is None:
             none = np.zeros_like(slopes)
-            own = (
+            slope_sums = (
                 SlopeSums(none, none, np.broadcast_to(none[..., None], (*none.shape, parameters))) if turning else None
             )
         elif further:
-            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (own.uv, own.vy))
-            own = SlopeSums(uv, vy, np.pad(own.vv, ((0, 0), (0, 0), (0, further), (0, further))))
+            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (slope_sums.uv, slope_sums.vy))
+            slope_sums = SlopeSums(uv, vy, np.pad(slope_sums.vv, ((0, 0), (0, 0), (0, further), (0, further))))
         pickup = None if self.pickup is None else self.pickup.filled(parameters)
-        return replace(self, level_slopes=slopes, turning=own, pickup=pickup)
+        return replace(self, level_slopes=slopes, turning=slope_sums, pickup=pickup)
 
     def scaled(self, factor: Floats) -> Self:
         """Of levels so many times as large (points,)."""
@@ -392,13 +397,13 @@ class FrfProducts:
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
         sums = Sums(self.uu[:, None], self.uy[:, None], self.yy, 0.0)
-        return sums if self.pickup is None else self.pickup.less(sums, levels)
+        return sums if self.pickup is None else self.pickup.without_pickup(sums, levels)
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums | None:
         """The sums with derivatives, at the first of the sets of noise levels; None where u is 1."""
         if self.pickup is None or self.turning is None:
             return self.turning
-        return self.pickup.slopes_less(self.turning, levels)
+        return self.pickup.slopes_without_pickup(self.turning, levels)
 
 
 @dataclass(frozen=True)
@@ -440,7 +445,7 @@ class PickupProducts:
     def _on_rows(self) -> Self:
         return replace(
             self,
-            line=self.rows.every,
+            line=self.rows.row_numbers,
             u=self.u[:, self.line],
             v=None if self.v is None else self.v[..., self.line],
         )
@@ -450,30 +455,32 @@ class PickupProducts:
         v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1]), dtype=complex) if self.v is None else self.v
         return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
 
-    def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
+    def without_pickup(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums less what rows lose to pick-up."""
         assert levels.pickup is not None
-        return self.rows.less(sums, self.line, self.u, levels.pickup, levels.level)
+        return self.rows.without_pickup(sums, self.line, self.u, levels.pickup, levels.level)
 
-    def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
+    def slopes_without_pickup(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        return self.rows.slopes_less(sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
+        return self.rows.slopes_without_pickup(
+            sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0]
+        )
 
 
-def _turned(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
+def _products_of_factor(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
     """Re u*u, Re u*y and the sums with the derivatives v of u (points, parameters, lines)."""
     from underskin.diagnosis.kernels import line_products, spread_sums
 
     moving, count = np.flatnonzero(slopes.any(axis=(0, 2))), slopes.shape[1]
     points, several = len(u), 1 + len(moving)
-    each = np.empty((points, several, u.shape[1]), dtype=complex)
-    each[:, 0], each[:, 1:] = u, slopes[:, moving]
+    functions = np.empty((points, several, u.shape[1]), dtype=complex)
+    functions[:, 0], functions[:, 1:] = u, slopes[:, moving]
     products = np.empty((points, several * (several + 1) // 2, u.shape[1]))
-    real, imag = np.empty(each.shape), np.empty(each.shape)
-    line_products(each, products, real, imag)
+    real, imag = np.empty(functions.shape), np.empty(functions.shape)
+    line_products(functions, products, real, imag)
     both = np.ascontiguousarray(lines.weight(products))
     with_y = np.ascontiguousarray(lines.real(real) + lines.imag(imag))
     recordings = both.shape[-1]

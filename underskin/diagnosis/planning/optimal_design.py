@@ -125,7 +125,7 @@ def _log_modulus(explanation: Explanation) -> tuple[float, float]:
     """ln E under an explanation, the declared one times what it makes of it, and its standard deviation."""
     names = [entry.name for entry in explanation.model.parameters]
     places = [names.index(name) for name in _MODULUS if name in names]
-    rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
+    rows = [explanation.best.hypothesis.mean_indices.index(place) for place in places]
     variance = float(explanation.best.covariance[np.ix_(rows, rows)].sum())
     return float(explanation.point.fit[places].sum()), float(np.sqrt(max(variance, 0.0)))
 
@@ -170,7 +170,7 @@ def _outlook(
         explanation = answer.explanation
         assert explanation is not None
         levels, value = explanation.best.levels, prediction.value[kept]
-        slopes = (prediction.slopes[explanation.best.hypothesis.mean_places][:, kept] / value).real
+        slopes = (prediction.slopes[explanation.best.hypothesis.mean_indices][:, kept] / value).real
         responses.append(np.log(np.abs(value)))
         unknown.append(slopes.T @ np.linalg.cholesky(explanation.best.covariance))
         variance = levels.gain**2 + (levels.level * line / np.abs(value)) ** 2

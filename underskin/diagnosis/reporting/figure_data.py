@@ -23,11 +23,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recording_axes, way_along
+from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, path_fractions, recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
-from underskin.diagnosis.inference.residuals import whole_prediction
+from underskin.diagnosis.inference.residuals import row_prediction
 from underskin.diagnosis.localisation import axis_values
 from underskin.diagnosis.reporting.numbers import place_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
@@ -156,7 +156,7 @@ def _shown(
         measured = measured - seen.zero
         jumps = [seen.snap_in, None if seen.pull_off is None else seen.pull_off - 1]
     snap_in, pull_off = (None if at is None else Mark(float(place[at]), float(measured[at])) for at in jumps)
-    shown = _thinned(way_along(place, measured, seen.noise), [seen.turn, *(at for at in jumps if at is not None)])
+    shown = _thinned(path_fractions(place, measured, seen.noise), [seen.turn, *(at for at in jumps if at is not None)])
     return ShownCurve(
         name=raw.id,
         count=len(measured),
@@ -249,7 +249,7 @@ def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
     """Of each row [C/N], with the sensors' gains and what scatter of the place does to the mean."""
     lines, best = problem.lines, explanation.best
     gain = best.sensor_gains[lines.sensor] + 0.5 * best.levels.position**2 * problem.curvature.laplacian
-    predicted: Complexes = whole_prediction(problem, explanation) * np.exp(gain)[lines.recording]
+    predicted: Complexes = row_prediction(problem, explanation) * np.exp(gain)[lines.recording]
     return predicted
 
 
@@ -379,7 +379,7 @@ class Thinned:
         lines, best = self.lines, explanation.best
         levels = best.levels
         gains = np.exp(best.sensor_gains)[lines.sensor][lines.recording]
-        predicted = whole_prediction(self.problem, explanation) * gains
+        predicted = row_prediction(self.problem, explanation) * gains
         plain = plain_reading(self.problem, explanation, predicted.real)
         if plain is not None:
             predicted = plain[1].astype(complex)

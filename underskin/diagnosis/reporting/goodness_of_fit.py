@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, at_bounds, parameter, place_of, rounded, with_hidden
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import OfCurves, hidden_factors, may_hide
@@ -149,7 +149,7 @@ def _apparent_modulus(problem: FittingProblem, explanation: Explanation) -> dict
 
 def _product(explanation: Explanation, places: Sequence[int]) -> dict[str, float | None]:
     """Of parameters on a logarithmic scale, with the 95 % interval."""
-    rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
+    rows = [explanation.best.hypothesis.mean_indices.index(place) for place in places]
     middle = float(explanation.point.fit[list(places)].sum())
     half = SDS_OF_95 * float(np.sqrt(explanation.best.covariance[np.ix_(rows, rows)].sum()))
     return {
@@ -254,7 +254,7 @@ def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any
         known = joined.beside.told_alone(kind) if joined.apart_is_likelier else joined.beside.told(kind, leading)
         explanation = known.best
         stated = [_of_elastomer(parameter(explanation, place_of(explanation, "youngs_modulus")), known)]
-        for own in own_places(explanation.names, explanation.best.hypothesis.lines).values():
+        for own in parameter_slices(explanation.names, explanation.best.hypothesis.lines).values():
             stated += [parameter(explanation, place) for place in range(own.start, own.stop)]
         told += [{"kind": kind.kind, **_entry(entry)} for entry in stated]
     own_modulus = _modulus_alone(joined)
@@ -281,7 +281,7 @@ def _modulus_alone(joined: KindsTogether) -> dict[str, Any] | None:
         return {**kind, **_entry(parameter(explanation, place_of(explanation, "youngs_modulus")))}
     if _MODULUS_ERROR not in explanation.names:
         return None
-    place = own_places(explanation.names, explanation.best.hypothesis.lines)[_MODULUS_ERROR].start
+    place = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[_MODULUS_ERROR].start
     factor = parameter(explanation, place)
     ends = {key: rounded(declared * factor[key]) for key in ("value", "low", "high")}
     return {**kind, "parameter": "youngs_modulus", "unit": "MPa", **ends}
@@ -329,7 +329,7 @@ def of_curves_alone(joined: KindsTogether, names: Sequence[str], leading: Sequen
 
 
 def _of_mechanism(name: str, explanation: Explanation, without: Explanation) -> dict[str, Any]:
-    places = own_places(explanation.names, explanation.best.hypothesis.lines)[name]
+    places = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[name]
     left, all_of_it = (_left(entry) for entry in (explanation, without))
     return {
         "name": name,

@@ -33,8 +33,8 @@ from underskin.diagnosis.inference.evidence import (
 )
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.inference.residuals import declared_d33, residuals, whole_prediction, with_unseen
+from underskin.diagnosis.inference.hypothesis import parameter_slices
+from underskin.diagnosis.inference.residuals import declared_d33, residuals, row_prediction, with_hidden_mechanism
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, declared_laws
 from underskin.findings.codes import Reason
@@ -95,7 +95,7 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
         own = [parameter.name for parameter in best.hypothesis.covariance].index(entry.name)
         variance = float(levels_covariance(best.fitter.covariance_equations(best.at)[1][0])[own, own])
     else:
-        index = best.hypothesis.mean_places.index(place)
+        index = best.hypothesis.mean_indices.index(place)
         variance = float(explanation.best.covariance[index, index])
     half_width = SDS_OF_95 * np.sqrt(max(variance, 0.0))
     low, high = entry.bounds
@@ -133,7 +133,7 @@ def without_effect(explanation: Explanation) -> list[str]:
     A strength is a parameter with such a value (`limit`); on a logarithmic scale none reaches 0 or ∞.
     """
     idle = []
-    for name, place in own_places(explanation.names, explanation.best.hypothesis.lines).items():
+    for name, place in parameter_slices(explanation.names, explanation.best.hypothesis.lines).items():
         own = range(place.start, place.stop)
         strengths = [index for index in own if explanation.model.parameters[index].limit is not None]
         if strengths and all(_holds_limit(explanation, index) for index in strengths):
@@ -154,7 +154,7 @@ def _absolute(explanation: Explanation, place: int, multiples: list[float]) -> l
     best, entry = explanation.best, explanation.model.parameters[place]
     assert entry.relative_to is not None
     other = place_of(explanation, entry.relative_to)
-    places = [best.hypothesis.mean_places.index(one) for one in (place, other)]
+    places = [best.hypothesis.mean_indices.index(one) for one in (place, other)]
     deviation = float(np.sqrt(max(best.covariance[np.ix_(places, places)].sum(), 0.0)))
     unit = float(np.exp(explanation.point.fit[other]))
     factor = np.exp(SDS_OF_95 * deviation)
@@ -193,7 +193,7 @@ class AtBound:
 
 def at_bounds(explanation: Explanation) -> Sequence[AtBound]:
     """Those of an explanation's mechanisms, and of d33 and a modulus that nobody declared."""
-    places = own_places(explanation.names, explanation.best.hypothesis.lines)
+    places = parameter_slices(explanation.names, explanation.best.hypothesis.lines)
     known = explanation.best.hypothesis.lines.mechanisms
     owner = {index: known[name] for name, place in places.items() for index in range(place.start, place.stop)}
     found = []
@@ -230,9 +230,9 @@ def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
     left = tuple(name for name in names if all(name != law.name for law in laws))
     with_law, without = (problem.hypothesis(each, has_position_scatter=False, whole=True) for each in (names, left))
     fit = np.zeros(len(without.model.parameters))
-    for name, place in own_places(left, without.lines).items():
+    for name, place in parameter_slices(left, without.lines).items():
         fit[place] = explanation.own(name)
-    fit[without.own_parameters :] = explanation.point.fit[with_law.own_parameters :]
+    fit[without.mechanism_parameter_count :] = explanation.point.fit[with_law.mechanism_parameter_count :]
     here, there = (
         np.abs(hypothesis.frf_model.predict(at, slopes=False, place=False).value)
         for hypothesis, at in ((with_law, explanation.point.fit), (without, fit))
@@ -358,7 +358,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
     best = explanation.best
     spread = marginalise_sensor_spread(best.fitter, best.at, place)
     if spread is None:
-        index = best.hypothesis.mean_places.index(place)
+        index = best.hypothesis.mean_indices.index(place)
         deviation = np.sqrt(best.covariance[index, index])
         spread = [NormalMixture(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))]
     several = list(spread)
@@ -367,7 +367,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
         others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in known]
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
         for name in others:
-            found = None if name in explanation.names else with_unseen(problem, explanation, name, "d33")
+            found = None if name in explanation.names else with_hidden_mechanism(problem, explanation, name, "d33")
             if found is not None:  # what declared facts say is as probable as its absence, and counts as it fits
                 several.append(found if name in declared_laws(problem.lines) else found.times(odds * _as_unseen(found)))
     mixture = NormalMixture.joined(several)
@@ -398,13 +398,13 @@ def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict
     leader = search.answers[0]
     if leader.explanation is None or not leader.explanation.names or leader.probability >= EXPLAINED:
         return None
-    predicted = whole_prediction(problem, leader.explanation)
+    predicted = row_prediction(problem, leader.explanation)
     size = float((np.abs(predicted) ** 2).sum())
     total, rivals, furthest = leader.probability, [], 0.0
     for answer in search.answers[1:]:
         if answer.explanation is None or answer.probability < _COUNTS or not answer.explanation.names:
             continue
-        off = np.abs(whole_prediction(problem, answer.explanation) - predicted) ** 2
+        off = np.abs(row_prediction(problem, answer.explanation) - predicted) ** 2
         percent = 100 * float(np.sqrt(off.sum() / size))
         if percent < _ALIKE * floor_percent:
             total += answer.probability
@@ -454,7 +454,7 @@ def _probability(answer: Answer, problem: FittingProblem, name: str, stated: Col
     if answer.probability < _ASKED or with_law in stated:
         return 0.0
     measured = "youngs_modulus" if problem.lines.curves else "d33"
-    found = with_unseen(problem, answer.explanation, name, measured)
+    found = with_hidden_mechanism(problem, answer.explanation, name, measured)
     odds = 0.0 if found is None else float(found.share.sum())
     return answer.probability * odds / (1 + odds)
 

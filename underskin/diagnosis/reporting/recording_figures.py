@@ -29,7 +29,7 @@ import plotly.io as pio
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.reporting.figure_data import CurvePrediction, Mark, ShownCurve, ShownFrf
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, multiple_of
 from underskin.diagnosis.reporting.page_styles import (
@@ -442,7 +442,7 @@ _TITLE = 13  # pixels
 
 def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
     """Each parameter's 95 % interval in its own unit, and in words that of its prior, which would hide it."""
-    places = own_places(shown.names, problem.lines)
+    places = parameter_slices(shown.names, problem.lines)
     rows = [
         (entry["name"], parameter, prior, multiple_of(shown, prior))
         for entry in document["mechanisms"]

@@ -11,7 +11,7 @@ from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.localisation import AxisResult, EffectSize, Shape, reaches_all_along
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import goodness_of_fit, numbers, statements
@@ -298,7 +298,7 @@ def _not_tried(
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
-    places = own_places(explanation.names, explanation.best.hypothesis.lines)
+    places = parameter_slices(explanation.names, explanation.best.hypothesis.lines)
     whole = cross_validation.in_sample(problem, explanation)
     probabilities = numbers.present(search, problem)
     return [

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, rounded
 from underskin.diagnosis.selection.answers import Search
@@ -125,8 +125,8 @@ class LeadingLaw:
 
     def variance(self, x: Floats) -> Floats:
         """Of the change, from the quadratic of the law's own parameters."""
-        places = own_places(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
-        mean = self.explanation.best.hypothesis.mean_places
+        places = parameter_slices(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
+        mean = self.explanation.best.hypothesis.mean_indices
         rows = [mean.index(place) for place in range(places.start, places.stop)]
         covariance = self.explanation.best.covariance[np.ix_(rows, rows)]
         here = self.change(x, self.values)
@@ -226,7 +226,7 @@ def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str
 def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
     """Those of the fit, with the names that readers know; of a sine its amplitude, start and period."""
     law, explanation = leading.law, leading.explanation
-    first = own_places(explanation.names, explanation.best.hypothesis.lines)[law.name].start
+    first = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[law.name].start
     stated = [parameter(explanation, first + place) for place in range(len(law.parameters_bound))]
     if isinstance(law, RecordingLaw | LagLaw | CurveLaw):
         if law.shape.form == "periodic" and len(law.amplitudes) == law.shape.count:

@@ -24,7 +24,7 @@ from scipy.special import expit, logit
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.fit import GAIN
 from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.noise import Plateau
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Search
 from underskin.diagnosis.selection.priors import log_prior
@@ -51,13 +51,13 @@ class Shared:
         """Of these mechanisms' parameters and, with `skin`, the factors on its modulus and thickness."""
         hypothesis = explanation.best.hypothesis
         model = explanation.model.parameters
-        own = own_places(explanation.names, hypothesis.lines)
+        own = parameter_slices(explanation.names, hypothesis.lines)
         places = [place for name in mechanisms for place in range(own[name].start, own[name].stop)]
         if skin:
             names = [entry.name for entry in model]
             places += [names.index(name) for name in _SKINS_OWN if name in names]
-        places = [place for place in places if place in hypothesis.mean_places]
-        rows = [hypothesis.mean_places.index(place) for place in places]
+        places = [place for place in places if place in hypothesis.mean_indices]
+        rows = [hypothesis.mean_indices.index(place) for place in places]
         moments = np.array([_prior(model[place], float(explanation.point.fit[place])) for place in places]).reshape(
             -1, 2
         )

@@ -25,7 +25,7 @@ import numpy as np
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.law_statement import of_clauses
 from underskin.diagnosis.reporting.numbers import rounded
@@ -158,7 +158,7 @@ def of_strengths(candidates: Mapping[str, Candidate], common: CommonSet) -> list
         fit = candidate.explained(frozenset(names))
         if fit is None:
             continue
-        for mechanism, places in own_places(fit.names, fit.best.hypothesis.lines).items():
+        for mechanism, places in parameter_slices(fit.names, fit.best.hypothesis.lines).items():
             for place in range(places.start, places.stop):
                 entry = fit.model.parameters[place]
                 likelihood = _likelihood(fit, place)
@@ -177,9 +177,9 @@ def _likelihood(fit: Explanation, place: int) -> Gaussian | None:
     """Of one fit coordinate by the recordings alone, the prior taken out; None where they say next to nothing of it, or
     it moves the covariance alone."""
     hypothesis = fit.best.hypothesis
-    if place not in hypothesis.mean_places:
+    if place not in hypothesis.mean_indices:
         return None
-    row = hypothesis.mean_places.index(place)
+    row = hypothesis.mean_indices.index(place)
     after = 1 / float(fit.best.covariance[row, row])
     prior, centre = quadratic_of_prior(fit.model.parameters[place], float(fit.point.fit[place]))
     precision = after - prior

@@ -26,7 +26,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
+from underskin.diagnosis.inference.hypothesis import curvature_of_prior, parameter_slices
 from underskin.diagnosis.reporting.numbers import mixture_quantile
 from underskin.diagnosis.several.course import Bench, Candidate
 from underskin.mechanisms.models.composed import Model
@@ -345,7 +345,7 @@ class FleetSkin:
     def _about_batch(self, model: Model, lines: Lines, held: Sequence[str]) -> Gaussian:
         """That E and thickness are about the make's, as far as held, beside what recordings of other kinds say."""
         other = self.candidate.problem.beside
-        places = own_places(model.names, lines)
+        places = parameter_slices(model.names, lines)
         rows = [ERRORS.index(name) for name in held]
         matrix = np.eye(len(model.parameters))[[places[name].start for name in held]]
         centre, precision = np.array(self._centre)[rows], np.diag(np.array(_ABOUT_BATCH)[rows] ** -2.0)
@@ -355,7 +355,7 @@ class FleetSkin:
 
     def _said(self, fit: Explanation, best: Evidence, held: Sequence[str]) -> Gaussian:
         """The likelihood by one of its fits: the posterior over the priors, those of errors and the usual ones."""
-        places = own_places(fit.names, best.hypothesis.lines)
+        places = parameter_slices(fit.names, best.hypothesis.lines)
         entries = [entry.name for entry in fit.model.parameters]
         matrix = np.zeros((len(QUANTITIES), len(entries)))
         centre, variance, log_evidence = np.zeros(len(QUANTITIES)), np.zeros(len(QUANTITIES)), best.log_evidence
@@ -371,7 +371,7 @@ class FleetSkin:
                     precision, middle = precision + also, (precision * middle + also * about) / (precision + also)
                 centre[row] += middle
                 variance[row] += 1 / precision
-        by_fit = matrix[:, best.hypothesis.mean_places]
+        by_fit = matrix[:, best.hypothesis.mean_indices]
         mean = matrix @ best.point.fit
         return Gaussian.from_posterior(log_evidence, mean, by_fit @ best.covariance @ by_fit.T, centre, 1 / variance)
 

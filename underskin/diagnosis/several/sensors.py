@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.inference.residuals import with_unseen
+from underskin.diagnosis.inference.hypothesis import parameter_slices
+from underskin.diagnosis.inference.residuals import with_hidden_mechanism
 from underskin.diagnosis.reporting.numbers import place_of, rounded
 from underskin.diagnosis.several.course import Candidate, Course, Shared, same_strength
 from underskin.errors import InvalidInput
@@ -429,7 +429,7 @@ def causes(candidate: Candidate, names: Sequence[str], change: Change) -> tuple[
     weights = {AGEING: float(_normal(np.log1p([change.value]), USUAL)[0])} if change.value < 0 else {}
     width = float(np.hypot(change.uncertainty, _BETWEEN))
     for name in candidate.problem.lines.mechanisms.named:
-        found = None if name in {*names, AGEING} else with_unseen(candidate.problem, explanation, name, "d33")
+        found = None if name in {*names, AGEING} else with_hidden_mechanism(candidate.problem, explanation, name, "d33")
         if found is not None:
             weights[name] = float(found.share @ _normal(found.mean - before, width))
     most = max(weights.values(), default=0.0)
@@ -458,10 +458,10 @@ def _added(candidate: Candidate, fit: Explanation, common: Sequence[str]) -> flo
 
 def _variance(fit: Explanation, common: Sequence[str]) -> float:
     hypothesis, covariance = fit.best.hypothesis, fit.best.covariance
-    places = own_places(fit.names, hypothesis.lines)
+    places = parameter_slices(fit.names, hypothesis.lines)
     known = [place for name in common for place in range(places[name].start, places[name].stop)]
-    rows = [hypothesis.mean_places.index(place) for place in known if place in hypothesis.mean_places]
-    d33 = hypothesis.mean_places.index(place_of(fit, "d33"))
+    rows = [hypothesis.mean_indices.index(place) for place in known if place in hypothesis.mean_indices]
+    d33 = hypothesis.mean_indices.index(place_of(fit, "d33"))
     with_known = covariance[d33, rows]
     return float(covariance[d33, d33] - with_known @ np.linalg.solve(covariance[np.ix_(rows, rows)], with_known))
 
