@@ -376,8 +376,8 @@ def _interior(recording: Indices, frequency: Floats) -> Indices:
     """Rows with a lower and a higher neighbour in their own recording."""
     inner = np.arange(1, len(recording) - 1)
     same = (recording[inner - 1] == recording[inner]) & (recording[inner + 1] == recording[inner])
-    apart = (frequency[inner] > frequency[inner - 1]) & (frequency[inner + 1] > frequency[inner])
-    return inner[same & apart & (frequency[inner - 1] > 0)]
+    increasing = (frequency[inner] > frequency[inner - 1]) & (frequency[inner + 1] > frequency[inner])
+    return inner[same & increasing & (frequency[inner - 1] > 0)]
 
 
 def _roughness(z: Complexes, frequency: Floats, recording: Indices) -> tuple[Indices, Floats, Floats]:

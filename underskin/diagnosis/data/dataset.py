@@ -139,7 +139,7 @@ _NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # from it,
 _SIDE_SAMPLES = 5  # samples on either side of the deepest one
 _STEP = 0.2  # of the larger step of both ways, which the smaller must exceed for their lines to meet in a corner
 _RESTS = 1e-3  # of that step: where the deepest samples differ by less, the sphere was held
-_SURE = 4.0  # standard deviations
+_BELOW_AIR_SDS = 4.0  # standard deviations below the air at which a minimum may be a hidden jump
 _DISTINCT = 5.0  # standard deviations by which two displacements differ, between which a slope is read
 
 
@@ -172,15 +172,15 @@ def thinned(
     return means, deviation, position, counts.astype(float)
 
 
-def _slopes(displacement: Floats, force: Floats, noise: Floats, back: Mask) -> Floats:
+def _slopes(displacement: Floats, force: Floats, noise: Floats, unloading: Mask) -> Floats:
     """How steep the force rises over displacement at each block (blocks,): the lesser of the slopes to either side.
 
-    Each is that to the next block of the same way whose displacement differs by more than its `noise` (blocks,); `back`
-    are blocks of the way back. Beside a jump, one side has none; between blocks as close as the noise, a slope would be
-    noise too.
+    Each is that to the next block of the same way whose displacement differs by more than its `noise` (blocks,);
+    `unloading` are blocks of the way back. Beside a jump, one side has none; between blocks as close as the noise, a
+    slope would be noise too.
     """
-    apart = displacement - displacement[:, None]
-    distinct = (np.abs(apart) > _DISTINCT * np.hypot(noise, noise[:, None])) & (back == back[:, None])
+    separation = displacement - displacement[:, None]
+    distinct = (np.abs(separation) > _DISTINCT * np.hypot(noise, noise[:, None])) & (unloading == unloading[:, None])
     number = np.arange(len(displacement))
     after = distinct & (number > number[:, None])
     before = distinct & (number < number[:, None])
@@ -283,7 +283,7 @@ def _hidden_jumps(seen: Course, force: Floats) -> Indices:
     end by a jump that noise hides, and means over it would take from the adhesion."""
     ways = (seen.snap_in, 0, seen.turn), (seen.pull_off, seen.turn, len(force))
     least = [first + int(np.argmin(force[first:end])) for jump, first, end in ways if jump is None and first < end]
-    return np.array([sample for sample in least if force[sample] < -_SURE * seen.noise], dtype=np.intp)
+    return np.array([sample for sample in least if force[sample] < -_BELOW_AIR_SDS * seen.noise], dtype=np.intp)
 
 
 def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
@@ -535,7 +535,7 @@ _ABSCISSA_RANGE = (1.0, 10.0)  # the abscissa: displacement over a curve's range
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
 _SURE_STEP = 4.0  # standard deviations
 _AIR_BLOCKS, _AIR_SAMPLES = 10, 4  # blocks of samples in the air, and samples of each at least
-_AWAY = 0.6  # of the samples in the air: what lies near may belong to a contact
+_FAR_SHARE = 0.6  # of the samples in the air: what lies near may belong to a contact
 _PLAINLY = 4.0  # times the variance that is expected: by chance in 1 of 4,000, of χ² over 7
 _FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known that no sample shows
 
@@ -605,15 +605,15 @@ def _slow_noise(seen: Course, force: Floats) -> float:
     """The standard deviation of noise that neighbouring samples share, which second differences do not see: by how
     much means over blocks in the air, away from the contact, scatter about a parabola, which a drift is, beyond what a
     sample's noise gives; 0 where that is not plain."""
-    away = int(_AWAY * len(seen.air))
-    air = seen.air[:away] if len(seen.air) and seen.air[0] == 0 else seen.air[len(seen.air) - away :]
-    count = len(air) // _AIR_BLOCKS
-    if count < _AIR_SAMPLES:
+    count_far = int(_FAR_SHARE * len(seen.air))
+    air = seen.air[:count_far] if len(seen.air) and seen.air[0] == 0 else seen.air[len(seen.air) - count_far :]
+    block_size = len(air) // _AIR_BLOCKS
+    if block_size < _AIR_SAMPLES:
         return 0.0
-    means = force[air[: count * _AIR_BLOCKS]].reshape(_AIR_BLOCKS, count).mean(axis=1)
+    means = force[air[: block_size * _AIR_BLOCKS]].reshape(_AIR_BLOCKS, block_size).mean(axis=1)
     block = np.arange(_AIR_BLOCKS)
     about = means - np.polyval(np.polyfit(block, means, 2), block)
-    variance, expected = float(about @ about) / (_AIR_BLOCKS - 3), seen.noise**2 / count
+    variance, expected = float(about @ about) / (_AIR_BLOCKS - 3), seen.noise**2 / block_size
     return float(np.sqrt(variance - expected)) if variance > _PLAINLY * expected else 0.0
 
 

@@ -1,8 +1,8 @@
-"""Hypotheses fitted: costs and their derivatives at many points at once, begun, settled and improved.
+"""Fits of hypotheses: costs and their derivatives at many points at once, starting points, and their improvement.
 
-Mean parameters take damped Gauss–Newton steps within the bounds; each point has its own damping, and rests once it has
-converged. What only enters the covariance (gain and position scatter, line level, and a mechanism's spread or pick-up)
-follows by Newton steps on the likelihood of the predictions at hand, which cost no model evaluation.
+Mean parameters take damped Gauss–Newton steps within the bounds, with a damping for each point, until it converges.
+Parameters of the covariance only (gain and position scatter, line level, sensor spread, pick-up) take Newton steps on
+the likelihood of fixed predictions, which need no model evaluation.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -34,16 +34,16 @@ from underskin.mechanisms.models.frf import FrfModels
 from underskin.recordings.campaign import curves_of
 from underskin.units import Floats, Indices, Mask
 
-GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
-SMOOTH = 2  # of curves, which have no place
-_FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
+GAIN, LEVEL, POSITION = 0, 1, 2  # indices of the covariance parameters, the last if there is positioning scatter
+SMOOTH = 2  # index of the smooth error of curves, which have no positioning scatter
+_FREE_SPREAD = 0.02  # above this sd of b, e^b is linearised at the most probable b, not at 0
 _NUMBERS_AT_ONCE = 500_000
 _PREDICTED_AT_ONCE = 1_000_000
 _GAIN_ROUNDS, _GAIN_CHANGE, _LARGEST_SENSOR_LOG_GAIN = (
     6,
     3e-3,
     2.0,
-)  # rounds at most, change that ends them, and bounds of b
+)  # most rounds, change that ends them, and bounds of b
 _LARGEST_D33_STEP = 1.0  # of log d33
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 _SETTLING = 20
@@ -52,23 +52,23 @@ _SOFTER = (1.0, 0.25, 0.06)
 _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
 _SMOOTH_STARTS = (np.log(1e-3), np.log(3e-2))  # of curves: close fit, and loose
 _CURVE_SETTLING = 8
-_PROMISED, _MARGIN = 10.0, 2.0  # times what the gradient says, and nats beyond, that a fit may still gain
+_PROMISED, _MARGIN = 10.0, 2.0  # times the gain by the gradient, and nats beyond it, that a fit may still gain
 _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's slopes
 _LARGEST_MEAN_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _LEAST_CURVATURE = 1e-10
 _MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
-CostToBeat = Callable[[Evaluated], Floats]  # costs (points,) that points must get below to be of any use
+CostToBeat = Callable[[Evaluated], Floats]  # costs (points,) that points must get below
 
 
 class Fitter:
-    """Evaluates, begins and improves points of hypotheses of the same recordings, which have the same covariance
+    """Evaluates, starts and improves points of hypotheses of the same recordings with the same covariance
     parameters."""
 
     def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[Collection[int]] | None = None) -> None:
-        """Prepare the names and bounds; the parameters of each hypothesis at `held` stay where a point has them, and
-        have no prior."""
+        """Prepare names and bounds; the parameters of each hypothesis with indices `held` are fixed and have no
+        prior."""
         self.hypotheses = tuple(hypotheses)
         first = hypotheses[0]
         self.lines, self.curvature, self.has_position_scatter = first.lines, first.curvature, first.has_position_scatter
@@ -94,7 +94,7 @@ class Fitter:
         self._gaussians = (
             GaussianBatch(gaussians, shape[1]) if any(gaussian is not None for gaussian in gaussians) else None
         )
-        # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
+        # Indices of each hypothesis's covariance parameters that belong to mechanisms; these come last.
         self.covariance_indices = np.array(
             [
                 [index for index, parameter in enumerate(hypothesis.model.parameters) if parameter.moves_covariance]
@@ -113,7 +113,7 @@ class Fitter:
 
     @property
     def no_sensor_log_gain(self) -> Floats:
-        """Log gains of the sensors that are all 0."""
+        """Log gains of 0 (sensors,)."""
         return np.zeros(self.lines.sensors.shape[1])
 
     def at(self, point: FitPoint) -> Points:
@@ -121,12 +121,12 @@ class Fitter:
         return Points(np.zeros(1, dtype=np.intp), point.fit[None], point.covariance[None], point.sensor_log_gain[None])
 
     def evaluate(self, points: Points, *, slopes: bool = True) -> Evaluated:
-        """Predict, with derivatives unless they are not needed, and weigh."""
+        """Predict, with derivatives if `slopes`, and compute the costs."""
         products = self.products(points, slopes=slopes, place=self.has_position_scatter)
         return self.weighed(points, products)
 
     def products(self, points: Points, *, slopes: bool, place: bool) -> Products:
-        """The inner products at points."""
+        """The inner products at points; with derivatives if `slopes`, with position slopes if `place`."""
         if self.lines.curves:
             edges = np.searchsorted(points.owner, np.arange(len(self.hypotheses) + 1))
             parts = [
@@ -141,7 +141,7 @@ class Fitter:
         return joined([self._frf_products(points[batch], slopes, place) for batch in several], max(self.counts))
 
     def _at_once(self, points: Points, variables: int) -> list[slice]:
-        """Which points are worked out at once, so that arrays with derivatives by so many variables stay small."""
+        """Slices of points small enough that arrays with derivatives by so many variables stay small."""
         largest = max(hypothesis.frf_model.numbers(variables) for hypothesis in self.hypotheses)
         count = max(_PREDICTED_AT_ONCE // largest, 1)
         return [slice(first, first + count) for first in range(0, len(points), count)]
@@ -151,7 +151,7 @@ class Fitter:
         return FrfModels([hypothesis.frf_model for hypothesis in self.hypotheses])
 
     def place_slopes(self, points: Points) -> Floats:
-        """∂m/∂x and ∂m/∂y of recordings, before the dynamics (2, points, recordings)."""
+        """∂m/∂x and ∂m/∂y of recordings, without the dynamics (2, points, recordings)."""
         slopes = np.empty((2, len(points), self.lines.recordings))
         for batch in self._at_once(points, 0):
             part = points[batch]
@@ -160,19 +160,20 @@ class Fitter:
         return slopes
 
     def _frf_products(self, points: Points, slopes: bool, place: bool) -> FrfProducts:
-        """The inner products at points that are worked out at once."""
+        """The inner products at points that are evaluated at once."""
         parts = self._models.respond(points.owner, points.fit, slopes=slopes, place=place)
         products = []
         for rows, response in parts:
             hypothesis = self.hypotheses[points.owner[rows[0]]]
             products.append(FrfProducts.of(hypothesis.frf_lines, hypothesis.pickup_rows, response))
         order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        if len(parts) == 1:  # whose points come in the order of what presses their contacts
+        if len(parts) == 1:  # whose points may be ordered by contact
             return products[0] if (np.diff(order) == 1).all() else products[0][order]
         return FrfProducts.joined(products, max(self.counts))[order]
 
     def weighed(self, points: Points, products: Products) -> Evaluated:
-        """Points whose predictions are known, with the sensors' gains that belong to them where these are free."""
+        """Points with known predictions and their costs; where the sensors' gains are free, at the most probable
+        gains."""
         if self._spread is not None:
             for _ in range(_GAIN_ROUNDS):
                 levels = self.levels(points.covariance[:, None])
@@ -188,12 +189,12 @@ class Fitter:
         return Evaluated(points, products, self._costs(points, products, points.covariance[:, None])[:, 0])
 
     def marginal(self, at: Evaluated) -> Likelihoods:
-        """The likelihoods at points."""
+        """The terms of the likelihood at points."""
         levels = self.levels(at.points.covariance[:, None])
         return Likelihoods(self.lines, self.curvature, at.products, levels, at.points.sensor_log_gain)
 
     def levels(self, covariance: Floats) -> SeveralLevels:
-        """The noise levels that covariance parameters (…, parameters) hold, (…, 1)."""
+        """The noise levels (…, 1) of covariance parameters (…, parameters)."""
         values = np.exp(covariance[..., None])
         shape = (*covariance.shape[:-1], 1)
         values_by_name = {parameter.name: values[..., column, :] for column, parameter in enumerate(self.covariance)}
@@ -208,7 +209,7 @@ class Fitter:
         )
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
-        """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
+        """The costs (points, sets) with covariance parameters (points, sets, parameters), at fixed predictions."""
         from underskin.diagnosis.inference.kernels import log_priors
 
         pickup = self.hypotheses[0].model.pickup
@@ -238,7 +239,7 @@ class Fitter:
     def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
         """Information and gradient of the log posterior in the mean parameters (points, parameters, parameters).
 
-        What is held or no parameter has gradient 0 and information 1 of its own.
+        Held and padded parameters have gradient 0 and information 1.
         """
         levels, sensor_log_gain = self.levels(at.points.covariance[:, None]), at.points.sensor_log_gain
         information, gradient = normal_equations(
@@ -246,27 +247,27 @@ class Fitter:
         )
         owner = at.points.owner
         free = self.free[owner]
-        away = at.points.fit - self._centre[owner]
-        precision = self._prior_precision(owner, away)
+        offset = at.points.fit - self._centre[owner]
+        precision = self._prior_precision(owner, offset)
         if self._gaussians is not None:
             of_others, towards = self._gaussians.equations(at.points)
             information, gradient = information + of_others, gradient + towards
-        gradient = np.where(free, gradient - precision * away, 0.0)
+        gradient = np.where(free, gradient - precision * offset, 0.0)
         information = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
         diagonal = np.arange(free.shape[1])
         information[:, diagonal, diagonal] += np.where(free, precision, 1.0)
         return information, gradient
 
-    def _prior_precision(self, owner: Indices, away: Floats) -> Floats:
-        """What a quadratic with the prior's gradient has for its precision, so far `away` from the centres (points,
-        parameters): less and less in heavy tails."""
+    def _prior_precision(self, owner: Indices, offset: Floats) -> Floats:
+        """Precision of the quadratic with the prior's gradient at the `offset` from the centres (points, parameters);
+        it decreases with the offset in heavy tails."""
         precision, freedom = self._precision[owner], self._freedom[owner]
         with np.errstate(invalid="ignore"):
-            weight = (freedom + 1) / (freedom + precision * away**2)
+            weight = (freedom + 1) / (freedom + precision * offset**2)
         return np.where(np.isfinite(freedom), weight, 1.0) * precision
 
     def with_covariance(self, points: Points, covariance: Floats) -> Points:
-        """The points with other covariance parameters, a mechanism's own among the coordinates of the fit."""
+        """The points with other covariance parameters; those of mechanisms are also coordinates of the fit."""
         fit = points.fit.copy()
         np.put_along_axis(fit, self.covariance_indices[points.owner], covariance[:, self._shared_count :], axis=1)
         return replace(points, covariance=covariance, fit=fit)
@@ -274,7 +275,7 @@ class Fitter:
     def update_noise_levels(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
         """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.
 
-        Several of a mechanism's own hang together, so that steps of one at a time would creep.
+        Where mechanisms have covariance parameters these are correlated, so the steps are joint.
         """
         if (
             isinstance(at.products, FrfProducts)
@@ -322,7 +323,7 @@ class Fitter:
         return Evaluated(points, at.products, cost, at.log_slope_gradient)
 
     def _update_independently(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
-        """The same where no mechanism acts on the covariance: each parameter moves on its own."""
+        """The same where no mechanism acts on the covariance: each parameter takes its own steps."""
         from underskin.diagnosis.inference.kernels import update_noise_levels
 
         covariance, cost = at.points.covariance.copy(), at.cost.copy()
@@ -354,8 +355,8 @@ class Fitter:
         return replace(at, points=replace(at.points, covariance=covariance), cost=cost)
 
     def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
-        """Gradient and Hessian of the costs in the covariance parameters, by differences; without mixed terms of the
-        parameters before the `first_mixed`."""
+        """Gradient and Hessian of the costs in the covariance parameters, by differences; without the mixed terms of
+        parameters before `first_mixed`."""
         from underskin.diagnosis.inference.kernels import STEP
 
         here = at.points.covariance
@@ -380,8 +381,8 @@ class Fitter:
         return gradient + np.einsum("nij,nj->ni", hessian, here - centre), hessian
 
     def start(self, mechanism_fits: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
-        """Points of each hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
-        parent or at their centre; noise as it is usual."""
+        """Points of each hypothesis with these coordinates of its mechanisms (points, parameters), nuisances from a
+        parent or at their priors' centres, and usual noise levels."""
         owner = np.repeat(np.arange(len(mechanism_fits)), [len(coordinates) for coordinates in mechanism_fits])
         fit = np.zeros((len(owner), max(self.counts)))
         for number, (hypothesis, values, parent) in enumerate(
@@ -409,7 +410,8 @@ class Fitter:
         *,
         slopes: bool = False,
     ) -> Evaluated:
-        """The starts of each hypothesis with these coordinates, d33 as the data would have it, evaluated."""
+        """The starting points of each hypothesis with these coordinates, evaluated, with d33 estimated from the
+        data."""
         points = self.start(mechanism_fits, parents or [None] * len(mechanism_fits))
         products = self.products(points, slopes=slopes, place=self.has_position_scatter)
         if not any(parameter.proportional for parameter in self.hypotheses[0].model.parameters):
@@ -420,7 +422,7 @@ class Fitter:
         return self.evaluate(self._times(points, ratio)[0], slopes=slopes)
 
     def _ratio(self, points: Points, products: Products) -> Floats:
-        """What measured recordings are of the predicted ones (points,): their mean, weighed by noise and scatter."""
+        """Mean ratio of measured to predicted recordings (points,), weighted by noise and scatter."""
         sums = products.summed(self.levels(points.covariance[:, None]))
         uu, uy = sums.uu[:, 0], sums.uy[:, 0]
         level = products.level
@@ -428,9 +430,10 @@ class Fitter:
         return np.asarray((weight * level * uy).sum(axis=1) / np.maximum((weight * level**2 * uu).sum(axis=1), 1e-300))
 
     def with_scatter(self, points: Points) -> Points:
-        """For each point fitted without positioning scatter, the best of a few scales of it, d33 following each.
+        """For each point fitted without positioning scatter, the best of a few scales of it, with d33 estimated for
+        each.
 
-        Where the scatter is large, what was fitted without it may be far off: also from the nuisances' centres.
+        Large scatter may have biased the fit without it, so the nuisances' centres are tried as well.
         """
         fresh = points.fit.copy()
         for number, (hypothesis, count) in enumerate(zip(self.hypotheses, self.counts, strict=True)):
@@ -456,13 +459,14 @@ class Fitter:
         return at.points[at.cost.reshape(-1, candidates).argmin(axis=1) + candidates * np.arange(len(points))]
 
     def _scaled(self, points: Points, products: Products, ratio: Floats) -> tuple[Points, Products]:
-        """Points with d33 so many times as large (points,), and what they predict."""
+        """Points with d33 multiplied by `ratio` (points,), and their predictions."""
         assert isinstance(products, FrfProducts)
         moved, factor = self._times(points, ratio)
         return moved, products.scaled(factor)
 
     def _times(self, points: Points, ratio: Floats) -> tuple[Points, Floats]:
-        """With d33 so many times as large (points,), within its bounds, and by how much; as it is where not above 0."""
+        """Points with d33 multiplied by `ratio` (points,) within its bounds, and the factor applied; 1 where the ratio
+        is not positive."""
         number, index = np.arange(len(points)), self._d33[points.owner]
         fit = points.fit.copy()
         change = np.log(np.where(ratio > 0, ratio, 1.0))
@@ -471,7 +475,7 @@ class Fitter:
         return replace(points, fit=fit), np.exp(fit[number, index] - points.fit[number, index])
 
     def _with_d33(self, at: Evaluated) -> Evaluated:
-        """With the d33 that the data would have at these noise levels: no further prediction."""
+        """With the most probable d33 at these noise levels; needs no further prediction."""
         information, gradient = self.posterior_equations(at)
         number, index = np.arange(len(at)), self._d33[at.points.owner]
         step = np.clip(
@@ -481,7 +485,7 @@ class Fitter:
 
     @cached_property
     def _d33(self) -> Indices:
-        """Where each hypothesis has the parameter that the prediction is proportional to."""
+        """Index of the parameter of each hypothesis that the prediction is proportional to."""
         proportional = [
             [parameter.proportional for parameter in hypothesis.model.parameters] for hypothesis in self.hypotheses
         ]
@@ -489,8 +493,8 @@ class Fitter:
 
     @cached_property
     def _moves_position_slopes(self) -> Mask:
-        """Which parameters of each hypothesis may change how σ depends on the contact's place (hypotheses, parameters),
-        relative to σ: not d33, nor those of the dynamics."""
+        """Parameters of each hypothesis that may change ∇σ/σ at the contact (hypotheses, parameters): not d33, nor
+        those of the dynamics."""
         moves = np.zeros(self.low.shape, dtype=bool)
         for number, hypothesis in enumerate(self.hypotheses):
             moves[number, : self.counts[number]] = [
@@ -501,7 +505,7 @@ class Fitter:
         return moves
 
     def improve(self, start: Points, cost_to_beat: CostToBeat | None = None) -> Evaluated:
-        """The most probable points near the starts; only roughly where their targets will not be reached."""
+        """The most probable points near the starts; only roughly where they will not reach `cost_to_beat`."""
         if not self.lines.curves:
             return self.update_noise_levels(
                 self.descend(self.update_noise_levels(self.evaluate(start), 3), 1, cost_to_beat), 2
@@ -515,7 +519,7 @@ class Fitter:
         return self.update_noise_levels(self._between_samples(initial).descend(initial, 1), _CURVE_SETTLING)
 
     def _between_samples(self, at: Evaluated) -> Self:
-        """Of what sticks, with contact points held between the samples where they are at one point."""
+        """With contact points confined to the interval between samples that they are in, where adhesion moves them."""
         (hypothesis,) = self.hypotheses
         if not any(self.lines.mechanisms[name].moves_contact_points for name in hypothesis.model.names):
             return self
@@ -526,10 +530,10 @@ class Fitter:
         return held
 
     def descend(self, best: Evaluated, settling: int, cost_to_beat: CostToBeat | None = None) -> Evaluated:
-        """Steps of the mean parameters, each followed by so many of the covariance's.
+        """Steps of the mean parameters, each followed by `settling` steps of the covariance's.
 
-        A point goes no further once it promises no cost below its target. What the gradient promises leaves out what
-        the noise levels may gain: where these are a curve's, or a mechanism's own, no point is left.
+        A point stops once the gradient promises no cost below `cost_to_beat`. As that leaves out gains by the noise
+        levels, no point of curves, or of mechanisms with covariance parameters, is stopped.
         """
         if self.lines.curves or self.covariance_indices.size:
             cost_to_beat = None
@@ -562,9 +566,9 @@ class Fitter:
     def _after_step(
         self, at: Evaluated, step: Floats, damping: Floats, settling: int
     ) -> tuple[Evaluated, Floats, Mask]:
-        """The points after steps, where these gain; their damping; and which of them are to go on.
+        """The points after steps, where these gain; their damping; and which of them continue.
 
-        A point that gains nothing learns first how the position's slopes change, then tries shorter steps.
+        A point that does not gain first needs the gradient of its position slopes, then shorter steps.
         """
         owner = at.points.owner
         fit = np.clip(at.points.fit + step, self.low[owner], self.high[owner])
@@ -586,7 +590,7 @@ class Fitter:
         return after, damping, ~(stuck | idle | (better & (gained < _CONVERGED)))
 
     def has_log_slope_gradient(self, at: Evaluated) -> Mask:
-        """Which points know how the position's slopes change, or have no use for it."""
+        """Points whose `log_slope_gradient` is known or not needed."""
         if not self.has_position_scatter:
             return np.ones(len(at), dtype=bool)
         if at.log_slope_gradient is None:
@@ -594,7 +598,7 @@ class Fitter:
         return np.asarray(np.isfinite(at.log_slope_gradient).all(axis=(1, 2)))
 
     def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
-        """With other points in the place of some, which are in rising order."""
+        """With other points in place of those at indices `where`, in rising order."""
         if not len(where):
             return at
         if len(where) == len(at) and (at.log_slope_gradient is None or other.log_slope_gradient is not None):
@@ -627,7 +631,7 @@ class Fitter:
         return Evaluated(points, products, merged(at.cost, other.cost), log_slope_gradient)
 
     def with_log_slope_gradient(self, at: Evaluated) -> Evaluated:
-        """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position's slopes t, by differences."""
+        """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position slopes t, by differences."""
         count = max(self.counts)
         owner = at.points.owner
         step = _SLOPE_STEP * (self.high - self.low)[owner]
@@ -643,13 +647,14 @@ class Fitter:
         return replace(at, log_slope_gradient=log_slope_gradient)
 
     def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats]:
-        """Damped Gauss–Newton steps of the mean parameters within the bounds, and what the gradients say they gain."""
+        """Damped Gauss–Newton steps of the mean parameters within the bounds, and the gains that the gradients
+        promise."""
         information, gradient = self.posterior_equations(at)
         owner, fit = at.points.owner, at.points.fit
         low, high = self.low[owner], self.high[owner]
         free, every = self.free[owner], np.arange(fit.shape[1])
         diagonal = information[:, every, every]
-        # Of curves, lest what changes nothing (the share of a second relaxation that is none) takes all of a step
+        # Of curves, so that a parameter without effect does not take all of a step
         least = self._range[owner] ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
         for _ in every:
             matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
@@ -665,7 +670,7 @@ class Fitter:
 
 
 def with_softer_moduli(fitter: Fitter, at: Evaluated) -> Evaluated:
-    """Of curves whose modulus is not declared: also with smaller moduli, since what sticks looks stiff."""
+    """Of curves with an undeclared modulus: also with smaller moduli, since adhesion makes a sample look stiffer."""
     indices = [index for index, parameter in enumerate(fitter.hypotheses[0].model.parameters) if parameter.proportional]
     if not indices:
         return at
@@ -676,9 +681,9 @@ def with_softer_moduli(fitter: Fitter, at: Evaluated) -> Evaluated:
 
 
 def with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
-    """Of indentations: each one's contact point where it fits best, in ever finer steps of the depth.
+    """Of indentations: the best contact point of each curve, by a search with ever finer steps of the depth.
 
-    Curves are independent of each other but for what they share, so that one set of depths serves all of them.
+    Given the shared parameters curves are independent, so one set of depths serves all of them.
     """
     (hypothesis,) = fitter.hypotheses
     assert isinstance(hypothesis.model, CurveModel)
@@ -707,7 +712,7 @@ def with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
 def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Bounds of fit coordinates (parameters,) that keep each contact point between the samples where it is.
 
-    Of what sticks: there the force jumps as a contact point passes a sample, and no slope says so.
+    With adhesion the force jumps as a contact point passes a sample, which no derivative shows.
     """
     assert isinstance(hypothesis.model, CurveModel)
     low, high = low.copy(), high.copy()
@@ -723,9 +728,9 @@ def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floa
 
 
 def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
-    """The best of the least-squares fits of one hypothesis of curves from these starts, with the noise it leaves.
+    """The best least-squares fit of one hypothesis of curves from these starts, with its noise levels.
 
-    A small smooth error and a close fit, or a large one and a loose fit: each may be a maximum of its own.
+    A small smooth error with a close fit and a large one with a loose fit may both be local maxima; both are tried.
     """
     fitting = LeastSquares(fitter.hypotheses[0])
     fits, costs = zip(*(fitting.fitted(fit) for fit in start.fit), strict=True)
@@ -740,11 +745,11 @@ def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
 
 
 def _smooth_range(fitter: Fitter) -> tuple[float, float]:
-    """Where the logarithm of the smooth error of curves may begin."""
+    """Range of starting values of the log smooth error of curves."""
     smooth = fitter.hypotheses[0].smooth
     return smooth.low, max(smooth.high, float(np.log(3e-2)))
 
 
 def _log_size(slopes: Floats) -> Floats:
-    """log |t|² (points, recordings) of the position's slopes (2, points, recordings); least where there are none."""
+    """log |t|² (points, recordings) of position slopes (2, points, recordings)."""
     return np.log((slopes**2).sum(axis=0) + 1e-300)

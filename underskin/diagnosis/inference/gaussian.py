@@ -110,8 +110,8 @@ def _matrix(precision: Floats) -> Floats:
 def moments(shares: Floats, means: Sequence[Floats], covariances: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Mean and covariance of a mixture of distributions with these; the shares sum to 1."""
     mean = np.asarray(shares @ np.array(means))
-    away = np.array(means) - mean
-    return mean, np.tensordot(shares, np.array(covariances), 1) + (shares[:, None] * away).T @ away
+    offsets = np.array(means) - mean
+    return mean, np.tensordot(shares, np.array(covariances), 1) + (shares[:, None] * offsets).T @ offsets
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,17 @@
-"""One hypothesis: a model, its priors, the points at which it is looked at, and the likelihood of its predictions.
-
-How probable the recordings are under predictions, with all of their noise marginalised exactly.
+"""A hypothesis (a model, its priors and the rows it explains), points at which it is evaluated, and its likelihood.
 
 Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + n_ij, with
     n ~ N(0, κ² d_ij² + q_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), b ~ N(0, τ²);
-q is mains pick-up, 0 on most rows.
-The contact's place scales a recording by a real factor, so m = L u and ∂m = t u have one direction u in each recording.
+q is mains pick-up, 0 on most rows. All of this noise is marginalised exactly.
+
+The contact's position scales a recording by a real factor, so m = L u and ∂m = t u with one direction u a recording.
 C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with m = a u; sensors add τ² m mᵀ over their
-recordings. All of it is taken out by Sherman and Morrison's identity, so that time is linear in rows and in
-recordings. The covariance follows the model, so log|C| stays.
+recordings. C is inverted by Sherman and Morrison's identity: the time is linear in rows and in recordings. As C depends
+on the model, log|C| is part of the likelihood.
 
-e^b is linearised at `sensor_log_gain`, the most probable b of each sensor: Laplace's method for b. Where a contact
-sits on an extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above,
-with H of the base model.
-
-What the cell of each curve adds under a prediction: its zero and drift, and the gain of the recording. How σ bends
-around each contact's commanded place, in the base model: positioning scatter in second order. Points of several
-hypotheses, one after another, and what was worked out there. One hypothesis: a model, the lines it is to explain, and
-the coordinates in which it is fitted.
+e^b is linearised at `sensor_log_gain`, the most probable b of each sensor (Laplace's method for b). Where σ has an
+extremum at the contact, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above,
+with H, the Hessian of σ, of the base model.
 """
 
 from collections.abc import Sequence
@@ -59,7 +53,7 @@ from underskin.units import Floats, Indices, Mask
 
 @dataclass(frozen=True)
 class Curvature:
-    """Of σ over the contact's place, relative to σ (recordings,) [1/m²] and [1/m⁴]: ∇²σ/σ and tr(H²)/σ²."""
+    """∇²σ/σ [1/m²] and tr(H²)/σ² [1/m⁴] over the contact's position (recordings,)."""
 
     laplacian: Floats
     square: Floats
@@ -68,9 +62,9 @@ class Curvature:
 def log_likelihoods(
     lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
 ) -> Floats:
-    """Of predictions at several points, each at some sets of noise levels (points, sets, 1): (points, sets).
+    """Log likelihoods (points, sets) of predictions at several points, at sets of noise levels (points, sets, 1).
 
-    `sensor_log_gain` (points, sensors).
+    `sensor_log_gain` is (points, sensors).
     """
     from underskin.diagnosis.inference.kernels import log_likelihoods as add
 
@@ -97,12 +91,12 @@ def normal_equations(
     sensor_log_gain: Floats,
     log_slope_gradient: Floats | None = None,
 ) -> tuple[Floats, Floats]:
-    """Jᵀ C⁻¹ J (points, P, P), the information on the parameters, and the gradient of the log likelihood (points, P),
-    at the first set of noise levels.
+    """Information Jᵀ C⁻¹ J (points, P, P) on the parameters and gradient of the log likelihood (points, P), at the
+    first set of noise levels.
 
-    The gradient is that by the mean and by all columns that follow the model, ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r). How the
-    position's slopes t change is given by `log_slope_gradient` ∂ log |t|²/∂θ (points, recordings, P), finite where
-    known; else they are taken to change as L does, or where they lead, not at all.
+    The gradient is that of −½ log|C| − ½ rᵀC⁻¹r by the mean and by all columns of C that depend on the model.
+    `log_slope_gradient` is ∂ log |t|²/∂θ (points, recordings, P) of the position slopes t; where it is not finite, t is
+    taken to change as L does, or not at all where t dominates.
     """
     from underskin.diagnosis.inference.kernels import normal_equations as fill
 
@@ -140,12 +134,12 @@ def normal_equations(
 
 
 class Likelihoods:
-    """Of predictions at several points, each at some sets of noise levels."""
+    """Terms of the likelihood of predictions at several points, each at some sets of noise levels."""
 
     def __init__(
         self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
     ) -> None:
-        """Levels are (points, sets, 1), `sensor_log_gain` (points, sensors)."""
+        """`levels` (points, sets, 1), `sensor_log_gain` (points, sensors)."""
         self.levels, self._products, self._curvature = levels, products, curvature
         self._sensors = lines.sensors
         self._log_gains = log_gains = sensor_log_gain[:, None, lines.sensor]
@@ -169,8 +163,8 @@ class Likelihoods:
         return np.asarray((self._sensor_shrink * self._sensor_mr)[:, 0])
 
     def projections(self, position: float) -> tuple[Floats, Floats, Floats]:
-        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter, with
-        weights that leave out κ."""
+        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter [m],
+        with weights 1/d² (without κ)."""
         sums = self._products.summed(self.levels)
         log_gain, level = self._log_gains[0, 0], self._products.level[0]
         uu, uy = np.broadcast_to(sums.uu[0, 0], level.shape), np.broadcast_to(sums.uy[0, 0], level.shape)
@@ -186,8 +180,10 @@ class Likelihoods:
         return np.asarray(along if sums is None else along + sums.uv[0] * (factor * self._products.level[0])[:, None])
 
     def information(self, uj: Floats, square: Floats) -> Floats:
-        """Jᵀ C⁻¹ J (points, P, P) of any J at the first set of noise levels, from Re u*J of the recordings (points,
-        recordings, P) and Re JᵀJ (points, P, P), both over κ²."""
+        """Jᵀ C⁻¹ J (points, P, P) of any J at the first set of noise levels.
+
+        `uj` is Re u*J (points, recordings, P), `square` is Re JᵀJ (points, P, P), both divided by κ².
+        """
         by_sensor = np.swapaxes(np.swapaxes(uj * self._weight[:, 0, :, None], 1, 2) @ self._sensors, 1, 2)
         shared = by_sensor.transpose(0, 2, 1) @ (by_sensor * self._sensor_shrink[:, 0, :, None])
         return np.asarray(square - np.einsum("nrp,nr,nrq->npq", uj, self._shrink[:, 0], uj, optimize=True) - shared)
@@ -195,22 +191,22 @@ class Likelihoods:
 
 @dataclass(frozen=True)
 class CellResponse:
-    """The most probable zero and drift (rows,) [N], gain (recordings,) relative, and the variance (rows,) [N²] that
-    not knowing them leaves."""
+    """Most probable zero and drift `offset` (rows,) [N] and relative `gain` (recordings,) of the cells, and the
+    variance (rows,) [N²] of the prediction by their uncertainty."""
 
     offset: Floats
     gain: Floats
     variance: Floats
 
     def reading(self, lines: Lines, force: Floats) -> Floats:
-        """What the cells show of a force (rows,) [N]."""
+        """The cells' readings (rows,) [N] of a force (rows,) [N]."""
         return force * (1 + self.gain[lines.recording]) + self.offset
 
 
 def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, observed: Mask | None = None) -> CellResponse:
-    """From the rows that are `observed` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
+    """Estimated from the rows that are `observed` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
 
-    `force` (rows,) is what is predicted without them.
+    `force` (rows,) is F, the prediction without g and c.
     """
     assert lines.smooth is not None
     observed = np.ones(len(force), dtype=bool) if observed is None else observed
@@ -229,9 +225,9 @@ def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, observed: Ma
     return CellResponse(offset, np.array(gain), variance)
 
 
-_STEP = 0.05  # of the finite difference, in h; σ turns over lengths of 0.3 h and more
-_DIGITS = 9  # of a place beside its sensor [mm]
-_LEAST = 0.2  # of the largest σ: nearer to where σ crosses zero, its first derivative says what scatter does
+_STEP = 0.05  # of the finite difference, in h; σ varies over lengths of 0.3 h and more
+_DIGITS = 9  # of a position relative to its sensor [mm]
+_LEAST = 0.2  # of the largest σ: where σ is smaller, the first derivative describes the effect of scatter
 
 
 def curvature(lines: Lines, table: SigmaTable) -> Curvature:
@@ -240,7 +236,7 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
     assert campaign.skin.thickness_mm is not None
     step = _STEP * campaign.skin.thickness_mm
     sensors = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    contacts: dict[tuple[float, ...], tuple[int, FrfConditions]] = {}  # alike in the base model: a place among them
+    contacts: dict[tuple[float, ...], tuple[int, FrfConditions]] = {}  # index of each distinct contact
     contact_indices = []
     for conditions in frf_of(campaign):
         x, y = conditions.position_mm or sensors[conditions.sensor]
@@ -271,10 +267,10 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
 
 @dataclass(frozen=True)
 class Points:
-    """Where fits stand: coordinates of the models (points, parameters), of the covariance, and the sensors' log gains.
+    """Coordinates of fits: of the models (points, parameters), of the covariance, and the sensors' log gains.
 
-    `owner` says which hypothesis each point is of, in rising order; models with fewer parameters than others have
-    zeros behind their own.
+    `owner` is the index of each point's hypothesis, in rising order; rows of models with fewer parameters are padded
+    with zeros.
     """
 
     owner: Indices
@@ -296,13 +292,13 @@ def joined_points(first: Points, second: Points) -> Points:
 
 
 def points_of(points: Points, owner: int, count: int) -> Points:
-    """The points of one of several hypotheses, which has so many parameters, as those of it alone."""
+    """The points of one of several hypotheses, with its `count` parameters, as points of that hypothesis only."""
     chosen = points[points.owner == owner]
     return Points(np.zeros_like(chosen.owner), chosen.fit[:, :count], chosen.covariance, chosen.sensor_log_gain)
 
 
 def stacked(parts: Sequence[Points]) -> Points:
-    """Points of several hypotheses, of the first, the second and so on, in this order."""
+    """Points of several hypotheses, in the order of `parts`."""
     owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     fit = np.zeros((len(owner), max(part.fit.shape[1] for part in parts)))
     for number, part in enumerate(parts):
@@ -315,10 +311,10 @@ def stacked(parts: Sequence[Points]) -> Points:
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Points with what was worked out there; `cost` is minus the log posterior density (up to what all share).
+    """Points with their products and `cost`, minus the log posterior density up to a constant that all share.
 
-    `log_slope_gradient` ∂ log |t|²/∂θ of the position's slopes (points, recordings, parameters): not finite where a
-    fit has not needed it yet.
+    `log_slope_gradient` is ∂ log |t|²/∂θ of the position slopes (points, recordings, parameters), not finite where a
+    fit has not needed it.
     """
 
     points: Points
@@ -330,7 +326,7 @@ class Evaluated:
         return len(self.points)
 
     def subset(self, points: Indices) -> "Evaluated":
-        """At some of the points, in their order: itself where that is all of them."""
+        """Some of the points, in their order; itself where that is all of them."""
         return self if len(points) == len(self) else self[points]
 
     def __getitem__(self, points: Indices | Mask | slice) -> "Evaluated":
@@ -347,10 +343,10 @@ class Evaluated:
 
 
 class GaussianBatch:
-    """That of several hypotheses, whose parameters are padded to equally many."""
+    """Gaussian likelihoods of several hypotheses, padded to equally many parameters."""
 
     def __init__(self, gaussians: Sequence[Gaussian | None], parameters: int) -> None:
-        """None where nothing is known beside the recordings themselves."""
+        """None where only the hypothesis's own recordings inform on its parameters."""
         self._precision, self._linear = (
             np.zeros((len(gaussians), parameters, parameters)),
             np.zeros((len(gaussians), parameters)),
@@ -375,12 +371,12 @@ class GaussianBatch:
 
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
-_CURVE_LEVELS = (0.3, 5.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
+_CURVE_LEVELS = (0.3, 5.0)  # least accuracy of a cell; larger noise would exceed the differences of neighbours
 
 
 @dataclass(frozen=True)
 class CovarianceParameter:
-    """A coordinate that moves the covariance alone: its name, bounds and prior."""
+    """A parameter that changes the covariance only: its name, and bounds and prior of its coordinate."""
 
     name: str
     low: float
@@ -390,12 +386,12 @@ class CovarianceParameter:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A model and the lines it is to explain, with or without positioning scatter, and how large scatter may be."""
+    """A model and the lines it explains, with or without positioning scatter, and the priors of the scatters."""
 
     model: Model
     lines: Lines
     curvature: Curvature
-    has_position_scatter: bool  # whether there is positioning scatter
+    has_position_scatter: bool
     gain: Plateau = GAIN_PRIOR
     position: Plateau = POSITION_PRIOR
     smooth: Plateau = USUAL  # η of curves
@@ -403,12 +399,13 @@ class Hypothesis:
 
     @cached_property
     def mean_indices(self) -> list[int]:
-        """The places of the model's parameters that move the mean."""
+        """The indices of the model's parameters that change the mean."""
         return [index for index, parameter in enumerate(self.model.parameters) if not parameter.moves_covariance]
 
     @cached_property
     def covariance(self) -> tuple[CovarianceParameter, ...]:
-        """Gain scatter, line level, position scatter or smooth error where there is one, then the model's own."""
+        """Gain scatter, line level, positioning scatter or smooth error if any, then those of the model's
+        mechanisms."""
         low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
@@ -434,8 +431,8 @@ class Hypothesis:
 
     @cached_property
     def priors(self) -> Floats:
-        """Of the model's parameters' priors precision and centre (see `curvature_of_prior`), the logarithm of their
-        height, and the degrees of freedom of their tails (4, parameters)."""
+        """Rows of precision and centre of the parameters' priors (see `curvature_of_prior`), log of their height, and
+        degrees of freedom of their tails (4, parameters)."""
         rows = []
         for parameter in self.model.parameters:
             freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
@@ -444,12 +441,13 @@ class Hypothesis:
 
     @cached_property
     def mechanism_parameter_count(self) -> int:
-        """How many of the model's parameters are its mechanisms' own; they come first."""
+        """The number of parameters that belong to mechanisms; they come first."""
         mechanisms = [self.lines.mechanisms[name] for name in self.model.names]
         return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
 
     def group(self, number: int) -> object:
-        """The same for hypotheses that can be evaluated together; `number` tells those apart that cannot."""
+        """A key that is equal for hypotheses that can be evaluated together; `number` makes it unique for those that
+        cannot."""
         names = tuple(parameter.name for parameter in self.covariance)
         return number if self.lines.curves else (self.gain, self.position, names)
 
@@ -458,14 +456,14 @@ class Hypothesis:
         return CurveLines(self.lines)
 
     def curve_products(self, fit: Floats, *, slopes: bool) -> CurveProducts:
-        """Of curves the inner products of the model at points (points, parameters), with derivatives on request."""
+        """Of curves the inner products of the model at points (points, parameters), with derivatives if `slopes`."""
         assert isinstance(self.model, CurveModel)
         force, by_force = self.model.forces_and_slopes(fit) if slopes else (self.model.forces(fit), None)
         return CurveProducts.of(self._curve_lines, force, by_force)
 
     @property
     def frf_model(self) -> FrfModel:
-        """The model, which is one of FRFs."""
+        """The model, if it is one of FRFs."""
         assert isinstance(self.model, FrfModel)
         return self.model
 
@@ -476,14 +474,14 @@ class Hypothesis:
 
     @cached_property
     def pickup_rows(self) -> PickupRows | None:
-        """The rows that pick-up reaches, where the model has any."""
+        """The rows that mains pick-up reaches, if the model has any."""
         pickup, design = self.model.pickup, self.frf_model.design
         return None if pickup is None else pickup_rows(self.lines, pickup, design)
 
 
 @dataclass(frozen=True)
 class FitPoint:
-    """Where a fit stands: the model's coordinates, the covariance's, and each sensor's most probable log gain."""
+    """A fit's coordinates of the model and of the covariance, and each sensor's most probable log gain."""
 
     fit: Floats
     covariance: Floats
@@ -507,8 +505,8 @@ def curvature_of_prior(parameter: Parameter) -> tuple[float, float]:
 
 
 def quadratic_of_prior(parameter: Parameter, fit: float) -> tuple[float, float]:
-    """Precision and centre of a quadratic that has the gradient of a parameter's prior at a fit coordinate, as the
-    covariance of a fit counts it; 0 where the prior is uniform."""
+    """Precision and centre of the quadratic with the gradient of a parameter's prior at a fit coordinate, for the
+    covariance of a fit; 0 where the prior is uniform."""
     precision, centre = curvature_of_prior(parameter)
     freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
     if np.isfinite(freedom):
@@ -517,7 +515,7 @@ def quadratic_of_prior(parameter: Parameter, fit: float) -> tuple[float, float]:
 
 
 def parameter_slices(names: Sequence[str], lines: Lines) -> dict[str, slice]:
-    """Where in a composed model's parameters each mechanism's are."""
+    """The slice of a composed model's parameters that belongs to each mechanism."""
     mechanisms = [mechanism for name, mechanism in lines.mechanisms.items() if name in names]
     slices, first = {}, 0
     for name, parameters in parameters_together(mechanisms, lines.campaign, lines.kind).items():

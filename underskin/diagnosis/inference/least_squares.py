@@ -57,7 +57,7 @@ class LeastSquares:
         self._has_jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
         curves = curves_of(lines.campaign) if self._has_jumps else []
         self._snap_in_intervals = [_snap_in_interval(curve) for curve in curves]
-        contacts = [_seen_contact(curve) for curve in curves]
+        contacts = [_visible_contact(curve) for curve in curves]
         visible = [contact for contact in contacts if contact is not None]
         self._visible_contact = np.concatenate(visible) if visible and len(visible) == len(contacts) else None
 
@@ -147,18 +147,18 @@ def _snap_in_interval(curve: CurveConditions) -> tuple[float, float, float] | No
     if seen is None or not seen.snap_in:
         return None
     before, after = curve.displacement_mm[seen.snap_in - 1 : seen.snap_in + 1].tolist()
-    begins = touch(curve.displacement_mm, seen.snap_in)
-    return (before, begins, after) if before < begins < after else None
+    contact_point = touch(curve.displacement_mm, seen.snap_in)
+    return (before, contact_point, after) if before < contact_point < after else None
 
 
-def _seen_contact(curve: CurveConditions) -> Mask | None:
+def _visible_contact(curve: CurveConditions) -> Mask | None:
     """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
     if not isinstance(curve, CurveRecording):
         return None
     seen = course(curve.displacement_mm, curve.force_n, curve.time_s)
     number = np.arange(len(curve.force_n))
-    back = float(curve.displacement_mm[seen.turn] - curve.displacement_mm[-1])
-    if seen.snap_in is None or (seen.pull_off is None and back > _RETURN * float(np.ptp(curve.displacement_mm))):
+    retraction = float(curve.displacement_mm[seen.turn] - curve.displacement_mm[-1])
+    if seen.snap_in is None or (seen.pull_off is None and retraction > _RETURN * float(np.ptp(curve.displacement_mm))):
         return None
     return (number >= seen.snap_in) & (number < (len(number) if seen.pull_off is None else seen.pull_off))
 

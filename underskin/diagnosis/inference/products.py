@@ -329,14 +329,14 @@ class FrfProducts:
 
     def __getitem__(self, points: Array | slice) -> Self:
         """At some of the points."""
-        place, slopes = self.place_slopes, self.level_slopes
+        position_slopes, level_slopes = self.place_slopes, self.level_slopes
         return replace(
             self,
             uu=self.uu[points],
             uy=self.uy[points],
             level=self.level[points],
-            level_slopes=None if slopes is None else slopes[points],
-            place_slopes=None if place is None else place[:, points],
+            level_slopes=None if level_slopes is None else level_slopes[points],
+            place_slopes=None if position_slopes is None else position_slopes[:, points],
             turning=None if self.turning is None else self.turning[points],
             pickup=None if self.pickup is None else self.pickup[points],
         )
@@ -389,10 +389,10 @@ class FrfProducts:
 
     def scaled(self, factor: Floats) -> Self:
         """Of levels so many times as large (points,)."""
-        by = factor[:, None]
-        slopes = None if self.level_slopes is None else self.level_slopes * by[..., None]
-        place = None if self.place_slopes is None else self.place_slopes * by
-        return replace(self, level=self.level * by, level_slopes=slopes, place_slopes=place)
+        column = factor[:, None]
+        level_slopes = None if self.level_slopes is None else self.level_slopes * column[..., None]
+        position_slopes = None if self.place_slopes is None else self.place_slopes * column
+        return replace(self, level=self.level * column, level_slopes=level_slopes, place_slopes=position_slopes)
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""

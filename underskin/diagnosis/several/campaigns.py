@@ -21,8 +21,8 @@ from underskin.diagnosis.several.sensors import (
     CampaignDates,
     SensorsOfCampaign,
     Values,
-    changes,
     corrected,
+    d33_changes,
     date_of,
     in_order,
     sensors_of,
@@ -110,7 +110,7 @@ def _with_changed_sensors(
 ) -> list[DiagnosisResult]:
     """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
     apart = [_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = changes(apart, alone, [0.0] * len(apart), np.arange(len(apart), dtype=float))
+    single = d33_changes(apart, alone, [0.0] * len(apart), np.arange(len(apart), dtype=float))
     again = []
     for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
         as_before = corrected(campaign, single, number)

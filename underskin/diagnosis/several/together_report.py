@@ -24,12 +24,12 @@ from underskin.diagnosis.reporting.statements import StatedD33, listed
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE
 from underskin.diagnosis.several.course import (
     Candidate,
-    Course,
-    Courses,
+    SetHistories,
+    SetHistory,
     Shared,
     combined,
-    courses,
     same_strength,
+    set_histories,
     values,
 )
 from underskin.diagnosis.several.sensors import (
@@ -41,11 +41,11 @@ from underskin.diagnosis.several.sensors import (
     array_over_dates,
     causes,
     changed_once,
-    changes,
+    d33_changes,
+    mark_exchanges,
     per_sensor,
     sensors_of,
     unsure_of_changes,
-    with_exchanges,
 )
 from underskin.diagnosis.several.sensors import findings as exchanges
 from underskin.findings.codes import FindingCode
@@ -304,8 +304,8 @@ def together_report(
         if result.problem is not None and result.search is not None
     ]
     names = dated.names
-    found = courses(candidates, min(candidate.search.supported for candidate in candidates))
-    undescribed = [candidate.undescribed for candidate in candidates]
+    found = set_histories(candidates, min(candidate.search.supported for candidate in candidates))
+    undescribed = [candidate.unlisted_probability for candidate in candidates]
     described = (1 - P_NOT_IN_MODEL_SPACE) * float(np.prod([1 - share for share in undescribed]))
     leader = found.best[0]
     strengths = _strengths(candidates, leader)
@@ -316,8 +316,8 @@ def together_report(
         for place, number in enumerate(usable)
     ]
     unsure = unsure_of_changes(candidates, leader)
-    single = changes(sensors, [alone[number] for number in usable], unsure, dated.times)
-    changed = [_with_causes(change, candidates, leader) for change in with_exchanges(single, sensors)]
+    single = d33_changes(sensors, [alone[number] for number in usable], unsure, dated.times)
+    changed = [_with_causes(change, candidates, leader) for change in mark_exchanges(single, sensors)]
     over = array_over_dates(sensors, unsure, dated.times)
     if over is not None:
         over = replace(over, change=_with_causes(over.change, candidates, leader))
@@ -381,7 +381,7 @@ def together_report(
     }
 
 
-def _with_causes(change: Change, candidates: Sequence[Candidate], leader: Course) -> Change:
+def _with_causes(change: Change, candidates: Sequence[Candidate], leader: SetHistory) -> Change:
     """With the mechanisms that would make it, of a change of the array."""
     if change.sensor is not None:
         return change
@@ -403,7 +403,7 @@ def _of_array(over: ArrayOverDates | None, names: Sequence[str]) -> dict[str, An
     }
 
 
-def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str, dict[str, float]]]:
+def _strengths(candidates: Sequence[Candidate], leader: SetHistory) -> list[dict[str, dict[str, float]]]:
     """Of each campaign the parameters of its mechanisms, from all campaigns in which they have that strength."""
     found: list[dict[str, dict[str, float]]] = [{} for _ in candidates]
     for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
@@ -415,7 +415,7 @@ def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str
     return found
 
 
-def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> list[dict[int, Shared]]:
+def _runs(candidates: Sequence[Candidate], leader: SetHistory, mechanism: str) -> list[dict[int, Shared]]:
     """The campaigns in which a mechanism acts, by number, those together in which it has the same strength."""
     runs: list[dict[int, Shared]] = []
     for number, (candidate, own) in enumerate(zip(candidates, leader.sets, strict=True)):
@@ -430,7 +430,7 @@ def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> li
     return runs
 
 
-def _verdict(leader: Course, described: float, undescribed: Sequence[float], changed: Sequence[Change]) -> str:
+def _verdict(leader: SetHistory, described: float, undescribed: Sequence[float], changed: Sequence[Change]) -> str:
     if max(undescribed) > 0.5:
         return "unexplained"
     if leader.probability * described < EXPLAINED:
@@ -439,7 +439,7 @@ def _verdict(leader: Course, described: float, undescribed: Sequence[float], cha
 
 
 def _mechanisms(
-    candidates: Sequence[Candidate], found: Courses, leader: Course, dated: CampaignDates
+    candidates: Sequence[Candidate], found: SetHistories, leader: SetHistory, dated: CampaignDates
 ) -> list[dict[str, Any]]:
     entries = []
     for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
@@ -521,7 +521,7 @@ def _groups(changed: Sequence[Change]) -> list[dict[str, Any]]:
     ]
 
 
-def _presence(found: Courses, described: float) -> list[dict[str, Any]]:
+def _presence(found: SetHistories, described: float) -> list[dict[str, Any]]:
     """The posterior that each mechanism acts in at least one campaign."""
     once: dict[str, float] = {}
     for course in found.best:
@@ -533,7 +533,7 @@ def _presence(found: Courses, described: float) -> list[dict[str, Any]]:
     ]
 
 
-def _alternative(course: Course, described: float, names: Sequence[str]) -> dict[str, Any]:
+def _alternative(course: SetHistory, described: float, names: Sequence[str]) -> dict[str, Any]:
     sets = list(dict.fromkeys(name for own in course.sets for name in own)) or [NOTHING_MISSING]
     each = "; ".join(
         f"{name}: {in_words(own or (NOTHING_MISSING,))}" for name, own in zip(names, course.sets, strict=True)
@@ -544,7 +544,7 @@ def _alternative(course: Course, described: float, names: Sequence[str]) -> dict
 def _statement(
     verdict: str,
     probability: float,
-    leader: Course,
+    leader: SetHistory,
     undescribed: Sequence[float],
     mechanisms: Sequence[dict[str, Any]],
     dated: CampaignDates,
