@@ -1,14 +1,8 @@
-"""Compiled sums over the lines of FRFs.
+"""Compiled sums over rows: the likelihood of the roughness of lines, products of dynamic factors with their
+derivatives, corrections of sums for mains pick-up, and the evidence of laws with several amplitudes.
 
-How probable the roughness of lines is under their noise, and what each line's variance does to it.
-Products of what a dynamic factor is on each line with its derivatives, for the sums of `products`.
-
-What sums over rows lose to mains pick-up, at many sets of noise levels.
-
-A row of variance κ² d² has κ² d² + q² with pick-up, so that its weight 1/d² in the sums (over κ²) becomes
+A row of variance κ² d² has κ² d² + q² with pick-up: its weight 1/d² in the sums (over κ²) becomes
 1/d² · 1/(1 + x), x = (q/κ)²/d², and log|C| grows by 2 log(1 + x).
-
-What laws of several amplitudes gain, from their features' moments.
 """
 
 import numpy as np
@@ -17,7 +11,7 @@ from numpy.typing import NDArray
 from underskin.compiled import compiled
 from underskin.units import Array, Complexes, Floats, Indices
 
-_VARIANCES_TOGETHER = 4  # factors, of 1e-70 to 1e70 each, whose logarithm is taken of their product
+_VARIANCES_TOGETHER = 4  # factors, of 1e-70 to 1e70 each, that share one logarithm
 
 
 @compiled("float64(float64[::1], int64[::1], float64[::1], float64[::1], float64, float64[::1])")
@@ -31,7 +25,7 @@ def roughness_cost(
     variance
         d² (rows,).
     middle, share, rough
-        The rows j that are compared with their neighbours, λ, and half the square of what they are off.
+        The rows j that are compared with their neighbours, λ, and half the square of their deviations.
     freedom
         ν.
     by_variance
@@ -65,7 +59,7 @@ def line_products(values: Array, products: Floats, real: Floats, imag: Floats) -
 
     Parameters
     ----------
-    each
+    values
         The functions (points, functions, lines).
     products
         (points, pairs, lines) the pairs in the order of the upper triangle, to be filled.
@@ -90,19 +84,19 @@ def line_products(values: Array, products: Floats, real: Floats, imag: Floats) -
 
 @compiled(f"void({_THREE}, {_THREE}, int64[::1], {_THREE}, {_THREE}, {_FOUR})")
 def spread_sums(both: Floats, with_y: Floats, moving: NDArray[np.int64], uv: Floats, vy: Floats, vv: Floats) -> None:
-    """The sums with derivatives at the places of their parameters.
+    """Place the sums with derivatives at the indices of their parameters.
 
     Parameters
     ----------
     both
         (points, pairs, recordings) of u and its derivatives, the pairs in the order of the upper triangle.
     with_y
-        (points, 1 + derivatives, recordings) of each with what was measured.
+        (points, 1 + derivatives, recordings) of each with the measured values.
     moving
         (derivatives,) the parameters that they are by.
     uv, vy, vv
-        (points, recordings, parameters), twice, and (points, recordings, parameters, parameters), of which what differs
-        from 0 is filled.
+        (points, recordings, parameters), twice, and (points, recordings, parameters, parameters), of which the elements
+        that differ from 0 are filled.
     """
     points, _, recordings = both.shape
     count = len(moving)
@@ -124,14 +118,14 @@ def spread_sums(both: Floats, with_y: Floats, moving: NDArray[np.int64], uv: Flo
 _ROWS_TOGETHER = (
     8  # factors of the determinant whose logarithm is taken together: below 1e38 each, they do not overflow
 )
-_NONE = 1e-17  # of x, below which a row loses nothing that its sum could tell
+_NONE = 1e-17  # of x: smaller losses are below the sum's rounding
 _SUMS = "float64[:, :, ::1]"
 _ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
 
 
 @compiled()
 def _subtract_losses(losses: Floats, uu: Floats, uy: Floats, yy: Floats, point: int, recording: int) -> None:
-    """Take what a recording's rows lose (3, sets) from its sums, and begin anew."""
+    """Subtract the losses (3, sets) of a recording's rows from its sums, and reset them."""
     for number in range(losses.shape[1]):
         uu[point, number, recording] -= losses[0, number]
         uy[point, number, recording] -= losses[1, number]
@@ -153,15 +147,15 @@ def subtract_pickup(
     yy: Floats,
     log_determinant: Floats,
 ) -> None:
-    """Take from `uu`, `uy` and `yy` (points, sets, recordings) what rows lose, x/(1 + x)/d² of each, and add 2 log(1 +
-    x) to `log_determinant` (points, sets).
+    """Subtract each row's loss x/(1 + x)/d² from `uu`, `uy` and `yy` (points, sets, recordings), and add 2 log(1 + x)
+    to `log_determinant` (points, sets).
 
     Parameters
     ----------
     pickup
         (q/κ)² (points, distinct, sets).
     alike, precision, recording, y, line
-        Of each row: which of the distinct q it has, 1/d², the recording, the measured value and the line.
+        Of each row: the index of its distinct q, 1/d², the recording, the measured value and the line.
     u
         The direction (points, lines).
     """
@@ -218,14 +212,14 @@ def subtract_pickup_slopes(
     vy: Floats,
     vv: Floats,
 ) -> None:
-    """Take from `uv`, `vy` (points, recordings, P) and `vv` (points, recordings, P, P) what rows lose.
+    """Subtract the rows' losses from `uv`, `vy` (points, recordings, P) and `vv` (points, recordings, P, P).
 
     Parameters
     ----------
     pickup
         (q/κ)² (points, distinct).
     alike, precision, recording, y, line
-        See `lost`.
+        See `subtract_pickup`.
     u, v
         The direction (points, lines), and its derivatives (points, P, lines).
     """
@@ -303,14 +297,14 @@ def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) ->
 
 @compiled("void(float64[:, ::1], int64[::1], int64[::1], float64[:, ::1], float64[:, :, :, ::1])")
 def less_shared(weights: Floats, rows: Indices, first: Indices, columns: Floats, grams: Floats) -> None:
-    """Take Σ sₙ sₙᵀ off products of columns, sₙ = Σ w x over the n-th sensor's recordings.
+    """Subtract Σ sₙ sₙᵀ from products of columns, sₙ = Σ w x over the n-th sensor's recordings.
 
     Parameters
     ----------
     weights
-        w at each scatter (scatters, pairs), the pairs of a sensor one after another.
+        w at each scatter (scatters, pairs), the pairs of a sensor contiguous.
     rows, first
-        The row of `columns` of each pair, and where the pairs of each sensor begin (sensors + 1,).
+        The row of `columns` of each pair, and the first pair of each sensor (sensors + 1,).
     columns
         x (rows, sets · features).
     grams

@@ -1,15 +1,9 @@
-"""Compiled: the likelihood of predictions, its gradient and information, and steps of noise levels.
+"""Compiled parts of the fit (see `hypothesis` for the model of the noise): likelihood, priors, steps of noise levels
+and normal equations.
 
-Compiled: how probable recordings are under predictions (see `hypothesis`), and priors, at many sets of noise levels.
-
-Arrays are (points, sets, recordings) where an axis may be 1 and then stands for all.
-
-Compiled: Newton steps of noise levels towards the least cost, each parameter on its own, at fixed predictions.
-
-Compiled: information on the mean parameters, and the gradient of the log likelihood (see `hypothesis`).
-
-With the direction u of a recording and J its derivatives, C⁻¹ is taken apart by Sherman and Morrison's identity, first
-for each recording, then for the sensors' columns.
+Arrays are (points, sets, recordings); an axis of length 1 stands for all. The inverse of the covariance is applied by
+Sherman and Morrison's identity, first for each recording, with its direction u and the derivatives J of its
+prediction, then for the sensors' columns.
 """
 
 import numpy as np
@@ -18,7 +12,7 @@ from numpy.typing import NDArray
 from underskin.compiled import compiled
 from underskin.units import Array, Floats, Mask
 
-_TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+_TOGETHER = 8  # factors of a determinant that share one logarithm: below 1e38 each, they do not overflow
 _NONE = 1e-300  # u*u where u is 0
 
 
@@ -40,7 +34,8 @@ def log_likelihood(
     """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten.
 
     With V = s'² a² + p² |t|² a recording's χ² is |y|² + ((Re u*r)²/(1 + V u*u) − (Re u*y)²)/u*u, the square completed
-    along u: |r|² less what V takes out would be rounding alone where a model predicts far more than was measured.
+    along u: |r|² minus what V takes out would cancel to rounding error where a model predicts far more than was
+    measured.
     """
     gain2, k2, p2, tau2 = noise[0] ** 2, noise[1] ** 2, noise[2] ** 2, noise[3] ** 2
     mm[:], mr[:] = 0.0, 0.0
@@ -94,7 +89,7 @@ def log_likelihoods(
     noise: Floats,
     totals: Floats,
 ) -> None:
-    """−½ of what noise levels make of χ² and log|C|: added to `totals` (points, sets).
+    """Add −½ of the terms of χ² and log|C| that depend on the noise levels to `totals` (points, sets).
 
     Parameters
     ----------
@@ -102,14 +97,14 @@ def log_likelihoods(
         (points, recordings).
     uu, uy, yy
         The sums Re u*u, Re u*y and |y|².
-    place
-        (points, recordings) |t|² of the position's slopes, (points, 0) where there are none.
+    squared_slopes
+        (points, recordings) |t|² of the position slopes, (points, 0) without positioning scatter.
     sensor
         (recordings,).
-    bend
+    sensor_log_gain
         (points, sensors).
     laplacian, square
-        (recordings,) of σ over the place, relative to it.
+        (recordings,) of σ over the contact's position, relative to σ.
     noise
         (points, sets, 4): gain, level, position and spread.
     """
@@ -162,12 +157,12 @@ def log_priors(
     plateaus: Floats,
     totals: Floats,
 ) -> None:
-    """The logarithms of the prior densities, added to `totals` (points, sets).
+    """Add the log prior densities to `totals` (points, sets).
 
     Of the coordinates `fit` (points, parameters) that are free in each point's hypothesis a normal or uniform density
     within bounds, or one of Student's t with so many degrees of `freedom`, where these are finite; of the covariance's
-    coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the logarithm
-    of the area (parameters, 5).
+    coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the log of the
+    area (parameters, 5).
     """
     for point in range(len(fit)):
         hypothesis = owner[point]
@@ -186,7 +181,11 @@ def log_priors(
 
 STEP = 0.05  # of the finite differences in the covariance's logarithms
 LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
-TRIES, SHORTER, LEAST_GAIN = 4, 4.0, 1e-3  # of a step that may gain nothing; gain that ends the steps
+TRIES, SHORTER, LEAST_GAIN = (
+    4,
+    4.0,
+    1e-3,
+)  # tries of a step without gain, its shortening, and the gain that ends the steps
 
 
 @compiled()
@@ -197,8 +196,9 @@ def _cost(
     sums: tuple[Floats, Floats],
     constants: tuple[float, float, bool, Floats],
 ) -> float:
-    """The cost with covariance parameters (parameters,), up to what no noise level changes; `noise` and `sums` are
-    overwritten."""
+    """The cost with covariance parameters (parameters,), up to terms without noise levels; `noise` and `sums` are
+    overwritten.
+    """
     about_means, numbers, has_position_scatter, plateaus = constants
     noise[0], noise[1] = np.exp(covariance[0]), np.exp(covariance[1])
     if has_position_scatter:
@@ -209,7 +209,7 @@ def _cost(
 
 @compiled()
 def _move_within_bounds(here: Floats, step: Floats, lowest: Floats, highest: Floats, moved: Floats) -> None:
-    """`moved` becomes where a step from here leads, within the bounds (parameters,)."""
+    """Set `moved` to `here` + `step`, clipped to the bounds (parameters,)."""
     for parameter in range(len(here)):
         moved[parameter] = min(max(here[parameter] + step[parameter], lowest[parameter]), highest[parameter])
 
@@ -226,7 +226,7 @@ def _newton_step(
     constants: tuple[float, float, bool, Floats],
     step: Floats,
 ) -> None:
-    """`step` becomes that of each parameter on its own, by central differences; 0 where it would leave the bounds."""
+    """Set `step` to each parameter's own Newton step, by central differences; 0 where it would leave the bounds."""
     centre = np.empty(len(here))
     _move_within_bounds(
         here, 0 * here, lowest + 2 * STEP, highest - 2 * STEP, centre
@@ -277,25 +277,25 @@ def update_noise_levels(
     covariance: Floats,
     cost: Floats,
 ) -> None:
-    """Newton steps of gain, level and, where `has_position_scatter`, position scatter, each on its own: `covariance`
-    (points, parameters) and `cost` (points,) are overwritten with where they end.
+    """Newton steps of gain, level and, if `has_position_scatter`, position scatter, each on its own: `covariance`
+    (points, parameters) and `cost` (points,) are overwritten with the results.
 
     Parameters
     ----------
-    level, uu, uy, place
+    level, uu, uy, squared_slopes
         (points, recordings); `squared_slopes` may be (points, 0).
     yy, sensor, laplacian, square
         (recordings,).
-    bend
+    sensor_log_gain
         (points, sensors).
     about_means, numbers
-        What lines scatter about their recordings' means, and how many numbers all lines are.
+        Sum of squares of lines about their recordings' means, and how many real numbers all lines are.
     spread
         Of the sensors' gains.
     plateaus, lowest, highest
         Prior (parameters, 5) and bounds (parameters,).
     steps, held
-        Steps at most, and the parameter that stays; -1 for none.
+        Most steps, and the index of the parameter that is fixed; -1 for none.
     """
     count = covariance.shape[1]
     noise, step, tried = np.zeros(4), np.empty(count), np.empty(count)
@@ -335,7 +335,7 @@ def update_noise_levels(
         cost[point] += best - initial_cost
 
 
-_FROM_SLOPES = 1e-3  # m: a recording whose response changes by more than itself over this way is led by its slopes
+_FROM_SLOPES = 1e-3  # m: the slopes dominate where the response changes by more than itself over this distance
 _OF_PARAMETERS, _OF_PAIRS = "float64[:, :, ::1]", "float64[:, :, :, ::1]"
 
 
@@ -356,7 +356,7 @@ def _fill_terms(
     levels: Floats,
     terms: Floats,
 ) -> None:
-    """What each recording's scatter makes of it: `terms` (recordings, 8), with V = s'² a² + p² |t|²."""
+    """Fill `terms` (recordings, 8) with each recording's scatter, V = s'² a² + p² |t|²."""
     gain2, k2, p2, _ = levels
     for r in range(len(level)):
         log_gain = sensor_log_gain[sensor[r]]
@@ -382,7 +382,7 @@ def _shrink(terms: Floats) -> float:
 def _project_derivatives(
     level_slopes: Floats, uv: Floats, vy: Floats, inverse: float, terms: Floats, uj: Floats, jr: Floats
 ) -> None:
-    """Re u*J and, with a recording's own scatter taken out, Re J*r, both over κ² (recordings, P)."""
+    """Re u*J and, with each recording's own scatter taken out, Re J*r, both over κ² (recordings, P)."""
     leveled, turned = level_slopes.shape[1] > 0, uv.shape[1] > 0
     for r in range(len(terms)):
         row = terms[r]
@@ -427,7 +427,7 @@ def _sum_over_sensors(
 def _add_information(
     level_slopes: Floats, uv: Floats, vv: Floats, inverse: float, terms: Floats, uj: Floats, information: Floats
 ) -> None:
-    """Add Jᵀ C⁻¹ J, without the sensors' columns, to the lower half."""
+    """Add Jᵀ C⁻¹ J, without the sensors' columns, to the lower half of `information`."""
     leveled, turned = level_slopes.shape[1] > 0, uv.shape[1] > 0
     for r in range(len(terms)):
         row = terms[r]
@@ -454,7 +454,8 @@ def _add_mean_gradient(
     jr_sensor: Floats,
     slope: Floats,
 ) -> None:
-    """Add the gradient by the mean and by what follows the model in a recording, the sensors' columns in C as well."""
+    """Add the gradient by the mean and by the columns of C that follow it in each recording, with the sensors' columns
+    in C."""
     jr_sensor[:] = 0.0
     for r in range(len(terms)):
         row, sensor_index = terms[r], sensor[r]
@@ -482,7 +483,7 @@ def _add_position_gradient(
     of_sensors: Floats,
     slope: Floats,
 ) -> None:
-    """Add the gradient by the column that the position's slopes are."""
+    """Add the gradient by the column of the position slopes."""
     for r in range(len(terms)):
         row = terms[r]
         _, _, shrink, gain = of_sensors[sensor[r]]
@@ -536,10 +537,10 @@ def normal_equations(
     uu, uy, uv, vy, vv
         The sums Re u*u, Re u*y (points, recordings), with the derivatives v of u Re u*v, Re v*y (points, recordings,
         P) and Re v*v (points, recordings, P, P), or P = 0 where u does not change.
-    place, growth
-        |t|² of the position's slopes (points, recordings), or (points, 0) where there are none, and ∂ log |t|²/∂θ
-        (points, recordings, P), NaN where t is taken to change as L does, or where it leads, not at all; or P = 0.
-    sensor, bend, laplacian, square
+    squared_slopes, log_slope_gradient
+        |t|² of the position slopes (points, recordings), or (points, 0) without positioning scatter, and ∂ log |t|²/∂θ
+        (points, recordings, P); NaN where t is taken to change as L does, or not at all where t dominates; or P = 0.
+    sensor, sensor_log_gain, laplacian, square
         See `log_likelihoods`.
     noise
         (points, 4): gain, level, position and spread.

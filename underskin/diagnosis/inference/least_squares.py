@@ -1,10 +1,10 @@
-"""Curves fitted by least squares, where fits begin: residuals in units of a law's usual error, with the parameters'
-priors, a gain of each recording, and the zero and drift of its cell taken out (variable projection).
+"""Least-squares fits of curves: starting points of the fit, and plain least squares for comparison.
 
-Scipy's trust-region reflective algorithm finds from far away what steps on the whole likelihood, whose covariance moves
-with the fit, do not. Where a sphere snaps in, the force jumps at the contact point, and no slope leads past a sample
-there: contact points begin where a snap-in is seen, and the curve is fitted again between those samples where it fits
-best.
+The residuals are in units of a law's usual error, with the parameters' priors, a gain of each recording, and zero and
+drift of its cell taken out (variable projection). Scipy's trust-region reflective algorithm converges from far away,
+where steps on the likelihood, whose covariance depends on the model, do not. With adhesion the force jumps at the
+contact point, and no derivative leads past a sample there: contact points start where a snap-in is seen, and the curve
+is fitted again between the samples where it fits best.
 """
 
 from collections.abc import Callable
@@ -22,16 +22,20 @@ from underskin.recordings.curve_course import course, touch
 from underskin.units import Floats, Mask
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
-_TOLERANCE, _OF_STARTS, _EVALUATIONS = 1e-4, 1e-3, 40  # of the sum of squares; the likelihood goes on from starts
+_TOLERANCE, _OF_STARTS, _EVALUATIONS = (
+    1e-4,
+    1e-3,
+    40,
+)  # of the sum of squares, the same for starting points, and most evaluations
 _STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far wider than a snap-in is deep
-_PASSED = 4  # samples at most, either way, past which a contact point is moved
+_PASSED = 4  # most samples, either way, that a contact point is moved past
 _RETURN = 0.5  # of the range of displacement: a way back that may end a contact
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
-_SAME = 1e-9  # of the range of displacement: what rounding alone tells apart
+_SAME = 1e-9  # of the range of displacement: smaller differences are rounding
 
 
 class LeastSquares:
-    """Of one hypothesis of curves."""
+    """Least-squares fits of one hypothesis of curves."""
 
     def __init__(self, hypothesis: Hypothesis) -> None:
         """Prepare the measured samples and the projections."""
@@ -67,17 +71,17 @@ class LeastSquares:
         for index, interval in zip(self._model.contact_points.tolist(), self._snap_in_intervals, strict=False):
             if interval is not None and low[index] < interval[0] < interval[2] < high[index]:
                 low[index], initial[index], high[index] = interval
-        if self._visible_contact is not None:  # while the parameters are far off, contact is where the jumps show it
+        if self._visible_contact is not None:  # first with the contact fixed to where the jumps show it
             initial, _ = self._minimised(initial, low, high, self._visible_contact)
         x, cost = self._minimised(initial, low, high)
         if self._has_jumps:
             other, less = self._minimised(*self._between_samples(x))
             x, cost = (other, less) if less < cost else (x, cost)
-        return np.clip(x[: len(start)], self._low, self._high), cost  # which rounding may pass
+        return np.clip(x[: len(start)], self._low, self._high), cost  # rounding may exceed the bounds
 
     def _between_samples(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Fit coordinates and gains with each contact point amid those two samples of the approach, near where it is,
-        between which its curve fits best; and bounds that keep it there."""
+        """Fit coordinates and gains with each contact point in the interval of the approach, near its present one,
+        where its curve fits best; and bounds that keep it there."""
         count, indices = len(self._low), self._model.contact_points
         lower, upper = (np.empty((2 * _PASSED + 1, len(indices))) for _ in range(2))
         for curve, travel in enumerate(self._approach):
@@ -85,7 +89,7 @@ class LeastSquares:
             cells = np.clip(first + np.arange(len(lower)), 0, max(len(travel) - 2, 0))
             lower[:, curve], upper[:, curve] = travel[cells], travel[np.minimum(cells + 1, len(travel) - 1)]
         lower, upper = (np.clip(edge, self._low[indices], self._high[indices]) for edge in (lower, upper))
-        shut = lower >= upper  # gaps beyond the contact point's bounds, which then stay as they are
+        shut = lower >= upper  # intervals outside the contact point's bounds: these are kept
         lower, upper = np.where(shut, self._low[indices], lower), np.where(shut, self._high[indices], upper)
         fits = np.tile(x[:count], (len(lower), 1))
         fits[:, indices] = (lower + upper) / 2
@@ -98,7 +102,7 @@ class LeastSquares:
         return moved, low, high
 
     def _minimised(self, start: Floats, low: Floats, high: Floats, held: Mask | None = None) -> tuple[Floats, float]:
-        """Fit coordinates and gains from a start, and half the sum of squares there; `held` are in contact."""
+        """Fit coordinates and gains from a start, and half the sum of squares there; samples `held` are in contact."""
         count = len(low)
         gains = np.full(len(start) - count, 0.5)
         margin = _INSIDE * (high - low)
@@ -126,7 +130,7 @@ class LeastSquares:
         return np.concatenate([rows, priors])
 
     def _projected(self, rows: Floats) -> Floats:
-        """Rows (…, rows) less what zero and drift of each cell take of them, and the coefficients of these."""
+        """Rows (…, rows) minus their projection on zero and drift of each cell, and the coefficients of these."""
         parts, coefficients = [], []
         for span, (columns, solved) in zip(self._spans, self._cell_projections, strict=True):
             coefficients.append(rows[..., span] @ solved.T)
@@ -135,14 +139,14 @@ class LeastSquares:
 
 
 def _distinct(travel: Floats) -> Floats:
-    """The displacements in order, without those that rounding alone tells apart."""
+    """The distinct displacements in order, to within rounding."""
     values = np.unique(travel)
     return values[np.append(True, np.diff(values) > _SAME * np.ptp(values))]
 
 
 def _snap_in_interval(curve: CurveConditions) -> tuple[float, float, float] | None:
-    """Between which displacements a curve snaps into contact, and about where between them [mm]; None where no snap-in
-    is seen."""
+    """The displacements [mm] of the samples before and after a snap-in, with the estimated contact point as the middle
+    one; None where no snap-in is seen."""
     seen = course(curve.displacement_mm, curve.force_n, curve.time_s) if isinstance(curve, CurveRecording) else None
     if seen is None or not seen.snap_in:
         return None
@@ -164,8 +168,8 @@ def _visible_contact(curve: CurveConditions) -> Mask | None:
 
 
 def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, float]:
-    """The fit (parameters,) of the law by plain least squares, and the root mean square that it leaves of all raw
-    samples [% of the force's own].
+    """The fit (parameters,) of the law by plain least squares, and the root mean square residual of all raw samples
+    [% of the force's own].
 
     Without priors and gains: the parameters and a zero of each curve are free, and its drift where that is plain in the
     air. From a start (parameters,).
@@ -202,8 +206,8 @@ def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, 
 
 
 def least_squares_reading(lines: Lines, force: Floats) -> Floats:
-    """What the cells show of a force (rows,) [N] by plain least squares: with the zero that leaves least of each curve,
-    and its drift where that is plain in the air."""
+    """The cells' readings of a force (rows,) [N] by plain least squares: with the best zero of each curve, and its
+    drift where that is plain in the air."""
     assert lines.smooth is not None
     root, measured = np.sqrt(lines.smooth.count), lines.value.real
     reading = force.copy()
@@ -215,8 +219,8 @@ def least_squares_reading(lines: Lines, force: Floats) -> Floats:
 
 
 def _cell_columns(columns: Floats, root: Floats, force: Floats) -> Floats:
-    """An orthonormal basis (rows, 1 or 2) of the zero of one curve and, where more of it than usual is expected, its
-    drift in time; `root` are the roots of the rows' weights."""
+    """An orthonormal basis (rows, 1 or 2) of the zero of one curve and, where more than usual is expected, its drift in
+    time; `root` are the square roots of the rows' weights."""
     time = columns[:, 1]
     plain = float(np.abs(time).max()) > 1.001 * USUAL_DRIFT * float(np.abs(force).max())
     return np.asarray(
@@ -225,7 +229,7 @@ def _cell_columns(columns: Floats, root: Floats, force: Floats) -> Floats:
 
 
 def _units(model: CurveModel, precision: Floats) -> Floats:
-    """Of the fit coordinates (parameters,): of contact points their prior's deviation, else 1."""
+    """Scales of the fit coordinates (parameters,): the prior's deviation of contact points, else 1."""
     units = np.ones(len(precision))
     units[model.contact_points] = 1 / precision[model.contact_points]
     return units
@@ -241,8 +245,8 @@ def _solved(
 ) -> tuple[Floats, float]:
     """The solution and half the sum of squares there.
 
-    Coordinates are shifted to the start and scaled by `unit`, so that the tolerance on steps does not depend on where
-    the displacement has its zero.
+    Coordinates are shifted to the start and scaled by `unit`, so that the tolerance on steps does not depend on the
+    zero of the displacement.
     """
     low, high = bounds
 

@@ -1,10 +1,10 @@
-"""All inner products over rows that the likelihood of predictions needs, at several points of the fit coordinates.
+"""Inner products over rows for the likelihood of predictions, at several points of the fit coordinates.
 
-A prediction is m = L u in each recording: of FRFs L is the level, which is real, and u the dynamics' factor line by
-line, 1 where there are none; of curves L = 1 and u is the force, turned such that samples are independent. With 1/d² as
-the weight of rows (of curves what whitening makes of it), the sums of each recording are Re u*u, Re u*y and |y|², and
-with the derivatives v of u, Re u*v, Re v*y and Re v*v. Arrays are (points, recordings, …). Rows that mains pick-up
-reaches weigh less, the more of it there is, and sums over rows lose as much.
+A prediction is m = L u in each recording: of FRFs L is the level, which is real, and u the factor of the dynamics on
+each line, 1 without dynamics; of curves L = 1 and u is the force, transformed so that samples are independent. With
+1/d² as the weight of rows (of curves the weight of the whitening), the sums of each recording are Re u*u, Re u*y and
+|y|², and with the derivatives v of u, Re u*v, Re v*y and Re v*v. Arrays are (points, recordings, …). Rows with mains
+pick-up weigh less, and the sums are corrected for it.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from underskin.weak_cache import cached_while_alive
 
 @dataclass(frozen=True)
 class Sums:
-    """Re u*u, Re u*y and |y|² of each recording, and what the noise levels add to the log of the determinant.
+    """Re u*u, Re u*y and |y|² of each recording, and the noise levels' contribution to log|C|.
 
     Of FRFs |y|² is that of each recording's mean: the rest is the same in all models (`Lines.about_means`).
     """
@@ -55,14 +55,14 @@ class SlopeSums:
 
 
 class PickupRows:
-    """Of all rows of the lines, those that pick-up reaches, in order of recordings.
+    """The rows that mains pick-up reaches, in order of recordings.
 
-    Attributes: `lines`, which of a model's distinct lines they are on; `line`, which of these each row is on; `every`,
-    the rows themselves.
+    Attributes: `lines`, which of a model's distinct lines they are on; `line`, the index of each row's line among
+    these; `row_numbers`, the indices of the rows.
     """
 
     def __init__(self, lines: Lines, pickup: Pickup, design: FrfDesign) -> None:
-        """The design says which distinct line each row of all is."""
+        """`design` gives the distinct line of each row."""
         rows = pickup.rows
         self._precision = lines.deviation[rows] ** -2.0
         self._value = contiguous(lines.value[rows])
@@ -74,8 +74,8 @@ class PickupRows:
         self.row_numbers: Indices = np.arange(len(rows))
 
     def without_pickup(self, sums: Sums, line: Indices, u: Array, pickup: Floats, level: Floats) -> Sums:
-        """The sums less what rows lose to pick-up of these distinct deviations (points, sets, distinct), at the
-        directions u (points, lines) of the rows on these lines (rows,)."""
+        """The sums corrected for pick-up of these distinct deviations (points, sets, distinct), at the directions u
+        (points, lines) of the rows on these lines (rows,)."""
         from underskin.diagnosis.kernels import subtract_pickup
 
         shape = *level.shape[:2], self._recordings
@@ -89,8 +89,8 @@ class PickupRows:
     def slopes_without_pickup(
         self, sums: SlopeSums, line: Indices, u: Array, v: Array, pickup: Floats, level: Floats
     ) -> SlopeSums:
-        """The sums with derivatives v (points, parameters, lines) less what rows lose, likewise; deviations are
-        (points, distinct), levels (points,)."""
+        """The sums with derivatives v (points, parameters, lines), corrected likewise; deviations are (points,
+        distinct), levels (points,)."""
         from underskin.diagnosis.kernels import subtract_pickup_slopes
 
         square = contiguous((pickup / level[:, None]) ** 2)
@@ -101,17 +101,17 @@ class PickupRows:
         return SlopeSums(uv, vy, vv)
 
 
-@cached_while_alive  # a diagnosis weighs dozens of models of one design
+@cached_while_alive  # a diagnosis evaluates dozens of models of one design
 def pickup_rows(lines: Lines, pickup: Pickup, design: FrfDesign) -> PickupRows:
-    """Those of these lines that a pick-up reaches, for models of this design."""
+    """The rows of these lines that a pick-up reaches, for models of this design."""
     return PickupRows(lines, pickup, design)
 
 
 class CurveLines:
-    """The measured samples of curves, turned to where their covariance is diagonal."""
+    """The measured samples of curves, transformed so that their covariance is diagonal."""
 
     def __init__(self, lines: Lines) -> None:
-        """Turn them; needs the lines' smooth error."""
+        """Transform them; the lines must have a smooth error."""
         assert lines.whitening is not None
         self.whitening = lines.whitening
         self.first = lines.first
@@ -125,7 +125,7 @@ class CurveLines:
 
 @dataclass(frozen=True)
 class CurveProducts:
-    """Of curves: forces (points, samples) and derivatives (points, parameters, samples) on turned samples."""
+    """Of curves: forces (points, samples) and derivatives (points, parameters, samples) on transformed samples."""
 
     lines: CurveLines
     force: Floats
@@ -189,7 +189,7 @@ class CurveProducts:
 
 
 class _WoodburyProducts:
-    """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity; what P takes out of them."""
+    """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity."""
 
     def __init__(self, lines: CurveLines, levels: SeveralLevels) -> None:
         """At noise levels (points, sets, 1)."""
@@ -208,12 +208,12 @@ class _WoodburyProducts:
         self.log_determinant = lines.whitening.log_determinant(ratio) + log.sum(axis=-1, keepdims=True)
 
     def projections(self, rows: Floats) -> Floats:
-        """Pᵀ times turned rows (points, sets, rows): (points, sets, recordings, columns)."""
+        """Pᵀ times transformed rows (points, sets, rows): (points, sets, recordings, columns)."""
         weighed = (self.weight * rows)[..., None, :] * self._lines.columns
         return np.moveaxis(self._lines.sums(weighed), -2, -1)
 
     def squares(self, rows: Floats, by_rows: Floats) -> Floats:
-        """Of turned rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
+        """Of transformed rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
         edges = [*self._lines.first, rows.shape[-1]]
         weighed = self.weight * rows
         unprojected = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
@@ -221,23 +221,23 @@ class _WoodburyProducts:
         return np.asarray(np.stack(unprojected, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
 
     def products(self, rows: Floats, others: Floats, by_rows: Floats, by_others: Floats) -> Floats:
-        """Of turned rows (points, sets, rows) of each recording."""
+        """Of transformed rows (points, sets, rows) of each recording."""
         unprojected = self._lines.sums(self.weight * rows * others)
         projected = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
         return np.asarray(unprojected - projected)
 
 
-_LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, from which on a block is dense
+_LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, above which blocks are dense
 
 
 class FrfLines:
-    """The measured lines of FRFs as sums of what a model's distinct lines have over the rows of each recording.
+    """The measured lines of FRFs, as weighted sums over the rows of each recording.
 
-    `weight` are those with 1/d², `real` and `imag` with the parts of y/d²; `uu`, `uy` and `yy` are sums for u = 1.
+    `weight` are sums with 1/d², `real` and `imag` with the parts of y/d²; `uu`, `uy` and `yy` are the sums for u = 1.
     """
 
     def __init__(self, lines: Lines, design: FrfDesign) -> None:
-        """Place the weights; the design says which distinct line each row is."""
+        """`design` gives the distinct line of each row."""
         weight = lines.deviation**-2.0
         rows = weight, weight * lines.value.real, weight * lines.value.imag
         self.weight, self.real, self.imag = (RowSums(values, lines, design) for values in rows)
@@ -246,11 +246,10 @@ class FrfLines:
 
 
 class RowSums:
-    """Sums over the rows of each recording, each row with a weight: of values on distinct lines (…, lines), (…,
-    recordings).
+    """Weighted sums over the rows of each recording: of values on distinct lines (…, lines), (…, recordings).
 
-    A contact's distinct lines stand together, so its recordings are a block of one matrix. Where blocks are large and
-    full they are dense.
+    A contact's distinct lines are contiguous, so its recordings are a block of one matrix. Blocks are dense where they
+    are large and full, else the matrix is sparse.
     """
 
     def __init__(self, weight: Floats, lines: Lines, design: FrfDesign) -> None:
@@ -292,7 +291,7 @@ def _block(sparse: csr_array, recordings: Indices, span: slice) -> Floats:
     return np.ascontiguousarray(sparse[recordings][:, span].toarray())
 
 
-@cached_while_alive  # a diagnosis weighs dozens of models of one design
+@cached_while_alive  # a diagnosis evaluates dozens of models of one design
 def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
     """The matrices of these lines for models of this design."""
     return FrfLines(lines, design)
@@ -300,7 +299,7 @@ def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
 
 @dataclass(frozen=True)
 class FrfProducts:
-    """Of FRFs; `turning` is None where u is 1, or where no derivatives were asked for."""
+    """Of FRFs; `turning`, the sums with derivatives of u, is None where u is 1 or derivatives were not requested."""
 
     yy: Floats  # (recordings,)
     uu: Floats  # (points, recordings)
@@ -313,7 +312,7 @@ class FrfProducts:
 
     @classmethod
     def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
-        """Of a model's response at several points, and the rows that its pick-up reaches."""
+        """Of a model's response at several points, with the rows of its pick-up."""
         level, factor = response.level, response.lines
         slopes = level.slopes.transpose(1, 2, 0) if len(level.slopes) else None
         uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
@@ -349,7 +348,7 @@ class FrfProducts:
 
     @classmethod
     def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
-        """At the points of several, one after another, with so many parameters in all."""
+        """At the points of several, one after another, padded to so many parameters."""
         filled = [part.filled(parameters, turning=any(other.turning for other in parts)) for part in parts]
 
         def of(name: str, axis: int = 0) -> Any:
@@ -369,7 +368,7 @@ class FrfProducts:
         )
 
     def filled(self, parameters: int, *, turning: bool) -> Self:
-        """With derivatives that are 0 by further parameters, so many in all, also those of u where it has none."""
+        """With zero derivatives by further parameters, `parameters` in all; also those of u if `turning`."""
         slopes = self.level_slopes
         if slopes is None:
             return self
@@ -388,7 +387,7 @@ class FrfProducts:
         return replace(self, level_slopes=slopes, turning=slope_sums, pickup=pickup)
 
     def scaled(self, factor: Floats) -> Self:
-        """Of levels so many times as large (points,)."""
+        """With levels multiplied by `factor` (points,)."""
         column = factor[:, None]
         level_slopes = None if self.level_slopes is None else self.level_slopes * column[..., None]
         position_slopes = None if self.place_slopes is None else self.place_slopes * column
@@ -408,8 +407,8 @@ class FrfProducts:
 
 @dataclass(frozen=True)
 class PickupProducts:
-    """On the distinct lines of the rows that pick-up reaches u (points, lines) and v (points, parameters, lines), None
-    where it is 0; `line` says which of them each row is on."""
+    """u (points, lines) and v (points, parameters, lines) on the distinct lines of the rows with pick-up; v is None
+    where it is 0. `line` is the index of each row's line."""
 
     rows: PickupRows
     line: Indices
@@ -451,17 +450,17 @@ class PickupProducts:
         )
 
     def filled(self, parameters: int) -> Self:
-        """With derivatives that are 0 by further parameters, so many in all."""
+        """With zero derivatives by further parameters, `parameters` in all."""
         v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1]), dtype=complex) if self.v is None else self.v
         return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
 
     def without_pickup(self, sums: Sums, levels: SeveralLevels) -> Sums:
-        """The sums less what rows lose to pick-up."""
+        """The sums corrected for pick-up."""
         assert levels.pickup is not None
         return self.rows.without_pickup(sums, self.line, self.u, levels.pickup, levels.level)
 
     def slopes_without_pickup(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
-        """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
+        """The sums with derivatives corrected for pick-up, at the first of the sets of noise levels."""
         assert levels.pickup is not None
         if self.v is None:
             return sums
@@ -494,7 +493,7 @@ Products = FrfProducts | CurveProducts
 
 
 def joined(parts: Sequence[Products], parameters: int) -> Products:
-    """Products of models of the same recordings one after another, their parameters filled up to so many."""
+    """Products of models of the same recordings one after another, padded to so many parameters."""
     if len(parts) == 1:
         return parts[0]
     curves = [part for part in parts if isinstance(part, CurveProducts)]

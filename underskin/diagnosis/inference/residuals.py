@@ -1,20 +1,14 @@
-"""What an explanation leaves, what its parameters take up, and what could hide behind it.
+"""Residuals of an explanation, changes of the force beyond its parameters, and parameters that it may hide.
 
-Measured against the base model: each recording's gain residual, each line's residual, and how uncertain they are.
-
-The residual of a recording is what it lies above its model, relative; that of a line is what it lies above its own
-recording's best real multiple of the model: a recording's lines share one gain error, so their mean and their shape are
-kept apart.
-
-What a fit to curves takes up of changes of the force: their χ², and what is left beside the parameters.
-
-What a parameter would be if one more mechanism were there that the recordings hardly tell from it.
-
-A glue line that slips by the same share under every sphere only changes d33: it does not show, and a fit without it is
-as good. At places spread evenly over such a mechanism's prior all else is fitted again, the noise levels as well; each
-counts by the evidence that it leaves. Where the sensors' spread is free, the parameter is averaged over it at each.
-
-What the declared values of a skin may be off by, in d33.
+- The residual of a recording is its relative deviation from the model; that of a line its deviation from its
+  recording's best real multiple of the model. The lines of a recording share one gain error, so level and shape are
+  kept apart.
+- Changes of the force of curves: their χ² after projection on the fitted parameters.
+- A mechanism may be present without being visible: a glue line that slips by the same share under every sphere only
+  changes d33. The posterior of a parameter with that mechanism added is a mixture over values spread evenly over its
+  prior, at each of which everything else is fitted again, each weighted by its evidence. Where the sensors' spread is
+  free, the parameter is averaged over it at each value.
+- The uncertainty of d33 by the tolerances of a skin's declared values.
 """
 
 from dataclasses import dataclass, replace
@@ -44,7 +38,7 @@ from underskin.units import Array, Floats, Indices, to_si
 
 @dataclass(frozen=True)
 class Residuals:
-    """Against one explanation's most probable parameters."""
+    """Residuals at an explanation's most probable parameters."""
 
     gain: Floats  # (recordings,) relative
     gain_deviation: Floats  # (recordings,) expected sd: gain scatter, positioning and lines
@@ -53,15 +47,15 @@ class Residuals:
 
 
 def row_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
-    """The explanation's prediction on all lines."""
+    """The explanation's prediction on all rows."""
     value: Array = explanation.best.prediction.value
     return value if len(value) == len(problem.lines.value) else value[problem.lines.recording]
 
 
 def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[Array, Floats]:
-    """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance.
+    """Each line divided by its recording's best real multiple of the model, minus 1, and its weight 1/variance.
 
-    The variance is that before the noise's level; mains pick-up adds to it.
+    The variance excludes the noise's level; mains pick-up adds to it.
     """
     lines, prediction, best = problem.lines, row_prediction(problem, explanation), explanation.best
     first = lines.first
@@ -75,7 +69,7 @@ def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[A
 
 
 def residuals(problem: FittingProblem, explanation: Explanation, gain: float, position: float) -> Residuals:
-    """The residuals, with the scatters that are expected of them: `gain` (relative) and `position` [m]."""
+    """The residuals, with their expected scatters: `gain` (relative) and `position` [m]."""
     lines = problem.lines
     prediction = row_prediction(problem, explanation)
     precision = lines.deviation**-2
@@ -87,7 +81,7 @@ def residuals(problem: FittingProblem, explanation: Explanation, gain: float, po
     return Residuals(along / size - 1, np.sqrt(gain**2 + position_variance + 1 / size), line, weight)
 
 
-_FLAT = 1e-3  # of a parameter's bounds: deviations of the least prior, for those that change nothing
+_FLAT = 1e-3  # of a parameter's bounds: weakest prior, for parameters without effect
 
 
 def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
@@ -99,12 +93,12 @@ def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
 
 
 def precision_of(hypothesis: Hypothesis) -> Floats:
-    """Of the parameters' priors (parameters,)."""
+    """Precisions of the parameters' priors (parameters,)."""
     return np.asarray(hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
 
 
 def information(explanation: Explanation, rows: Floats, noise: Explanation | None = None) -> Floats:
-    """Jᵀ C⁻¹ J of changes of the force J (changes, samples) under the noise that the explanation, or another, found."""
+    """Jᵀ C⁻¹ J of changes of the force J (changes, samples), under the noise of the explanation or of another one."""
     fitter = Fitter([explanation.best.hypothesis])
     covariance = (noise or explanation).point.covariance
     at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)))
@@ -117,25 +111,28 @@ def information(explanation: Explanation, rows: Floats, noise: Explanation | Non
 
 
 def information_beyond(full: Floats, indices: Indices, precision: Floats) -> Floats:
-    """Of the `information` of parameters and further changes that of these changes (changes, changes), less what the
-    parameters at `indices` take up; `precision` of all parameters (parameters,)."""
+    """Information (changes, changes) on the changes after projection on the parameters.
+
+    `full` is the `information` on parameters and further changes, `indices` those of the parameters to project on,
+    `precision` that of all parameters (parameters,).
+    """
     first = len(precision)
     block = full[np.ix_(indices, indices)] + np.diag(precision[indices])
     shared = full[first:, indices]
     return np.asarray(full[first:, first:] - shared @ np.linalg.solve(block, shared.T))
 
 
-_NODES = {0: 1, 1: 12, 2: 24}  # for so many parameters
+_NODES = {0: 1, 1: 12, 2: 24}  # by number of parameters
 _MOST_NODES = 48
-_MOST = 600.0  # nats that shares tell: e to the power of 710 is more than a float holds
-_NEGLIGIBLE_NATS = 6.0  # nats behind the fit without the mechanism within which a place counts
+_MOST = 600.0  # nats of the largest share: exp(710) overflows
+_NEGLIGIBLE_NATS = 6.0  # nats behind the fit without the mechanism beyond which a node is negligible
 
 
 def with_hidden_mechanism(
     problem: FittingProblem, explanation: Explanation, name: str, parameter_name: str
 ) -> NormalMixture | None:
-    """A parameter of the model with one more mechanism, each share relative to the explanation without it, e^600 at
-    most.
+    """A parameter of the model with one more mechanism, each share relative to the explanation without it, at most
+    e^600.
 
     None where the recordings do not support the mechanism, or it moves no prediction.
     """
@@ -153,7 +150,7 @@ def with_hidden_mechanism(
         len(explanation.own(mechanism)) != slices[mechanism].stop - slices[mechanism].start
         for mechanism in explanation.names
     ):
-        return None  # beside it another mechanism has other parameters
+        return None  # with it another mechanism has other parameters
     parameters = [hypothesis.model.parameters[index] for index in new]
     levels = _evenly(len(parameters))
     fit = np.zeros((len(levels), len(hypothesis.model.parameters)))
@@ -183,7 +180,7 @@ def with_hidden_mechanism(
 
 
 def _evenly(parameters: int) -> Floats:
-    """Probabilities between 0 and 1, spread evenly over so many parameters (places, parameters)."""
+    """Probabilities between 0 and 1, spread evenly over so many parameters (nodes, parameters)."""
     count = _NODES.get(parameters, _MOST_NODES)
     levels = (np.arange(count) + 0.5) / count
     if parameters < 2:
@@ -193,7 +190,7 @@ def _evenly(parameters: int) -> Floats:
 
 
 def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
-    """The places that count, with all that is not held fitted."""
+    """The nodes within `_NEGLIGIBLE_NATS` of the explanation, with all that is not held fitted."""
     point, cost = explanation.point, explanation.best.cost
     covariance, sensor_log_gain = (
         np.tile(values, (len(fit), 1)) for values in (point.covariance, point.sensor_log_gain)
@@ -204,10 +201,10 @@ def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
 
 
 def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
-    """The standard deviation of ln d33 by the skin's tolerances, beyond what its fit allows the declared values.
+    """The standard deviation of ln d33 by the skin's tolerances, beyond the priors of the fit.
 
-    A prior's centre that is off by e moves the posterior mean of ln d33 by C/s² · e: C is the covariance of ln d33 and
-    that factor, s the standard deviation of its prior. So a value that the recordings tell themselves moves nothing.
+    An error e of a prior's centre moves the posterior mean of ln d33 by C/s² · e: C is the covariance of ln d33 and
+    that factor, s the standard deviation of its prior. A value that the recordings determine therefore moves nothing.
     """
     skin = problem.lines.campaign.skin
     off = skin.tolerances or Tolerances()
