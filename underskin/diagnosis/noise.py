@@ -1,46 +1,39 @@
 """The noise of lines, curves, gains and positions, and its priors.
 
-Priors of the noise that every hypothesis shares.
+Priors that every hypothesis shares:
 
-- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, falling off outside to
-  a tenth at 0.3 and at 11 %: a careful rig is better than 1 %, a poor one worse than 5 %;
-- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm, falling off outside
+- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, decreasing outside to
+  a tenth at 0.3 and at 11 %: careful rigs are better than 1 %, poor ones worse than 5 %;
+- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm, decreasing outside
   to a tenth at 0.02 and at 0.6 mm;
 - line noise: its level as estimated from the lines' roughness, times a factor near 1.
 
-How large each kind of noise is, as the likelihood takes them: s, κ, p, τ, q and η.
-
-What the samples of a curve share under every hypothesis: what the cell adds, and that no law is exact.
-
-A cell shows its zero F0 and a drift b in time (without times, in the order of the samples) or along the travel beside
-the force (its gain is the recording's, as of FRFs): columns P with normal coefficients, whose scale is the prior's
-standard deviation. Where samples in the air show the zero, F0 is as good as free; else a tared cell is within a
-hundredth of what it measures. The drift over the curve is 2 % of the largest force, or as much as a plain drift or
-the air before a snap-in shows where that is more, and none is looked for where no air shows it.
-
-The position of the surface, friction in a stage and the idealisation of every law bend a curve a little. Neighbouring
-samples share that error too. Within each curve, with s the force (or, near the contact's beginning and in the air, 0.7
-and 0.2 of the largest), x the place along the curve from 0 to 1 and η the size,
+Error that the samples of a curve share under every hypothesis. A cell has a zero F0 and a drift b in time (without
+times, in the order of the samples) or along the travel (its gain is the recording's, as of FRFs): columns P with normal
+coefficients, scaled to the prior's standard deviation. Where samples in the air show the zero, F0 is practically free;
+else a tared cell is within a hundredth of the largest force. The drift over the curve is 2 % of the largest force, or a
+larger one that the air shows; without air there is none. The position of the surface, friction in a stage and the
+idealisation of every law also bend a curve a little. With s the force (at least 0.7 of the largest near the beginning
+of contact and 0.2 in the air), x the position along the curve from 0 to 1 and η the size,
 
     ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
 
 k the mean of Matérn-3/2 kernels of length 0.025 and 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
-idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, slowly
+idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, decreasing outside, slowly
 downwards.
 
-The noise of single lines, from how rough the lines are along frequency.
-
-Real and imaginary part each have variance d² = rel(f)² A² + floor², A the recording's amplitude around the line.
-What all recordings share at a frequency is taken off, then each line is compared with its two neighbours,
+Noise of single lines, from their roughness along frequency. Real and imaginary part each have variance
+d² = rel(f)² A² + floor², A the recording's amplitude around the line. The part common to all recordings at a frequency
+is subtracted, then each line is compared with its two neighbours,
     e_j = z_j − λ z_(j−1) − (1−λ) z_(j+1)   (linear in log f),   E|e_j|²/2 = d_j² + λ² d_(j−1)² + (1−λ)² d_(j+1)²,
-which smooth misfit hardly reaches. A steep course, such as the flank of a resonance that moves with the preload, does
-reach it: where a law describes that, its prediction (`expected`) is taken off as well (see search.py).
-log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that single wild lines
-(mains, a resonance between two lines) do not count, and the level is set by the median of |e|².
-Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it. It may miss
-noise that is not averaged, alike in all recordings: of many recordings it says little more than of a few.
-Where lines are known to be `uneven` (of a time series whose force has more power at one than at the next), rel is that
-much larger.
+which smooth misfit hardly affects. Steep changes, such as the flank of a resonance that moves with the preload, do
+affect it: where a law describes them, its prediction (`expected`) is subtracted too (see search.py).
+log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that outliers (mains, a
+resonance between two lines) do not count, and the level is set by the median of |e|².
+Where `coherence` γ² is given, (1 − γ²)/γ² is proportional to (d/A)² (with an unknown number of averages) and
+stabilises it. It may miss noise that is not averaged, common to all recordings: many recordings carry little more
+information on it than a few. Where lines are `uneven` (of a time series whose force has more power at one than at the
+next), rel is larger by that factor.
 """
 
 import itertools
@@ -62,9 +55,9 @@ POSITION_FALL = (0.4, 0.3)  # the same of positions
 
 @dataclass(frozen=True)
 class Plateau:
-    """A density of a logarithm: constant between two values, falling off as half Gaussians outside.
+    """A density of a logarithm: constant between two values, decreasing as half Gaussians outside.
 
-    Normal where the two are one; uniform where `area`, the integral of what is 1 at the plateau, counts only the range.
+    Normal where the two values are equal; uniform where `area`, the integral with height 1, counts only the range.
     """
 
     low: float
@@ -91,7 +84,7 @@ class Plateau:
 
     @property
     def row(self) -> tuple[float, float, float, float, float]:
-        """Its numbers, with the logarithm of the area, as compiled functions take them."""
+        """Its numbers, with the logarithm of the area, for compiled functions."""
         return self.low, self.high, self.fall_low, self.fall_high, float(np.log(self.area))
 
     def log_density(self, x: Floats | float) -> Floats:
@@ -100,14 +93,14 @@ class Plateau:
         return np.asarray(-0.5 * outside**2 - np.log(self.area))
 
 
-START_GAIN = 0.03  # scatter of gains while nothing was fitted yet
+START_GAIN = 0.03  # scatter of gains before any fit
 GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 POSITION_PRIOR = Plateau.of(POSITION_RANGE, POSITION_FALL)
-# No rig's: something that nobody named moves the recordings
 
 
 def level_prior(log_level_sd: float) -> Plateau:
-    """Of the factor on the lines' deviations; wider than the estimate's own error: noise is not quite normal."""
+    """Prior of the factor on the lines' deviations; wider than the estimate's own error, as noise is not exactly
+    normal."""
     return Plateau.normal(0.0, float(np.hypot(log_level_sd, 0.05)))
 
 
@@ -125,7 +118,7 @@ class NoiseLevels:
 
 @dataclass(frozen=True)
 class SeveralLevels:
-    """Sets of noise levels (…, 1); of pick-up its distinct deviations (…, distinct)."""
+    """Sets of noise levels (…, 1); `pickup` has the distinct deviations (…, distinct)."""
 
     gain: Floats
     level: Floats
@@ -161,7 +154,7 @@ _COLUMNS = 3
 
 @dataclass(frozen=True)
 class CurveError:
-    """Of all rows of a campaign's curves, one curve after another."""
+    """The error that samples share, for all rows of a campaign's curves, one curve after another."""
 
     scale: Floats  # (rows,) [N]: the deviation is η times this
     path_fraction: Floats  # (rows,) along the curve, 0 to 1
@@ -192,9 +185,9 @@ class CurveError:
         return type(self)(*(values[order] for values in rows))
 
     def within(self, force: Floats, curves: Sequence[slice]) -> float:
-        """The sum of squares [N²] of raw samples about a law beyond that of their means, of whole curves.
+        """The sum of squares [N²] of raw samples about a law beyond that of their means, for complete curves.
 
-        The law's force (rows,) is straight between rows, and so are the samples of a row but for their noise.
+        The law's force (rows,) is taken as straight between rows, as are the samples of a row apart from their noise.
         """
         middle = np.cumsum(self.count) - self.count / 2
         slope = np.concatenate([np.gradient(force[span], middle[span]) for span in curves])
@@ -202,7 +195,7 @@ class CurveError:
         return float((self.about_line + square * (self.slope - slope) ** 2).sum())
 
     def covariance(self, size: float) -> Floats:
-        """Of rows that are one curve's, with η = `size` (rows, rows)."""
+        """Covariance of rows of one curve, with η = `size` (rows, rows)."""
         return np.asarray(size**2 * np.outer(self.scale, self.scale) * _correlation(self.path_fraction))
 
 
@@ -217,10 +210,11 @@ def instrument_columns(displacement: Floats, time: Floats, zero: float, drift: f
 
 
 class Whitening:
-    """κ² D + η² B as κ² times a unit matrix: each curve's rows over d, turned to where B is diagonal, and weighed."""
+    """κ² D + η² B as κ² times a diagonal matrix: each curve's rows divided by d and rotated to the eigenvectors of
+    B."""
 
     def __init__(self, error: CurveError, deviation: Floats, recording: Indices) -> None:
-        """Find the directions of each curve; `deviation` is D's square root (rows,)."""
+        """Compute the eigenvectors of each curve; `deviation` is D's square root (rows,)."""
         self._deviation = deviation
         edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
         self._spans = [slice(low, high) for low, high in pairwise(edges)]
@@ -238,18 +232,18 @@ class Whitening:
         return np.asarray(np.log1p(ratio**2 * self._size).sum(axis=-1, keepdims=True))
 
     def weight(self, ratio: Floats) -> Floats:
-        """What products of turned rows weigh at ratios η/κ (…, 1): (…, rows)."""
+        """Weights of products of transformed rows at ratios η/κ (…, 1): (…, rows)."""
         return np.asarray(1 / (1 + ratio**2 * self._size))
 
     def turned(self, rows: Floats) -> Floats:
-        """The rows (…, rows), forces, such that their covariance is κ² diag(1/weight)."""
+        """The rows (…, rows), forces, transformed so that their covariance is κ² diag(1/weight)."""
         scaled = rows / self._deviation
         parts = [scaled[..., span] @ turn.T for span, turn in zip(self._spans, self._turns, strict=True)]
         return np.concatenate(parts, axis=-1)
 
 
 def _correlation(path_fraction: Floats) -> Floats:
-    """k between all places of a curve."""
+    """k between all positions along a curve."""
     total = np.zeros((len(path_fraction), len(path_fraction)))
     for length in _LENGTHS:
         distance = np.sqrt(3.0) * np.abs(path_fraction[:, None] - path_fraction) / length
@@ -260,15 +254,15 @@ def _correlation(path_fraction: Floats) -> Floats:
 _KNOTS_PER_DECADE = 2.0
 _SMOOTH = 1.0  # sd of the second difference of log rel² between knots
 _FREEDOM = 6.0
-_TYPICAL, _TYPICAL_SD = 1e-4, 3.0  # rel², and the sd of its logarithm: where hardly any line says anything
-_SHARED = 8  # recordings at a frequency from which what they share is taken off
+_TYPICAL, _TYPICAL_SD = 1e-4, 3.0  # rel², and the sd of its logarithm: prior where lines carry little information
+_SHARED = 8  # least recordings at a frequency whose common part is subtracted
 _WINDOW = 5
-_BLOCK = 10_000  # windows that are copied at a time
+_BLOCK = 10_000  # windows that are copied at once
 
 
 @dataclass(frozen=True)
 class LineNoise:
-    """`deviation` (rows,) of real and imaginary part [C/N], and how well its level is known (sd of its logarithm)."""
+    """`deviation` (rows,) of real and imaginary part [C/N], and the uncertainty of its level (sd of its logarithm)."""
 
     deviation: Floats
     log_level_sd: float
@@ -283,9 +277,9 @@ def line_noise(
     uneven: Floats,
     expected: Complexes | None = None,
 ) -> LineNoise:
-    """The noise of the rows, which run over recordings one after another, sorted by frequency within each.
+    """The noise of the rows, which are sorted by recording and by frequency within each.
 
-    `expected` (rows,) is a prediction whose course along frequency is no noise.
+    `expected` (rows,) is a prediction whose change with frequency is not noise.
     """
     from underskin.diagnosis.kernels import roughness_cost
 
@@ -316,7 +310,7 @@ def line_noise(
         by_d2 = np.zeros(len(d2))
         cost = roughness_cost(d2, middle, share, rough, _FREEDOM, by_d2)
         if from_coherence is not None:
-            # Noisy, and with an unknown n: loose Gaussians; p[-1] is log(1/2n).
+            # Noisy, with an unknown number of averages n: wide Gaussians; p[-1] is log(1/2n).
             gap = np.log(d2[has_coherence] / size2[has_coherence]) - from_coherence - p[-1]
             cost += 0.5 * np.sum(certainty * gap**2)
             by_d2[has_coherence] += certainty * gap / d2[has_coherence]
@@ -349,8 +343,8 @@ def line_noise(
     return LineNoise(scale * np.sqrt(d2), sd, float(scale * np.exp(p[-2] / 2)))
 
 
-_COHERENCE_VARIANCE = 0.5  # of the logarithm of what one recording's says
-_OF_ALL_VARIANCE = 0.1  # and of what all have in common at a frequency
+_COHERENCE_VARIANCE = 0.5  # of the logarithm of one recording's coherence estimate
+_OF_ALL_VARIANCE = 0.1  # and of the part common to all at a frequency
 
 
 def local_amplitude(value: Complexes, recording: Indices) -> Floats:
@@ -389,8 +383,8 @@ def _roughness(z: Complexes, frequency: Floats, recording: Indices) -> tuple[Ind
 
 
 def _without_shared(value: Complexes, frequency: Floats, recording: Indices, rest: Complexes) -> Complexes:
-    """`rest` (rows,), the lines or what is left of them, less each recording's level times what all recordings have of
-    it at that frequency, where many have it."""
+    """`rest` (rows,), the lines or their remainder, minus each recording's level times the part common to all
+    recordings at that frequency, where there are at least `_SHARED`."""
     edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
     level = np.array([np.median(value.real[low:high]) for low, high in itertools.pairwise(edges.tolist())])
     ratio = rest / np.where(level == 0, 1.0, level)[recording]

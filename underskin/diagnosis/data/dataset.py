@@ -1,24 +1,15 @@
-"""Recordings as the rows that are explained, with their noise.
+"""Recordings as the rows that a diagnosis explains, with their noise.
 
-The campaign's axes as numbers: what each recording was made at, on a scale where like distances mean alike. The
-recordings that a diagnosis uses, with the findings on all recordings.
-
-A curve thinned to means over blocks of neighbouring samples.
-
-They lie evenly along it, and ever closer towards its jumps and the kinks where contact begins and ends. The deviation
-of a mean is the samples' noise, read from second differences, of the force and, times the slope, of the displacement.
-
-The lines of a campaign's FRF recordings as the diagnosis uses them: what was measured, and how surely.
-
-A model without frequency in it has one value a recording, and then the recording's lines can be replaced by their
-weighted mean: with weights 1/d², Σ|y − m|²/d² = Σ|y − ȳ|²/d² + |ȳ − m|²/d̄². `collapsed` does that, exactly; the
-first sum, which no such model changes, is carried along in `scatter`.
-
-Indentation and compression curves as the diagnosis uses them: samples of force in place of lines of an FRF.
-
-A curve is thinned to means over blocks of samples, with the deviation of each. How large that really is, the level of
-the noise says, which every hypothesis fits under the same prior. What a cell adds, and what neighbouring samples share,
-is in correlated_error.
+- `recording_axes`: the conditions on which recordings differ, as numbers.
+- `Inspected`: the usable recordings and the findings.
+- `Lines` and `lines`: the lines of FRF recordings. A model without frequency has one value a recording, and then the
+  recording's lines can be replaced by their weighted mean: with weights 1/d²,
+  Σ|y − m|²/d² = Σ|y − ȳ|²/d² + |ȳ − m|²/d̄². `Lines.collapsed` does that, exactly; the first sum, which is the same
+  for all such models, is kept in `scatter`.
+- `curve_lines`: indentation and compression curves, thinned to means over blocks of neighbouring samples. Blocks are
+  even along the curve and shorter towards jumps and the kinks where contact begins and ends. The deviation of a mean
+  comes from the samples' noise, estimated from second differences of the force and, times the slope, of the
+  displacement. All hypotheses fit the level of the noise, under the same prior.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,7 +41,7 @@ from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Complexes, Floats, Indices, Mask
 
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
-WORDS = {  # of each axis: what it is called, and its unit
+WORDS = {  # of each axis: its name and unit in sentences
     "preload_n": ("preload", "N"),
     "indenter_radius_mm": ("radius of the sphere", "mm"),
     "sensor": ("sensor", ""),
@@ -68,11 +59,11 @@ _SAME = 0.01  # on a logarithmic scale: values within a percent were meant to be
 
 
 def recording_axes(campaign: Campaign) -> dict[str, Floats]:
-    """Of each axis on which the recordings differ, one row a recording (recordings, 1 or 2).
+    """The axes on which the recordings differ, with one row a recording (recordings, 1 or 2).
 
-    `position_mm` is the contact's place seen from the sensor's centre, `sensor` the sensor's own place on the skin
-    [mm], `recorded_at` is in hours from the first. An axis that a recording lacks is left out, and one on which all
-    agree, on a logarithmic scale within a percent.
+    `position_mm` is the contact's position relative to the sensor's centre, `sensor` the sensor's position on the skin
+    [mm], `recorded_at` is in hours from the first. An axis is omitted where a recording lacks it or all values agree,
+    on a logarithmic scale within a percent.
     """
     recordings = campaign.recordings
     columns_by_axis: dict[str, Floats] = {}
@@ -94,8 +85,7 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
 
 
 def agree(name: str, values: Sequence[float | None]) -> bool:
-    """Whether values on an axis of a logarithmic scale were meant to be one: they lie within a percent, or none is
-    known."""
+    """Whether values on a logarithmic axis are meant to be equal: they lie within a percent, or none is given."""
     present = [value for value in values if value is not None]
     return len(present) in (0, len(values)) and (not present or float(np.ptp(_scaled(name, present))) <= _SAME)
 
@@ -106,7 +96,7 @@ def _scaled(name: str, values: Sequence[float]) -> Floats:
 
 
 def hours(times: list[str | None]) -> Floats:
-    """Hours since the first of these times (ISO 8601; UTC where they do not say)."""
+    """Hours since the first of these times (ISO 8601; UTC where they have no zone)."""
     read = [datetime.fromisoformat(str(time).replace("Z", "+00:00")) for time in times]
     zoned = [time if time.tzinfo else time.replace(tzinfo=UTC) for time in read]
     since = np.array([(time - zoned[0]).total_seconds() for time in zoned])
@@ -115,11 +105,11 @@ def hours(times: list[str | None]) -> Floats:
 
 @dataclass(frozen=True)
 class Inspected:
-    """The recordings that can be used and the findings; what is `lacking` where nothing can be concluded from them.
+    """The usable recordings and the findings; `lacking` says why nothing can be concluded from them.
 
-    `uneven` is how uneven the noise of the lines of time series is, by the recording's id; `unsure` the relative
-    uncertainty that noise in their channels leaves of all levels; `beyond` are the ids of
-    those whose contacts lie beyond the tables as declared, and within them by a plausible modulus.
+    `uneven`: the relative noise of the lines of time series, by the recording's id; `unsure`: the relative uncertainty
+    of all levels by noise in the channels; `beyond`: the ids of recordings whose contacts lie outside the tables as
+    declared, and inside them with a plausible modulus.
     """
 
     campaign: Campaign
@@ -131,14 +121,14 @@ class Inspected:
 
 
 _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
-_STRAIGHT = 3.0  # standard deviations of χ² about a straight line beyond which a block is split
-_LEAST_NOISE = 2e-5  # of the range of force: what numbers written with five digits are good to
+_STRAIGHT = 3.0  # standard deviations of χ² about a straight line above which a block is split
+_LEAST_NOISE = 2e-5  # of the range of force: resolution of numbers with five digits
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which changes of force are summed, standard deviations of noise
 _NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # from it, where blocks begin: in samples, or in
 # as many of them as hide the travel, since a law of single displacements that are noisy is biased where it bends
 _SIDE_SAMPLES = 5  # samples on either side of the deepest one
 _STEP = 0.2  # of the larger step of both ways, which the smaller must exceed for their lines to meet in a corner
-_RESTS = 1e-3  # of that step: where the deepest samples differ by less, the sphere was held
+_RESTS = 1e-3  # of that step: the sphere was held where the deepest samples differ by less
 _BELOW_AIR_SDS = 4.0  # standard deviations below the air at which a minimum may be a hidden jump
 _DISTINCT = 5.0  # standard deviations by which two displacements differ, between which a slope is read
 
@@ -146,9 +136,9 @@ _DISTINCT = 5.0  # standard deviations by which two displacements differ, betwee
 def thinned(
     columns: Sequence[Floats], seen: Course, slow: float, kind: Kind
 ) -> tuple[list[Floats], Floats, Floats, Floats]:
-    """The means of displacement [mm], force [N] and, where there is one, time [s] over blocks (blocks,), the deviation
-    of the force's [N], how far along the curve each lies, 0 to 1, and the samples in each; `slow` is what neighbouring
-    samples of force share [N]."""
+    """The means of displacement [mm], force [N] and, if given, time [s] over blocks (blocks,), the deviation of the
+    force's [N], the position of each along the curve, 0 to 1, and the number of samples in each; `slow` is the noise
+    that neighbouring samples of force share [N]."""
     unsteady = roughness(columns[0])
     columns = _with_corner(_with_still_hold(columns, seen), seen.turn)
     displacement, force = columns[:2]
@@ -173,11 +163,10 @@ def thinned(
 
 
 def _slopes(displacement: Floats, force: Floats, noise: Floats, unloading: Mask) -> Floats:
-    """How steep the force rises over displacement at each block (blocks,): the lesser of the slopes to either side.
+    """The slope of force over displacement at each block (blocks,): the smaller of the slopes to either side.
 
-    Each is that to the next block of the same way whose displacement differs by more than its `noise` (blocks,);
-    `unloading` are blocks of the way back. Beside a jump, one side has none; between blocks as close as the noise, a
-    slope would be noise too.
+    Each is that to the next block of the same way (loading or `unloading`) whose displacement differs by more than its
+    `noise` (blocks,). At a jump one side has none; between blocks closer than the noise a slope would be noise too.
     """
     separation = displacement - displacement[:, None]
     distinct = (np.abs(separation) > _DISTINCT * np.hypot(noise, noise[:, None])) & (unloading == unloading[:, None])
@@ -194,17 +183,18 @@ def _slopes(displacement: Floats, force: Floats, noise: Floats, unloading: Mask)
 
 
 def _corners(seen: Course) -> Indices:
-    """The first samples of what is not smoothly joined to what was before."""
+    """The first samples after jumps and corners."""
     samples = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
     return np.unique(np.array([sample for sample in samples if sample is not None], dtype=np.intp))
 
 
 def _sag(column: Floats, starts: Indices, corners: Indices) -> tuple[Floats, Floats]:
-    """How far the mean over each block lies beside the column's value in the block's middle, and how surely.
+    """The difference between the mean over each block and the column's value in the block's middle, and its
+    uncertainty.
 
-    By the parabola through the means of the block and of those beside it, bent no more than those of its neighbours:
-    beside a kink one is bent that the curve is not, and what it would add is doubtful. 0 where a corner lies among
-    them.
+    From the parabola through the means of the block and its neighbours, with a curvature no larger than theirs: at a
+    kink the parabola has a curvature that the curve has not, and that excess counts as uncertainty. 0 where a corner
+    lies among them.
     """
     ends = np.append(starts[1:], len(column))
     counts = ends - starts
@@ -225,9 +215,9 @@ def _sag(column: Floats, starts: Indices, corners: Indices) -> tuple[Floats, Flo
 
 
 def _split(starts: Indices, columns: Sequence[tuple[Floats, float]]) -> Indices:
-    """Blocks halved until each column is straight within its noise: a mean over a bend lies beside the curve.
+    """Blocks halved until each column is straight within its noise, as the mean over a curved block is biased.
 
-    The most bent ones first, as long as there are not too many.
+    The most curved blocks first, up to `_MOST_SAMPLES`.
     """
     while len(starts) < _MOST_SAMPLES:
         ends = np.append(starts[1:], len(columns[0][0]))
@@ -244,7 +234,7 @@ def _split(starts: Indices, columns: Sequence[tuple[Floats, float]]) -> Indices:
 
 
 def _curvature_excess(force: Floats, noise: float) -> float:
-    """How far χ² about a straight line lies above its expectation, in its standard deviations."""
+    """The excess of χ² about a straight line over its expectation, in standard deviations."""
     freedom = len(force) - 2
     if freedom < 1:
         return 0.0
@@ -257,9 +247,8 @@ def _curvature_excess(force: Floats, noise: float) -> float:
 
 
 def _starts_near_corners(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> Indices:
-    """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
-    far a contact has grown is told by single samples; and where contact begins and ends without a jump: a mean over
-    that kink lies above the curve."""
+    """The first samples of blocks near jumps, where single samples determine the size of the contact, near the turning
+    point, and where contact begins and ends without a jump: a mean over that kink would be too large."""
     samples = _corners(seen)
     if kind == "indentation":
         samples = np.concatenate([samples, _hidden_jumps(seen, force), _feet(seen, displacement, force)])
@@ -269,7 +258,7 @@ def _starts_near_corners(seen: Course, displacement: Floats, force: Floats, kind
 
 
 def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
-    """Where contact begins, and where it ends, on the ways on which no jump is seen."""
+    """Where contact begins and ends, on the ways without a visible jump."""
     ways = (
         (seen.snap_in, np.arange(seen.arrive + 1)),
         (seen.pull_off, np.arange(len(force) - 1, seen.leave - 1, -1)),
@@ -279,17 +268,17 @@ def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
 
 
 def _hidden_jumps(seen: Course, force: Floats) -> Indices:
-    """The least force of each way on which no jump is seen, where it lies below the air: there contact may begin or
-    end by a jump that noise hides, and means over it would take from the adhesion."""
+    """The least force of each way without a visible jump, where it lies below the air: contact may begin or end there
+    by a jump that noise hides, and means over it would reduce the adhesion."""
     ways = (seen.snap_in, 0, seen.turn), (seen.pull_off, seen.turn, len(force))
     least = [first + int(np.argmin(force[first:end])) for jump, first, end in ways if jump is None and first < end]
     return np.array([sample for sample in least if force[sample] < -_BELOW_AIR_SDS * seen.noise], dtype=np.intp)
 
 
 def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
-    """With the displacement of a hold that is noisy on a straight line.
+    """With the displacement of a noisy hold replaced by a straight line.
 
-    Noise of the displacement moves no contact; a law would answer to it, the more the steeper it is.
+    Noise of the displacement moves no contact, but a law would respond to it, the more the steeper it is.
     """
     corrected = [column.copy() for column in columns]
     if seen.arrive < seen.turn:
@@ -300,10 +289,10 @@ def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
 
 
 def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
-    """With the deepest sample where the way in and the way back meet, which was between two samples.
+    """With the deepest sample at the intersection of loading and unloading, which lay between two samples.
 
-    How far the contact has grown is remembered on all of the way back. By straight lines through the samples on either
-    side; as it is where the sphere was held.
+    The largest contact affects all of the unloading. From straight lines through the samples on either side; unchanged
+    where the sphere was held.
     """
     corrected = [column.copy() for column in columns]
     displacement = columns[0]
@@ -326,9 +315,9 @@ def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
 
 
 def path_fractions(displacement: Floats, force: Floats, noise: float) -> Floats:
-    """How far along the curve each sample lies, 0 to 1: as much by displacement, by force and by count.
+    """The position of each sample along the curve, 0 to 1: the mean of the shares of displacement, force and count.
 
-    A sphere's way through the air is long and says little; force counts where it changes by more than its noise.
+    Motion in the air is long and carries little information; force counts where it changes by more than its noise.
     """
     coarse = np.linspace(0, len(force) - 1, min(len(force), _COARSE)).round().astype(int)
     steps = np.maximum(np.abs(np.diff(force[coarse])) - _BEYOND_NOISE * noise, 0.0)
@@ -338,17 +327,17 @@ def path_fractions(displacement: Floats, force: Floats, noise: float) -> Floats:
     return np.asarray(sum(parts) / len(parts))
 
 
-COLLAPSED_HZ = 30.0  # stands for the frequency of a collapsed line; no model that is given one asks for it
+COLLAPSED_HZ = 30.0  # frequency of a collapsed line; models without frequency do not use it
 
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Rows run over all recordings one after another; SI.
+    """Rows of all recordings one after another; SI.
 
     `campaign` holds exactly these rows, so that a model composed for it predicts them. `deviation` is the standard
-    deviation of real and of imaginary part each, up to the common factor that every hypothesis fits. `scatter` is what
-    collapsing left out: Σ|y − ȳ|²/d² and its degrees of freedom. `smooth` is the error that a curve's
-    samples share.
+    deviation of real and of imaginary part each, up to the common factor that every hypothesis fits. `scatter` is the
+    remainder of collapsing: Σ|y − ȳ|²/d² and its degrees of freedom. `smooth` is the error that a curve's samples
+    share.
     """
 
     campaign: Campaign
@@ -364,12 +353,12 @@ class Lines:
 
     @property
     def recordings(self) -> int:
-        """How many there are."""
+        """The number of recordings."""
         return len(self.sensor)
 
     @cached_property
     def kind(self) -> Kind:
-        """Of the recordings; all are of one kind."""
+        """The kind of the recordings; all are of one kind."""
         return kind_of(self.campaign)
 
     @property
@@ -394,7 +383,7 @@ class Lines:
 
     @cached_property
     def about_means(self) -> tuple[float, int]:
-        """Σ|y − ȳ|²/d² about each recording's mean, and how many real numbers the lines are, collapsed or not."""
+        """Σ|y − ȳ|²/d² about each recording's mean, and the number of real values of the lines, collapsed or not."""
         square, freedom = self.scatter
         if not self.curves:
             weight = self.deviation**-2
@@ -404,16 +393,16 @@ class Lines:
 
     @cached_property
     def sensors(self) -> Floats:
-        """1 where a recording is of a sensor (recordings, sensors)."""
+        """1 where a recording is of a sensor, else 0 (recordings, sensors)."""
         return np.eye(int(self.sensor.max()) + 1)[self.sensor]
 
     @cached_property
     def whitening(self) -> Whitening | None:
-        """What makes the samples of curves independent."""
+        """The transformation that makes the samples of curves independent."""
         return None if self.smooth is None else Whitening(self.smooth, self.deviation, self.recording)
 
     def collapsed(self) -> "Lines":
-        """One line a recording, the weighted mean of its lines; what the lines scatter about it goes into `scatter`."""
+        """One line a recording, the weighted mean of its lines; their scatter about it goes into `scatter`."""
         weight = self.deviation**-2
         total = np.add.reduceat(weight, self.first)
         mean = np.add.reduceat(weight * self.value, self.first).astype(np.complex128) / total
@@ -433,7 +422,7 @@ class Lines:
         )
 
     def part(self, rows: Mask) -> "Lines":
-        """Only some of the rows, each with the noise it had; recordings without a row are left out."""
+        """Some of the rows, with the noise that they had; recordings without a row are left out."""
         order = np.flatnonzero(rows)
         indices, first = np.unique(self.recording[order], return_index=True)
         value, frequency = self.value[order], self.frequency[order]
@@ -492,8 +481,9 @@ def lines(
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """The recordings with finite lines, the sensor of each and how many lines it has; and columns over all these lines
-    (rows,), `coherence` NaN where not given."""
+    """The recordings with finite lines, their sensors and numbers of lines, and columns over all these lines (rows,);
+    `coherence` is NaN where not given.
+    """
 
     recordings: list[FrfRecording]
     sensor: Indices
@@ -528,16 +518,16 @@ def _measured(campaign: Campaign, uneven: Mapping[str, Floats]) -> _Measured:
     return _Measured(recordings, sensor, counts, value, *columns)
 
 
-_READING, _FULL_SCALE = 2e-3, 1e-3  # of a testing machine, whose samples in the air are none
+_READING, _FULL_SCALE = 2e-3, 1e-3  # of a testing machine, without samples in the air
 _LEVEL_SD = 0.25  # of the logarithm of the noise's level
 _LEAST_SAMPLES = 5
 _ABSCISSA_RANGE = (1.0, 10.0)  # the abscissa: displacement over a curve's range, on this scale
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
 _SURE_STEP = 4.0  # standard deviations
 _AIR_BLOCKS, _AIR_SAMPLES = 10, 4  # blocks of samples in the air, and samples of each at least
-_FAR_SHARE = 0.6  # of the samples in the air: what lies near may belong to a contact
-_PLAINLY = 4.0  # times the variance that is expected: by chance in 1 of 4,000, of χ² over 7
-_FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known that no sample shows
+_FAR_SHARE = 0.6  # of the samples in the air: nearer ones may be in contact
+_PLAINLY = 4.0  # times the variance that is expected: probability 1/4,000 by chance, of χ² with 7 degrees of freedom
+_FEW_FOR_ZERO = 0.01  # of the largest force: uncertainty of a cell's zero without samples in the air
 
 
 def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
@@ -595,16 +585,18 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
 
 
 def finite_samples(curve: CurveRecording) -> list[Floats]:
-    """Displacement [mm], force [N] and, where there is one, time [s] of the samples that have all of them."""
+    """Displacement [mm], force [N] and, if given, time [s] of the samples where all of these are finite."""
     columns = [curve.displacement_mm, curve.force_n, *([] if curve.time_s is None else [curve.time_s])]
     finite = np.isfinite(np.stack(columns)).all(axis=0)
     return [column[finite] for column in columns]
 
 
 def _slow_noise(seen: Course, force: Floats) -> float:
-    """The standard deviation of noise that neighbouring samples share, which second differences do not see: by how
-    much means over blocks in the air, away from the contact, scatter about a parabola, which a drift is, beyond what a
-    sample's noise gives; 0 where that is not plain."""
+    """The standard deviation of noise that neighbouring samples share, which second differences do not show.
+
+    The scatter of means over blocks in the air, away from the contact, about a parabola (a drift), beyond that by the
+    samples' noise; 0 where it is not significant.
+    """
     count_far = int(_FAR_SHARE * len(seen.air))
     air = seen.air[:count_far] if len(seen.air) and seen.air[0] == 0 else seen.air[len(seen.air) - count_far :]
     block_size = len(air) // _AIR_BLOCKS
@@ -618,8 +610,8 @@ def _slow_noise(seen: Course, force: Floats) -> float:
 
 
 def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floats]:
-    """The samples of each block, the slope [N per sample] of the straight line through them, and the sum of their
-    squares about it [N²]."""
+    """The number of samples of each block, the slope [N per sample] of the straight line through them, and the sum of
+    their squares about it [N²]."""
     starts = (np.cumsum(counts) - counts).astype(np.intp)
     block = np.repeat(np.arange(len(counts)), counts.astype(np.intp))
     offset = np.arange(len(force)) - (starts + (counts - 1) / 2)[block]
@@ -629,10 +621,10 @@ def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floa
 
 
 def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
-    """How far [N] the cell runs off over the whole curve if it goes on as in the air; 0 where no plain drift and no
-    snap-in tells the air from the foot of a contact.
+    """The drift [N] of the cell over the whole curve, extrapolated from the air; 0 without a significant drift, or
+    without a snap-in to separate the air from the beginning of contact.
 
-    Without times, samples are taken at a steady rate.
+    Without times, a constant sampling rate is assumed.
     """
     along = np.arange(float(len(force))) if time is None else time
     if seen.drift:
@@ -657,7 +649,7 @@ def _error(
     drift: float,
     samples: tuple[Floats, Floats, Floats, Floats],
 ) -> CurveError:
-    """What the samples of one curve share; `drift` [N] is what the air shows, `samples` as CurveError has them."""
+    """The error that the samples of one curve share; `drift` [N] is that in the air, `samples` as in CurveError."""
     largest = float(np.abs(force).max()) or 1.0
     if kind == "compression":
         return CurveError(np.full(len(force), largest), path_fraction, np.zeros((len(force), 0)), *samples)
@@ -666,7 +658,7 @@ def _error(
         in_air &= displacement < displacement[np.argmax(displacement)]
     scale = np.maximum(np.abs(force), np.where(in_air, _IN_THE_AIR, _AT_CONTACT) * largest)
     zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
-    # Without times, samples are taken at a steady rate: an hour's drift follows their order, not the travel.
+    # Without times, a constant sampling rate is assumed: drift follows the order of samples, not the travel.
     counts = samples[0]
     order = np.cumsum(counts) - counts / 2
     size = max(USUAL_DRIFT * largest, drift) if seen.has_air else 0.0
