@@ -1,17 +1,13 @@
-"""Courses of parameters over the campaigns of one skin.
+"""Sets of mechanisms and shared parameters over the campaigns of one skin, and the scatter on one bench.
 
-What two fits say together of parameters that they share, by their normal approximations.
-
-Which mechanisms act in each of several campaigns of one skin: a course through the sets, one set a campaign.
-
-The evidence of a course is the product of the evidences of its sets, times how well the parameters that neighbours
-share agree, times the prior of the changes. Sets change seldom, by one mechanism rather than by two. All courses over
-the sets that any campaign asks for are summed.
-
-The scatter of gains and positions of skins of one make, which are recorded on one bench: what a skin's sisters say.
-
-A few recordings determine neither, nor many whether positions scatter at all. Where gain scatter is underestimated
-intervals are too narrow; where positions scatter and none is assumed, or the reverse, all d33 are off to one side.
+- `Shared`: the normal approximation of parameters that two fits share, and how well these agree.
+- `set_histories`: which mechanisms act in each of several campaigns, one set a campaign. The evidence of a history is
+  the product of the evidences of its sets, times the agreement of parameters that neighbours share, times the prior of
+  the changes: sets change seldom, and by one mechanism rather than by two. All histories over the sets that are
+  relevant in any campaign are summed.
+- `benches`: the scatter of gains and positions of one skin, by the other skins on the same bench. A few recordings do
+  not determine it. With too little gain scatter intervals are too narrow; with a wrong positioning scatter all d33 are
+  biased.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,8 +28,8 @@ from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats
 
-_UNIFORM_VARIANCE = 12.0  # a uniform prior's variance is the square of its width over this
-_SKIN_PARAMETERS = ("youngs_modulus", "thickness")  # nuisances of FRFs that are of the skin
+_UNIFORM_VARIANCE = 12.0  # the variance of a uniform distribution is its width² over this
+_SKIN_PARAMETERS = ("youngs_modulus", "thickness")  # nuisances of FRFs that belong to the skin
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +44,7 @@ class Shared:
 
     @classmethod
     def of(cls, explanation: Explanation, mechanisms: Sequence[str], *, skin: bool = True) -> "Shared":
-        """Of these mechanisms' parameters and, with `skin`, the factors on its modulus and thickness."""
+        """Of these mechanisms' parameters and, if `skin`, the factors on modulus and thickness."""
         hypothesis = explanation.best.hypothesis
         model = explanation.model.parameters
         slices = parameter_slices(explanation.names, hypothesis.lines)
@@ -71,13 +67,13 @@ class Shared:
 
     @property
     def precision(self) -> Floats:
-        """That of the posterior, at least the prior's in every direction: a quadratic may be flatter."""
+        """Precision of the posterior, at least the prior's in every direction: a quadratic may be flatter."""
         prior = np.diag(self.prior_precision)
         values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
         return np.asarray(prior + (vectors * np.maximum(values, 0.0)) @ vectors.T)
 
     def likelihood(self, prior_precision: Floats) -> Gaussian:
-        """That by which a normal prior of this precision (parameters,) becomes the posterior."""
+        """The likelihood that turns a normal prior of this precision (parameters,) into the posterior."""
         prior = np.diag(prior_precision)
         return Gaussian(self.precision - prior, self.precision @ self.mean - prior @ self.prior_mean, 0.0)
 
@@ -89,7 +85,7 @@ def _prior(parameter: Parameter, fit: float) -> tuple[float, float]:
 
 
 def log_agreement(earlier: Shared, later: Shared) -> float:
-    """ln ∫ p₁(x) p₂(x)/p(x) dx: how much more probable two campaigns are if parameters are the same in both."""
+    """ln ∫ p₁(x) p₂(x)/p(x) dx: the log Bayes factor for equal parameters in two campaigns."""
     if not len(earlier.mean):
         return 0.0
     prior = _least_prior([earlier, later])
@@ -102,12 +98,13 @@ def log_agreement(earlier: Shared, later: Shared) -> float:
 
 
 def _least_prior(parts: Sequence[Shared]) -> Floats:
-    """The precision of the prior that is in all: in heavy tails the quadratics of one prior differ."""
+    """The least precision of the priors of all parts: in heavy tails the quadratics of one prior differ."""
     return np.min([shared.prior_precision for shared in parts], axis=0)
 
 
 def combined(parts: Sequence[Shared]) -> tuple[Floats, Floats]:
-    """Mean and standard deviations of parameters that several fits share: their precisions add, the prior's once."""
+    """Mean and standard deviations of parameters that several fits share: their precisions add, with the prior counted
+    once."""
     prior = _least_prior(parts)
     likelihoods = [shared.likelihood(prior) for shared in parts]
     mean, covariance = sum(likelihoods[1:], likelihoods[0]).posterior(parts[0].prior_mean, prior)
@@ -116,7 +113,7 @@ def combined(parts: Sequence[Shared]) -> tuple[Floats, Floats]:
 
 
 def values(parameters: Sequence[Parameter], fit: Floats) -> dict[str, float]:
-    """Of parameters at these fit coordinates, in their units, by name."""
+    """Parameters at these fit coordinates, in their units, by name."""
     by_name = {
         parameter.name: parameter.from_fit(float(coordinate))
         for parameter, coordinate in zip(parameters, fit, strict=True)
@@ -130,8 +127,8 @@ def values(parameters: Sequence[Parameter], fit: Floats) -> dict[str, float]:
 
 P_CHANGE = 0.15  # probability that a set changes from one campaign to the next by one mechanism
 _BEHIND_BEST, _MOST_SETS = 12.0, 12  # nats behind a campaign's best, and how many of its sets
-_PRUNE_NATS = 30.0  # nats behind which a set in a campaign is on no course
-_SAME_STRENGTH = 0.9  # probability that a mechanism that stays has the strength that it had
+_PRUNE_NATS = 30.0  # nats behind the best set of a campaign beyond which a set is in no history
+_SAME_STRENGTH = 0.9  # probability that a mechanism that remains keeps its strength
 _MOST_HISTORIES = 400  # kept from campaign to campaign
 
 Names = tuple[str, ...]
@@ -146,12 +143,12 @@ class Candidate:
 
     @cached_property
     def explanations_by_set(self) -> dict[frozenset[str], Explanation]:
-        """The sets that were fitted."""
+        """The explanations of the sets fitted so far."""
         return {frozenset(explanation.names): explanation for explanation in self.search.explanations}
 
     @property
     def required_sets(self) -> list[frozenset[str]]:
-        """The sets that may matter."""
+        """The supported sets near the best one."""
         supported = sorted(
             (explanation for explanation in self.search.explanations if self.search.is_supported(explanation)),
             key=self.search.log_weight,
@@ -165,8 +162,8 @@ class Candidate:
 
     @property
     def unlisted_probability(self) -> float:
-        """The probability that what is missing in this campaign has no name, beyond what stays for what nobody thought
-        of, which is the same in all campaigns."""
+        """The probability that something unlisted acts in this campaign, beyond `P_NOT_IN_MODEL_SPACE`, which is the
+        same in all campaigns."""
         share = sum(answer.probability for answer in self.search.answers if answer.explanation is None)
         return max(share - P_NOT_IN_MODEL_SPACE, 0.0) / (1 - P_NOT_IN_MODEL_SPACE)
 
@@ -175,7 +172,7 @@ class Candidate:
         return frozenset(name for name in names if name not in self.search.unsupported)
 
     def explained(self, names: frozenset[str]) -> Explanation | None:
-        """A set, as far as this campaign supports its mechanisms."""
+        """The explanation of a set, reduced to the mechanisms that this campaign supports."""
         supported = self.supported(names)
         if supported not in self.explanations_by_set:
             catalogue = self.problem.lines.mechanisms.named
@@ -196,14 +193,14 @@ class SetHistory:
 
 @dataclass(frozen=True)
 class SetHistories:
-    """The most probable courses, and the posterior that each mechanism acts in each campaign."""
+    """The most probable histories, and the posterior probability of each mechanism in each campaign."""
 
     best: tuple[SetHistory, ...]
     present: Mapping[str, Floats]  # (campaigns,)
 
 
 def set_histories(candidates: Sequence[Candidate], supported: int) -> SetHistories:
-    """Of campaigns in the order of their dates; `supported` mechanisms."""
+    """Of campaigns in the order of their dates; `supported` is the number of mechanisms."""
     sets = list(
         dict.fromkeys(names for candidate in candidates for names in (frozenset[str](), *candidate.required_sets))
     )
@@ -253,7 +250,7 @@ def set_histories(candidates: Sequence[Candidate], supported: int) -> SetHistori
 def _step(
     candidates: Sequence[Candidate], number: int, sets: Sequence[frozenset[str]], here: int, there: int, supported: int
 ) -> float:
-    """ln of the prior of the change, and of how well what stays agrees."""
+    """Log prior of the change, plus the log agreement of shared parameters."""
     of_change = log_change(len(sets[here] ^ sets[there]), supported)
     before, after = candidates[number - 1].explained(sets[here]), candidates[number].explained(sets[there])
     if before is None or after is None:
@@ -264,29 +261,29 @@ def _step(
 
 
 def log_change(mechanisms: int, supported: int, share: float = P_CHANGE) -> float:
-    """ln of the prior probability that a set differs from another by so many mechanisms; one with this `share`."""
+    """Log prior probability that a set differs from another by so many mechanisms; by one with probability `share`."""
     return mechanisms * float(np.log(share / max(supported, 1))) if mechanisms else float(np.log(1 - share))
 
 
 def same_strength(earlier: Shared, later: Shared) -> bool:
-    """Whether it is more probable that a mechanism kept its strength than that it has another."""
+    """Whether a mechanism more probably kept its strength than not."""
     return bool(np.log(_SAME_STRENGTH) + log_agreement(earlier, later) > np.log(1 - _SAME_STRENGTH))
 
 
 _FROM_SKIN_TO_SKIN = 0.2  # deviation of the logarithm of the gain scatter on one bench
-_LEAST_PROBABILITY = 0.02  # the least probability that positions do, or do not, scatter
+_LEAST_PROBABILITY = 0.02  # least probability of positioning scatter, and of none
 
 
 @dataclass(frozen=True)
 class Bench:
-    """The prior of the gain scatter's logarithm, and the probability that positions scatter."""
+    """The prior of the gain scatter's logarithm, and the probability of positioning scatter."""
 
     gain: Plateau
     has_position_scatter: float
 
 
 def benches(candidates: Sequence[Candidate]) -> list[Bench]:
-    """Of each skin, by what its sisters say, one at least."""
+    """Of each skin, by the other skins, of which there must be at least one."""
     leaders = [candidate.search.fit_behind(candidate.search.answers[0]) for candidate in candidates]
     log_gains = np.array([leader.point.covariance[GAIN] for leader in leaders])
     recordings = np.array([leader.best.hypothesis.lines.recordings for leader in leaders])

@@ -1,19 +1,10 @@
-"""Fleets of skins: what their population is, and the report on it.
+"""Fleets: skins of one batch that are diagnosed together, and the report on them.
 
-Which mechanisms act in skins of one make: a set that all have in common, from which single skins may differ.
-
-Every set that any skin asks for may be the common one; given it, each skin has it, or one that differs by a mechanism
-or two, each of which shows in that skin's own recordings. A skin of which little was recorded so leans on its sisters.
-Errors of E and of the thickness are no mechanisms here: they make a skin depart (population.py).
-
-The strengths of mechanisms that several skins of one make have, as populations. The report of skins of one make that
-were diagnosed as a fleet.
-
-Skins of one make: their E, thickness, d33 and the strengths of their mechanisms as populations, and which departs.
-
-Each skin speaks by its latest campaign of FRFs that can be used, with the curves of its campaigns without FRFs. The set
-of mechanisms that all have in common is found over all skins, and what each says of its E, thickness
-and d33 (skin.py) is pooled (population.py), so that a skin of which little was recorded leans on its sisters.
+Each skin is represented by its latest usable campaign of FRFs, with the curves of its campaigns without FRFs.
+`common_set` finds the set of mechanisms common to all skins; given it, each skin has it, or one that differs by a
+mechanism or two, each of which is supported by that skin's own recordings. Errors of E and of the thickness are no
+mechanisms here: they make a skin depart (population.py). E, thickness, d33 and the strengths of mechanisms are pooled
+as populations, so that a skin with few recordings is informed by the others.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -58,15 +49,15 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_PRUNE_NATS = 40.0  # nats
-_P_DIFFERS = 0.03  # probability that a skin differs from its sisters by one mechanism
+_PRUNE_NATS = 40.0  # nats behind the best set of a skin, at most
+_P_DIFFERS = 0.03  # probability that a skin differs from the others by one mechanism
 
 
 @dataclass(frozen=True)
 class CommonSet:
-    """The most probable common set and set of each skin, with the probability of each of these; `probability` is that
-    of all of them together. `from_other_specimens`: of each skin the logarithms of the sets' probabilities by the
-    recordings of the others alone. `log_evidence`: of all recordings, over all sets."""
+    """The most probable common set and set of each skin, with the probabilities of the latter; `probability` is that of
+    all of them together. `from_other_specimens`: of each skin the log probabilities of the sets by the recordings of
+    the others only. `log_evidence`: of all recordings, over all sets."""
 
     common: Names
     sets: tuple[Names, ...]
@@ -77,18 +68,18 @@ class CommonSet:
 
 
 def candidate_sets(candidates: Sequence[Candidate]) -> list[frozenset[str]]:
-    """The sets that any skin asks for, beside errors of E and of the thickness."""
+    """The sets that are relevant for any skin, without errors of E and of the thickness."""
     names_of_skins = (names.difference(ERRORS) for candidate in candidates for names in candidate.required_sets)
     return list(dict.fromkeys((frozenset[str](), *names_of_skins)))
 
 
 def with_smaller(sets: Sequence[frozenset[str]]) -> list[frozenset[str]]:
-    """The sets, and those with one mechanism less, which say whether each of theirs shows."""
+    """The sets, and those with one mechanism less, which decide whether each mechanism is supported."""
     return list(dict.fromkeys((*sets, *(names - {name} for names in sets for name in sorted(names)))))
 
 
 def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], supported: int) -> CommonSet:
-    """Of skins that were fitted under these sets and the smaller ones; `supported` mechanisms."""
+    """Of skins fitted under these sets and the smaller ones; `supported` is the number of mechanisms."""
     evidence = np.array([[skin.log_evidence(names, len(skins)) for names in sets] for skin in skins])
     log_evidence = np.maximum(evidence - evidence.max(axis=1, keepdims=True), -_PRUNE_NATS)
     changes = np.array([[log_change(len(common ^ names), supported, _P_DIFFERS) for names in sets] for common in sets])
@@ -108,10 +99,12 @@ def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], suppo
             for names in sets
         ]
     )
-    log_common = np.where(of_all > least, prior + of_all, -np.inf)  # what shows in no skin the smaller set says
+    log_common = np.where(
+        of_all > least, prior + of_all, -np.inf
+    )  # a mechanism supported by no skin is left to the smaller set
     share = np.exp(log_common - np.logaddexp.reduce(log_common))
     best = int(share.argmax())
-    # Of each skin the posterior of its set, all common sets averaged
+    # Posterior of each skin's set, averaged over all common sets
     posterior = np.einsum("c,ncm->nm", share, np.exp(weights - of_skins[..., None]))
     chosen = weights[:, best].argmax(axis=1)
     order = skins[0].candidate.problem.lines.mechanisms.named
@@ -131,14 +124,14 @@ def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], suppo
 
 
 def _is_supported(skin: FleetSkin, names: frozenset[str], skins: int) -> bool:
-    """Whether each mechanism of a set brings evidence in a skin's own recordings."""
+    """Whether each mechanism of a set is supported by a skin's own recordings."""
     log_evidence = skin.log_evidence(names, skins)
     return all(log_evidence > skin.log_evidence(names - {name}, skins) + SHOWS for name in names)
 
 
 _LEAST_SKINS_OF_STRENGTH = 3
-_INFORMS = 0.5  # of a prior's precision: what recordings must say at least to count
-_WIDEST = 10.0  # deviation of the logarithm of a strength of which nothing is known
+_INFORMS = 0.5  # of a prior's precision: the least of informative recordings
+_WIDEST = 10.0  # deviation of the logarithm of an unknown strength
 _SPREAD = Spread(0.1, 2.0)  # deviation of its logarithm from skin to skin
 _DEPARTURE_SD = 1.0  # the same of a skin that departs in it
 DEPARTS = "strength"
@@ -146,7 +139,7 @@ DEPARTS = "strength"
 
 @dataclass(frozen=True)
 class Strength:
-    """One parameter of a mechanism, with its unit, as a population of the skins that have it."""
+    """One parameter of a mechanism, with its unit, as a population of the skins that have the mechanism."""
 
     parameter: str
     unit: str
@@ -180,8 +173,8 @@ def of_strengths(candidates: Mapping[str, Candidate], common: CommonSet) -> list
 
 
 def _likelihood(fit: Explanation, index: int) -> Gaussian | None:
-    """Of one fit coordinate by the recordings alone, the prior taken out; None where they say next to nothing of it, or
-    it moves the covariance alone."""
+    """The likelihood of one fit coordinate by the recordings only, without the prior; None where they hardly inform, or
+    the coordinate changes the covariance only."""
     hypothesis = fit.best.hypothesis
     if index not in hypothesis.mean_indices:
         return None
@@ -194,16 +187,16 @@ def _likelihood(fit: Explanation, index: int) -> Gaussian | None:
     return Gaussian(np.array([[precision]]), np.array([after * fit.point.fit[index] - prior * centre]), 0.0)
 
 
-_MOST_LISTED = 3  # skins that depart in the statement
-_LEAST_LISTED = 0.1  # probability from which on a quantity is listed in which such a skin may depart
+_MOST_LISTED = 3  # departing skins in the statement
+_LEAST_LISTED = 0.1  # least probability of a listed quantity in which such a skin may depart
 _UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
 
 
 @dataclass(frozen=True)
 class Fleet:
-    """What was found: the usable skins, the sets of their mechanisms, their E and thickness over the declared ones and
-    d33, the logarithms of the declared ones (skins, quantities), the probabilities that one of these is declared
-    wrongly for all skins, and the strengths of mechanisms."""
+    """The usable skins, the sets of their mechanisms, their E and thickness over the declared ones and d33 (`pooled`),
+    the logarithms of the declared values (skins, quantities), the probabilities that one of these is wrong for all
+    skins, and the strengths of mechanisms."""
 
     candidates: Mapping[str, Candidate]
     common: CommonSet
@@ -220,8 +213,8 @@ def fleet_report(
     fleet: Fleet,
     orders: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Of a fleet of this name, its campaigns' names, the result of each skin alone, and of skins with several campaigns
-    what is said where their order is not one of time."""
+    """Of a fleet with this name, its campaigns' names and the result of each skin alone; `orders` are clauses on skins
+    with several campaigns whose order is not known in time."""
     usable = {skin: results[skin] for skin in fleet.candidates}
     lacking = [skin for skin in results if skin not in usable]
     reports = {skin: reported(result) for skin, result in usable.items()}
@@ -300,7 +293,7 @@ def _populations(fleet: Fleet) -> list[dict[str, Any]]:
 
 
 def _expected(fleet: Fleet) -> dict[tuple[str, str], float]:
-    """What the others would have if they were declared as one skin is, by parameter and skin, where they differ."""
+    """The batch's mean at one skin's declared values, by parameter and skin, where the declared values differ."""
     expected = np.exp(fleet.pooled.mean + fleet.declared)
     return {
         (quantity, skin): float(expected[number, row])
@@ -311,8 +304,8 @@ def _expected(fleet: Fleet) -> dict[tuple[str, str], float]:
 
 
 def _probability_of_departures(fleet: Fleet) -> tuple[float, float]:
-    """The probability of what is stated of all skins' departures, and the least of that of one skin: were the first to
-    decide the verdict, fleets of many skins would all be ambiguous."""
+    """The probability of the stated departures of all skins together, and the least of that of one skin. The verdict
+    uses the latter: by the former, fleets of many skins would all be ambiguous."""
     departing = [strength.population for strength in fleet.strengths if any(strength.population.stated)]
     joint_probability, least_certain = 1.0, 1.0
     for pooled in (fleet.pooled, *departing):
@@ -339,7 +332,7 @@ def _of_strength(strength: Strength) -> dict[str, Any]:
 def _population(
     parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str, declared: Floats
 ) -> dict[str, Any]:
-    """Of one quantity, pooled over one that is declared, of which these are the logarithms (skins,)."""
+    """Of one quantity, pooled relative to declared values with these logarithms (skins,)."""
     mean, spread = float(np.exp(pooled.mean[row] + declared.mean())), float(pooled.spread[row])
     value, low, high = np.exp(pooled.of_skins[:, :, row] + declared)
     return {
@@ -365,7 +358,8 @@ def _population(
 
 
 def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
-    """With the skins that have each; a declared E or thickness that is wrong for all, or for one that departs in it."""
+    """With the skins that have each; also a declared E or thickness that is wrong for all, or for a skin that departs
+    in it."""
     present: dict[str, dict[str, float]] = {
         error: dict.fromkeys(fleet.candidates, share)
         for error, share in fleet.declared_wrongly.items()
@@ -392,7 +386,7 @@ def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
 def _lacking(
     mechanisms: Sequence[Mapping[str, Any]], stated_mechanisms: Mapping[str, set[str]]
 ) -> dict[str, list[str]]:
-    """Of each skin the mechanisms that it has by the fleet's report and not by its own."""
+    """Of each skin the mechanisms that it has in the fleet's report but not in its own."""
     return {
         skin: [
             mechanism["name"]
@@ -445,8 +439,8 @@ def _statement(
                 else f"{expected_value:.4g} for the same declared"
             )
             departures.setdefault(departure["skin"], []).append(
-                f"in {quantity_in_words(population['parameter'])}: {departure['value']:g}{_unit(population['unit'])}, where the others "
-                f"have {others} ({in_percent(departure['probability'])})"
+                f"in {quantity_in_words(population['parameter'])}: {departure['value']:g}{_unit(population['unit'])}, "
+                f"where the others have {others} ({in_percent(departure['probability'])})"
             )
     clauses = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_LISTED]
     clauses += (
@@ -460,11 +454,9 @@ def _unit(label: str) -> str:
 
 
 _LEAST_SKINS = 3
-_DECLARED = (0.02, 0.01)  # deviations of ln of the make's E and thickness about the declared ones
-# Pieces of one cure and of one poled film differ by some percent; a mould's thickness is held
-_FAR_FROM_DECLARED = (
-    2.0  # deviations by which skins must be off together for an error of what is declared of all to be looked at
-)
+_DECLARED = (0.02, 0.01)  # deviations of ln of the batch's E and thickness about the declared ones
+# Pieces of one cure and of one poled film differ by some percent; a mould sets the thickness
+_FAR_FROM_DECLARED = 2.0  # common deviation of the skins, in sd, above which an error of the declared values is tried
 SPREADS = (Spread(0.03, 2.0), Spread(0.01, 1.0), Spread(0.03, 2.0))
 
 
@@ -508,7 +500,8 @@ def diagnose_fleet(
 
 
 def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collection[str]) -> DiagnosisResult:
-    """The diagnosis of the latest campaign that says something alone, else of the latest that does beside others."""
+    """The diagnosis of the latest campaign with a result of its own, else of the latest with one together with
+    others."""
     results: list[DiagnosisResult] = []
     for campaign in in_order(campaigns)[::-1]:
         results.append(diagnose(campaign, table, without=without))
@@ -519,7 +512,7 @@ def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collectio
 
 @dataclass(frozen=True)
 class _Attempt:
-    """The skins looked at about what is declared, or with an `error` of that in all of them."""
+    """The skins fitted about the declared values, or with an `error` of these in all skins."""
 
     error: str
     skins: Sequence[FleetSkin]
@@ -561,8 +554,8 @@ def _fleet(candidates: Mapping[str, Candidate]) -> Fleet:
 
 
 def _pooled(attempt: _Attempt, odds: float) -> tuple[Populations, dict[str, float]]:
-    """The populations by one attempt, and by its skins the probability that what is declared of all is right or has an
-    error."""
+    """The populations by one attempt, and the probability of each error (or none) of the values declared for all
+    skins."""
     states = [
         skin.states(log_shares)
         for skin, log_shares in zip(attempt.skins, attempt.common.from_other_specimens, strict=True)
@@ -575,14 +568,16 @@ def _pooled(attempt: _Attempt, odds: float) -> tuple[Populations, dict[str, floa
 
 
 def declared_wrongly(attempts: Mapping[str, float], batches: Mapping[str, float]) -> dict[str, float]:
-    """The probability of each error of what is declared of all skins: `attempts` those of each attempt, by error, and
-    `batches` those of each error by the attempt that has none."""
+    """The probability of each error of the values declared for all skins: `attempts` are the probabilities of the
+    attempts, by error, `batches` those of each error in the attempt without one."""
     errors = [error for error in dict.fromkeys((*batches, *attempts)) if error]
     return {error: attempts[""] * batches.get(error, 0.0) + attempts.get(error, 0.0) for error in errors}
 
 
 def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float]:
-    """By how much ln of a quantity is off what is declared, if it is the same in all skins, and its deviation."""
+    """The mean deviation of ln of a quantity from the declared values, if it is the same in all skins, and its standard
+    deviation.
+    """
     departures = [skin.departing(error) for skin in skins if error in skin.errors]
     means, variances = (
         np.array([departure[part] for departure in departures if departure is not None]) for part in (0, 1)
@@ -594,7 +589,8 @@ def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float
 
 
 def _batches(skins: Sequence[FleetSkin], odds: float) -> tuple[list[Batch], list[str]]:
-    """The priors of the make's quantities, and by each the error of what is declared of all skins, with its odds."""
+    """The priors of the batch's quantities, and the error of the values declared for all skins in each, with its
+    odds."""
     usual, centre = np.array([*_DECLARED, D33_PRIOR[1]]), np.array([0.0, 0.0, D33_PRIOR[0]])
     batches, errors = [Batch(0.0, centre, usual**-2)], [""]
     for row, error in enumerate(ERRORS):

@@ -1,18 +1,14 @@
-"""Skins as members of a population.
+"""Skins of one batch as members of a population: its mean and spread, and which skins depart from it, in what.
 
-Quantities of skins of one make as populations: what the skins say together, which of them departs, and in what.
+A skin's logarithms q (of E, thickness and d33) are normal about the batch's μ: q_i ~ N(μ, diag τ²). One that departs
+has a far larger deviation D in one quantity. The likelihood of q by a skin's recordings in each of these states is
+Gaussian. Given the states and τ all is normal; sums run over a grid of τ and over all relevant sets of departing skins,
+enlarged by one skin at a time. Fewer than half of the skins depart: the batch is what most are.
 
-A skin's logarithms q (of E, thickness and d33) are normal about the make's μ: q_i ~ N(μ, diag τ²). One that departs has
-a far larger deviation D in one quantity. What a skin's recordings say of q in each of these states is a normal
-likelihood. Given the states and τ all is normal; sums run over a grid of τ and over all sets of departing skins that
-matter, grown by one skin at a time. Fewer than half of the skins depart: the make is what most are.
-
-What the recordings of one skin say of its E, thickness and d33, as it is of its make or departs from it.
-
-Fits under each set of mechanisms with all three free: E and thickness about the make's, as skins of one make differ;
-and either of them anywhere, since what is declared is wrong for this skin. Laplace's approximation of each, with the
-priors taken out, is a normal likelihood of the logarithms; those of E and thickness are over the declared ones, so that
-skins that are declared to differ are still of one make.
+The likelihood of one skin's q (`FleetSkin`) comes from fits under each set of mechanisms with all three free: E and
+thickness about the batch's, as skins of one batch differ; and either of them unrestricted, in case the declared value
+is wrong for this skin. It is Laplace's approximation of each fit with the priors removed. The logarithms of E and
+thickness are relative to the declared ones, so that skins that are declared to differ can be of one batch.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,21 +29,22 @@ from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats, Indices
 
-_P_ANY_DEPARTS = 0.5  # prior probability that any skin of a fleet departs: as likely as not
-_NODES, _STRIDES = 12, 2.7  # of the grid of ln τ, and to how many of its standard deviations it reaches
-_PRUNE_NATS = 12.0  # nats behind the best set of departing skins, beyond which one counts no longer
+_P_ANY_DEPARTS = 0.5  # prior probability that any skin of a fleet departs
+_NODES, _STRIDES = 12, 2.7  # of the grid of ln τ, and its half-width in standard deviations
+_PRUNE_NATS = 12.0  # nats behind the best set of departing skins beyond which a set is dropped
 _MOST_SETS = 200  # with equally many departing skins
 _NEGLIGIBLE = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals
 _LEVELS = (0.5, 0.025, 0.975)
 
-STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
+STATED = 0.5  # least probability of a stated departure, and of a stated error of the values declared for all skins
 REGULAR = ""  # the departure of a skin that does not depart
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What a skin says if it departs so: the name of the departure, the likelihood of the quantities, and the variances
-    of the departure (quantities,)."""
+    """A skin's state: the name of the departure, the likelihood of the quantities, and the variances of the departure
+    (quantities,).
+    """
 
     departure: str
     likelihood: Gaussian
@@ -56,7 +53,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """A prior of μ: the logarithm of its probability, centre and precision (quantities,)."""
+    """A prior of μ: log probability, centre and precision (quantities,)."""
 
     log_prior: float
     centre: Floats
@@ -65,15 +62,15 @@ class Batch:
 
 @dataclass(frozen=True)
 class Spread:
-    """The prior of τ of one quantity: ln τ is normal about that of `usual` with the standard deviation ln `factor`; a
-    factor of 1 is a known τ."""
+    """The prior of τ of one quantity: ln τ is normal about ln `usual` with standard deviation ln `factor`; τ is known
+    where the factor is 1."""
 
     usual: float
     factor: float
 
     @property
     def nodes(self) -> list[tuple[float, float]]:
-        """Values of τ with the logarithms of their weights."""
+        """Values of τ with their log weights."""
         if self.factor == 1:
             return [(self.usual, 0.0)]
         deviations = np.linspace(-_STRIDES, _STRIDES, _NODES).tolist()
@@ -82,9 +79,9 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Populations:
-    """`mean` and `spread` τ of the make (quantities,), of each skin median and ends of the 95 % interval
-    (3, skins, quantities), its departures' probabilities by name, and the probability of each prior of μ. `together`:
-    that of the departures of all skins at once, by their names."""
+    """`mean` and `spread` τ of the batch (quantities,); `of_skins`: median and ends of the 95 % interval (3, skins,
+    quantities); `departures`: their probabilities by name, for each skin; `batches`: the probability of each prior of
+    μ; `joint`: the probability of the departures of all skins together, by their names."""
 
     mean: Floats
     spread: Floats
@@ -95,7 +92,7 @@ class Populations:
 
     @property
     def stated(self) -> tuple[str, ...]:
-        """The departure of each skin: the likeliest of those that more probably departs than not."""
+        """The departure of each skin: the most probable one of skins that more probably depart than not."""
         return tuple(
             REGULAR
             if probabilities[REGULAR] >= 1 - STATED
@@ -105,20 +102,21 @@ class Populations:
 
 
 def log_odds_of_departure(skins: int) -> float:
-    """The prior log odds that one of so many skins departs."""
+    """The prior log odds that one of `skins` departs."""
     return float(np.log(np.expm1(-np.log1p(-_P_ANY_DEPARTS) / skins)))
 
 
 def populations(skins: Sequence[Sequence[State]], batches: Sequence[Batch], spreads: Sequence[Spread]) -> Populations:
-    """Of the states of each skin, the regular one first, the priors of μ, and those of τ (quantities,)."""
+    """From the states of each skin, the regular one first, the priors of μ, and those of τ (quantities,)."""
     assert all(states and states[0].departure == REGULAR for states in skins)
     return _Fleet(skins, batches, spreads).populations
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Of the posterior: the states of all skins, one prior of μ, the spreads that matter (spreads,), and their
-    probabilities."""
+    """A part of the posterior: the states of all skins, one prior of μ, the relevant spreads (spreads,), and their
+    probabilities.
+    """
 
     states: tuple[int, ...]
     batch: Batch
@@ -133,19 +131,22 @@ class _Fleet:
         self.spreads = np.array([[value for value, _ in node] for node in nodes])  # (spreads, quantities)
         shares = np.array([sum(share for _, share in node) for node in nodes])
         self.log_shares = shares - np.logaddexp.reduce(shares)
-        # What each skin in each state says of μ, (spreads,) each
+        # Likelihoods of μ by each skin in each state, (spreads,) each
         self.likelihoods = [
             [state.likelihood.of_mean(self.spreads**2 + state.variance) for state in states] for states in skins
         ]
 
     def mean_likelihood(self, states: Sequence[int], without: int | None = None) -> Gaussian:
-        """What the skins in these states say of μ, but for one."""
-        likelihoods = [of_skin[state] for number, (of_skin, state) in enumerate(zip(self.likelihoods, states, strict=True))
-                if number != without]  # fmt: skip
+        """The likelihood of μ by the skins in these states, leaving out one."""
+        likelihoods = [
+            of_skin[state]
+            for number, (of_skin, state) in enumerate(zip(self.likelihoods, states, strict=True))
+            if number != without
+        ]
         return sum(likelihoods[1:], likelihoods[0])
 
     def log_weights(self, states: Sequence[int]) -> Floats:
-        """Of each prior of μ and each spread (makes, spreads)."""
+        """Log weights of each prior of μ and each spread (batches, spreads)."""
         odds = log_odds_of_departure(len(self.skins))
         prior = sum(
             odds - np.log(len(skin_states) - 1) for skin_states, state in zip(self.skins, states, strict=True) if state
@@ -158,7 +159,7 @@ class _Fleet:
 
     @cached_property
     def log_weights_by_states(self) -> dict[tuple[int, ...], Floats]:
-        """The states of all skins that matter, with their log weights."""
+        """The relevant states of all skins, with their log weights."""
         current = {none: self.log_weights(none) for none in [(0,) * len(self.skins)]}
         all_weights = dict(current)
         for _ in range((len(self.skins) - 1) // 2):
@@ -246,19 +247,19 @@ class _Fleet:
 
 MODULUS, THICKNESS, D33 = "modulus_error", "thickness_error", "d33"
 ERRORS = (MODULUS, THICKNESS)
-QUANTITIES = {MODULUS: "youngs_modulus", THICKNESS: "thickness", D33: "d33"}  # by what a skin departs in
-_ABOUT_BATCH = (0.1, 0.01)  # deviations of ln E and ln h about the make's within which a regular skin is fitted
+QUANTITIES = {MODULUS: "youngs_modulus", THICKNESS: "thickness", D33: "d33"}  # by departure
+_ABOUT_BATCH = (0.1, 0.01)  # deviations of ln E and ln h of regular skins about the batch's
 _FAR_IN_D33 = 0.4  # an amplifier's other range
 FAR = (*(curvature_of_prior(CATALOGUE[name].parameters_stated[0])[0] ** -0.5 for name in ERRORS), _FAR_IN_D33)
-# Deviations of ln E, ln h and ln d33 of one that departs, those of errors as the mechanisms have their scales
+# Deviations of ln E, ln h and ln d33 of departing skins, those of E and h from the priors of the mechanisms
 D33_PRIOR = (float(np.log(15.0)), 1.5)
-_BEYOND = 2.0  # deviations about the make, beyond which a fit says no more than that the skin departs
+_BEYOND = 2.0  # deviations from the batch beyond which a regular fit is no approximation
 
 Likelihoods = dict[tuple[frozenset[str], str], Gaussian]  # by set and departure
 
 
 class FleetSkin:
-    """One skin beside its sisters, fitted under sets of mechanisms, the first of them none."""
+    """One skin of a fleet, fitted under sets of mechanisms, the first of them empty."""
 
     def __init__(
         self,
@@ -267,8 +268,8 @@ class FleetSkin:
         bench: Bench,
         centre: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """Fit all sets; `bench` says what scatters, `centre` is ln of the make's E and thickness over the declared
-        ones."""
+        """Fit all sets; `bench` has the priors of the scatters, `centre` is ln of the batch's E and thickness over the
+        declared ones."""
         self.candidate = candidate
         self._centre = centre
         skin = candidate.problem.lines.campaign.skin
@@ -281,7 +282,7 @@ class FleetSkin:
         self._fitted = self._fits(tuple(dict.fromkeys(candidate.supported(names) for names in sets)), bench)
 
     def log_evidence(self, names: frozenset[str], skins: int) -> float:
-        """Of a set, whether the skin departs or not, as one of so many."""
+        """Of a set, over the regular state and all departures, as one of `skins`."""
         supported = self.candidate.supported(names)
         odds = log_odds_of_departure(skins) - float(np.log(len(self.departures)))
         weights = [
@@ -292,7 +293,7 @@ class FleetSkin:
         return float(np.logaddexp.reduce(weights)) if weights else -np.inf
 
     def departing(self, error: str) -> tuple[float, float] | None:
-        """If what is declared is off, and no mechanism acts: mean and variance of the logarithm by which it is."""
+        """With a wrong declared value and no mechanism: mean and variance of the log of its error."""
         likelihood = self._fitted.get((frozenset(), error))
         if likelihood is None:
             return None
@@ -301,7 +302,7 @@ class FleetSkin:
         return float(mean[row]), float(covariance[row, row])
 
     def states(self, log_shares: Mapping[frozenset[str], float]) -> list[State]:
-        """What it says under sets of mechanisms of these prior probabilities, the regular state first."""
+        """The states under sets of mechanisms of these prior log probabilities, the regular one first."""
         states = []
         for departure in (REGULAR, *self.departures):
             components = [
@@ -323,7 +324,7 @@ class FleetSkin:
         return np.array([far**2 * (departure == name) for name, far in zip(QUANTITIES, FAR, strict=True)])
 
     def _prior(self, departure: str) -> tuple[Floats, Floats]:
-        """Centre and precision of the quantities before any recording."""
+        """Prior centre and precision of the quantities."""
         centre = np.array([*self._centre, D33_PRIOR[0]])
         return centre, 1 / (np.array([*_ABOUT_BATCH, D33_PRIOR[1]]) ** 2 + self._departure_variance(departure))
 
@@ -331,7 +332,7 @@ class FleetSkin:
         return likelihood.log_integral(*self._prior(departure)).item()
 
     def _fits(self, sets: Sequence[frozenset[str]], bench: Bench) -> Likelihoods:
-        """Of those that can be fitted."""
+        """Likelihoods of the sets and departures that can be fitted."""
         likelihoods: Likelihoods = {}
         lines, table = self.candidate.problem.lines, self.candidate.problem.table
         for departure in (REGULAR, *self.errors):
@@ -355,9 +356,10 @@ class FleetSkin:
         return likelihoods
 
     def _replace_far_regular(self, likelihoods: Likelihoods, names: frozenset[str]) -> None:
-        """Far from the make the regular fit, which is held there, is no approximation: a departing one takes its place.
+        """Replace the regular fit, which is held near the batch, by a departing one where the skin is far from the
+        batch.
 
-        Its quadratic would have the likelihood grow without end towards where the recordings pull.
+        There its quadratic is no approximation: its likelihood would grow without limit.
         """
         others = [name for name in self.errors if (names, name) in likelihoods]
         if (names, REGULAR) not in likelihoods or not others:
@@ -369,7 +371,7 @@ class FleetSkin:
             likelihoods[names, REGULAR] = likelihoods[names, nearest]
 
     def _about_batch(self, model: Model, lines: Lines, held: Sequence[str]) -> Gaussian:
-        """That E and thickness are about the make's, as far as held, beside what recordings of other kinds say."""
+        """The likelihood that `held` E and thickness are near the batch's, times that by recordings of other kinds."""
         other_kinds = self.candidate.problem.beside
         slices = parameter_slices(model.names, lines)
         rows = [ERRORS.index(name) for name in held]
@@ -380,7 +382,8 @@ class FleetSkin:
         return about if from_others is None else from_others + about
 
     def _likelihood(self, fit: Explanation, best: Evidence, held: Sequence[str]) -> Gaussian:
-        """The likelihood by one of its fits: the posterior over the priors, those of errors and the usual ones."""
+        """The likelihood of the quantities by one fit: the posterior divided by the priors, of errors and usual
+        ones."""
         slices = parameter_slices(fit.names, best.hypothesis.lines)
         names = [parameter.name for parameter in fit.model.parameters]
         matrix = np.zeros((len(QUANTITIES), len(names)))
@@ -406,7 +409,7 @@ class FleetSkin:
 
 
 def _log_share(fit: Explanation, evidence: Evidence, bench: Bench) -> float:
-    """ln of the prior of a fit with or without positioning scatter, where there are both."""
+    """Log prior of a fit with or without positioning scatter, where there are both."""
     if len(fit.each) == 1:
         return 0.0
     return float(
@@ -417,7 +420,7 @@ def _log_share(fit: Explanation, evidence: Evidence, bench: Bench) -> float:
 
 
 def _explained(problem: FittingProblem, sets: Sequence[set[str]]) -> list[Explanation | None]:
-    """Of each set, None where it is hopeless beside the others; the first is not compared with them."""
+    """Explanations of the sets, None where one is far less probable than the others; the first is not compared."""
     catalogue = problem.lines.mechanisms.named
     requests = [Request(tuple(name for name in catalogue if name in names)) for names in sets]
     return [*problem.explain(requests[:1]), *problem.explain(requests[1:])]

@@ -1,16 +1,13 @@
-"""The sensors of an array at several dates.
+"""The sensors of an array in several campaigns: the campaigns' dates, each sensor's d33 with the mechanisms of the
+diagnosis, and what changed.
 
-When campaigns were recorded, and how a report calls them by that. The d33 of each sensor in each of several campaigns,
-the mechanisms found taken into account, and what changed.
-
-Two sensors of which each has, from a campaign on, the d33 that the other one had: their labels were exchanged.
-
-Two changes of single sensors at once, which would be this size by chance alone, against an exchange, which fixes both.
-
-A d33 of all sensors that changed from one campaign to the next: how well that is known, and what could have done it.
-
-The same factor on all sensors tells nothing of its cause: d33 itself, or a mechanism that in this design acts as one
-factor, such as a glue line that gives way alike under every sphere.
+- `CampaignDates`: when campaigns were recorded, and their names in reports.
+- `d33_changes`: changes of the array and of single sensors.
+- `mark_exchanges`: two sensors of which each has the d33 of the other from one campaign on had their labels exchanged.
+  Compared are an exchange, which fixes both changes, and two changes of this size by chance.
+- `causes`: what could have changed d33 of all sensors. The same factor on all sensors does not tell its cause: d33
+  itself, or a mechanism that in this design acts as one factor, such as a glue line that slips by the same share under
+  every sphere.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -42,45 +39,43 @@ from underskin.units import Floats, to_lab
 
 @dataclass(frozen=True)
 class CampaignDates:
-    """Names of campaigns in their order, with the dates of their first recordings, None of those without a time."""
+    """Names of campaigns in their order, with the dates of their first recordings, None where there is no time."""
 
     names: Sequence[str]
     dates: Sequence[str | None]
 
     @property
     def ordered(self) -> bool:
-        """Whether their order is one of time: all have a date."""
+        """Whether the order is one of time: all have a date."""
         return None not in self.dates
 
     def since(self, number: int) -> str | None:
-        """The date from which on something is there that begins with this campaign; None where the order is not one of
-        time."""
+        """The date of this campaign, where a change begins; None where the order is not one of time."""
         return self.dates[number] if self.ordered else None
 
     @property
     def times(self) -> Floats:
-        """When the campaigns were recorded, in days; where not all have a date of their own, their places in the
-        order."""
+        """When the campaigns were recorded, in days; their indices where not all have a date of their own."""
         days = [date.fromisoformat(date_text).toordinal() for date_text in self.dates if date_text is not None]
         ordered = self.ordered and days == sorted(days) and len(set(days)) == len(days)
         return np.array(days if ordered else range(len(self.dates)), dtype=float)
 
     def days(self, first: int, last: int) -> int | None:
-        """Between two campaigns; None where their order is not one of time."""
+        """Days between two campaigns; None where their order is not one of time."""
         start, end = self.dates[first], self.dates[last]
         if start is None or end is None or not self.ordered:
             return None
         return (date.fromisoformat(end) - date.fromisoformat(start)).days
 
     def called(self, number: int) -> str:
-        """A campaign by its date where that says which it is, else by its name: "campaign B (no date)"."""
+        """A campaign's date where that is unique, else its name: "campaign B (no date)"."""
         date_text = self.dates[number]
         if date_text is not None and self.ordered and self.dates.count(date_text) == 1:
             return date_text
         return f"campaign {self.names[number]} ({date_text or 'no date'})"
 
     def order_clause(self) -> str:
-        """That the order is not one of time; empty where it is."""
+        """The clause that the order is not one of time; empty where it is."""
         if self.ordered:
             return ""
         listed = ", ".join(self.called(number) for number in range(len(self.names)))
@@ -88,7 +83,7 @@ class CampaignDates:
 
 
 def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
-    """By the first time of each; as they come where one has none."""
+    """By the first time of each; in the given order where one has none."""
     times = [_first_time(campaign) for campaign in campaigns]
     known_times = [time for time in times if time is not None]
     if len(known_times) < len(times):
@@ -97,7 +92,7 @@ def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
 
 
 def _first_time(campaign: Campaign) -> float | None:
-    """In seconds; None where none of its recordings has a time."""
+    """Of its recordings, in seconds; None where none has a time."""
     written = [recording.recorded_at for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     times = [datetime.fromisoformat(time) for time in written if time is not None]
     zone = time_zone()
@@ -115,7 +110,7 @@ def date_of(campaign: Campaign) -> str | None:
 
 _STATED = 0.98  # probability of a change that is stated
 _PRIOR, USUAL = 0.05, 0.2  # that d33 changes between campaigns, and the sd of such a change's logarithm
-_SUSPECTED = 0.5  # the same prior of a sensor that one of two campaigns says stands alone
+_SUSPECTED = 0.5  # the same prior of a sensor whose level differs from the others' in one of two campaigns
 _LEAST, _LEAST_OF_ALL = 0.03, 0.05  # relative changes that are stated: amplifiers are calibrated to some percent
 
 
@@ -147,8 +142,8 @@ class SensorsOfCampaign:
 
 @dataclass(frozen=True)
 class Change:
-    """A relative change of d33 between two campaigns, `before` and `until`: of one sensor beside the array, or of the
-    array (None). Of a step these follow each other; of a course they are the first and the last."""
+    """A relative change of d33 between two campaigns, `before` and `until`: of one sensor relative to the array, or of
+    the array (None). For a step these are consecutive; for a gradual change they are the first and the last."""
 
     sensor: str | None
     before: int
@@ -157,23 +152,24 @@ class Change:
     uncertainty: float  # of its logarithm
     probability: float
     causes: tuple[str, ...] = ()  # of a change of all: mechanisms that would make it
-    exchanged_with: str | None = None  # the sensor that has since then the d33 that this one had, and this one its
+    exchanged_with: str | None = None  # the sensor with which it exchanged its d33
 
     @property
     def since(self) -> int:
-        """Number of the campaign from which on it is there."""
+        """Number of the first campaign with the change."""
         return self.before + 1
 
     @property
     def is_step(self) -> bool:
-        """Whether it is from one campaign to the next."""
+        """Whether it is between consecutive campaigns."""
         return self.until == self.since
 
 
 @dataclass(frozen=True, eq=False)
 class ArrayOverDates:
-    """d33 [pC/N] of the array in those campaigns (dates,) that tell one, over the sensors that they share, with its
-    standard uncertainty between dates; and its change from the first to the last, as `Change` and with its interval."""
+    """d33 [pC/N] of the array in the campaigns (dates,) that determine it, over the sensors that they share, with its
+    standard uncertainty between dates; and its change from the first to the last, as `Change` and with its interval.
+    """
 
     numbers: tuple[int, ...]
     d33: Floats
@@ -185,7 +181,7 @@ class ArrayOverDates:
 
     @property
     def is_significant(self) -> bool:
-        """Whether its 95 % interval leaves out that nothing changed."""
+        """Whether its 95 % interval excludes no change."""
         return self.low * self.high > 0
 
 
@@ -195,8 +191,8 @@ Values = Mapping[str, Mapping[str, float]]  # of mechanisms' parameters
 def sensors_of(
     campaign: Campaign, values: Values, table: SigmaTable, used: Collection[str]
 ) -> SensorsOfCampaign | None:
-    """With mechanisms at these values, by the recordings `used` (ids) that its own diagnosis used; without sensors
-    that are dead. None where no recording can be inverted."""
+    """With mechanisms at these values, from the recordings `used` (ids) by the campaign's own diagnosis; without dead
+    sensors. None where no recording can be inverted."""
     recordings = tuple(recording for recording in campaign.recordings if recording.id in used)
     model = AdoptedModel(campaign.skin, {name: parameters for name, parameters in values.items() if parameters}, 0.0)
     try:
@@ -214,7 +210,7 @@ def sensors_of(
 
 
 def corrected(campaign: Campaign, changes: Sequence[Change], number: int) -> Campaign:
-    """The campaign of this number as it would be had no single sensor changed at once until then."""
+    """The campaign of this number with earlier steps of single sensors undone."""
     factors: dict[str, float] = {}
     for change in changes:
         if change.sensor is not None and change.is_step and change.since <= number:
@@ -241,12 +237,12 @@ def d33_changes(
     unsure: Sequence[float],
     times: Floats,
 ) -> list[Change]:
-    """What changed: from one campaign to the next the array, and single sensors beside it; and over all of them what
-    changed too slowly for that.
+    """Changes of the array and of single sensors relative to it: steps between consecutive campaigns, and over all of
+    them changes too slow for a step.
 
-    `suspected_sensors` are those of which each campaign by itself finds that their level stands beside that of the
-    others, `unsure` by how much ln d33 of all since the campaign before is by the mechanisms taken into account,
-    `times` (campaigns,) when they were recorded, in any unit.
+    `suspected_sensors`: those whose level, in each campaign by itself, differs from the others'. `unsure`: the
+    uncertainty of ln d33 of all sensors since the previous campaign by the mechanisms. `times` (campaigns,): when they
+    were recorded, in any unit.
     """
     detected: list[Change] = []
     for number in range(1, len(campaigns)):
@@ -290,7 +286,7 @@ def array_over_dates(
 
 
 def _levels(campaigns: Sequence[SensorsOfCampaign | None]) -> tuple[list[int], list[str], ArrayLevels]:
-    """The campaigns that tell d33, by number, the sensors of any, and their levels (sensors, dates)."""
+    """The numbers of campaigns that determine d33, the sensors of any of them, and their levels (sensors, dates)."""
     campaigns_with_d33 = {
         number: sensors_of_campaign
         for number, sensors_of_campaign in enumerate(campaigns)
@@ -312,7 +308,7 @@ def _levels(campaigns: Sequence[SensorsOfCampaign | None]) -> tuple[list[int], l
 def _steps(
     campaigns: Sequence[SensorsOfCampaign | None], number: int, suspected: frozenset[str], unsure: float
 ) -> list[Change]:
-    """The changes since the campaign before this one."""
+    """The changes since the previous campaign."""
     _, sensors, levels = _levels(campaigns[number - 1 : number + 1])
     detected = []
     shared = np.isfinite(levels.departure).all(axis=1)
@@ -328,7 +324,7 @@ def _steps(
 
 
 def _gradual(campaigns: Sequence[SensorsOfCampaign | None], unsure: Sequence[float], times: Floats) -> list[Change]:
-    """The changes between the first and the last of three campaigns or more, of the array and of each sensor."""
+    """The changes between the first and the last of at least three campaigns, of the array and of each sensor."""
     numbers, sensors, levels = _levels(campaigns)
     over = array_over_dates(campaigns, unsure, times)
     if over is None or len(over.numbers) < FEWEST_DATES:
@@ -349,7 +345,7 @@ def _gradual(campaigns: Sequence[SensorsOfCampaign | None], unsure: Sequence[flo
 
 
 def _stated(sensor: str | None, before: int, until: int, size: float, sd: float, prior: float) -> list[Change]:
-    """A change of ln d33 where it is to be stated."""
+    """A change of ln d33, if it is probable and large enough to be stated."""
     probability = _probability(size, sd, prior)
     least = _LEAST_OF_ALL if sensor is None else _LEAST
     if probability <= _STATED or abs(size) <= least:
@@ -362,14 +358,14 @@ def _unsure_between(unsure: Sequence[float], first: int, last: int) -> float:
 
 
 def _probability(change: float, deviation: float, prior: float) -> float:
-    """That it changed at all: usual changes are of some 20 %."""
+    """The probability that d33 changed; usual changes are about 20 %."""
     both = (deviation**2 + USUAL**2, deviation**2)
     changed, same = (-0.5 * (change**2 / variance + np.log(variance)) for variance in both)
     return float(1 / (1 + (1 - prior) / prior * np.exp(np.clip(same - changed, -700, 700))))
 
 
 def per_sensor(campaigns: Sequence[SensorsOfCampaign | None]) -> list[dict[str, Any]]:
-    """Of all campaigns."""
+    """Rows of all campaigns."""
     return [
         row
         for sensors_of_campaign in campaigns
@@ -383,7 +379,7 @@ _LOG_PRIOR = float(np.log(0.2))  # of an exchange, where two sensors have change
 
 
 def mark_exchanges(detected: Sequence[Change], campaigns: Sequence[SensorsOfCampaign | None]) -> list[Change]:
-    """The changes, two of single sensors marked as an exchange where that is far more probable."""
+    """The changes; two of single sensors are marked as an exchange where that is far more probable."""
     changes = list(detected)
     single = [index for index, change in enumerate(changes) if change.sensor is not None and change.is_step]
     odds = {
@@ -402,7 +398,7 @@ def mark_exchanges(detected: Sequence[Change], campaigns: Sequence[SensorsOfCamp
 
 
 def _log_odds(first: Change, second: Change, campaigns: Sequence[SensorsOfCampaign | None]) -> float:
-    """Of an exchange over two changes of usual size; both changes are beyond that of all sensors."""
+    """Of an exchange over two changes of usual size; both changes are relative to that of all sensors."""
     before = campaigns[first.since - 1]
     assert before is not None
     first_d33, second_d33 = (float(before.d33[before.ids.index(str(change.sensor))]) for change in (first, second))
@@ -423,7 +419,7 @@ def changed_once(changes: Sequence[Change]) -> Iterator[Change]:
 
 
 def findings(changes: Sequence[Change], dated: CampaignDates) -> list[Finding]:
-    """One of each exchange."""
+    """One finding for each exchange."""
     return [
         Finding(
             Reason.LEVELS_EXCHANGED,
@@ -437,13 +433,13 @@ def findings(changes: Sequence[Change], dated: CampaignDates) -> list[Finding]:
 
 
 AGEING = "ageing"
-_LIKELY = 0.1  # of the weight of the most probable cause, from which on another one is listed
-_SPACING = 0.03  # of ln d33: places over a mechanism's prior lie about as far apart
+_LIKELY = 0.1  # of the weight of the most probable cause: least weight of a listed one
+_SPACING = 0.03  # of ln d33: about the distance of nodes over a mechanism's prior
 
 
 def unsure_of_changes(candidates: Sequence[Candidate], leader: SetHistory) -> list[float]:
-    """Of each campaign by how much ln d33 since the one before is unsure by the mechanisms' strengths; a mechanism that
-    is in both with one strength moves both alike. 0 of the first."""
+    """Of each campaign the uncertainty of ln d33 since the previous one by the mechanisms' strengths; a mechanism with
+    the same strength in both cancels. 0 for the first."""
     deviations = [0.0]
     for number in range(1, len(candidates)):
         before, after = (_moving(candidates[index], leader.sets[index]) for index in (number - 1, number))
@@ -454,8 +450,8 @@ def unsure_of_changes(candidates: Sequence[Candidate], leader: SetHistory) -> li
 
 
 def causes(candidate: Candidate, names: Sequence[str], change: Change) -> tuple[str, ...]:
-    """The mechanisms that, appearing beside a campaign's own `names`, would change d33 of all sensors so: ageing, which
-    is d33 itself and only falls, then the most probable first."""
+    """The mechanisms that, added to a campaign's own `names`, would change d33 of all sensors so: ageing, which is d33
+    itself and only decreases it, then the most probable first."""
     explanation = _moving(candidate, names)
     before = float(explanation.point.fit[place_of(explanation, "d33")] - np.log1p(change.value))
     weights = {AGEING: float(_normal(np.log1p([change.value]), USUAL)[0])} if change.value < 0 else {}
@@ -472,7 +468,8 @@ def causes(candidate: Candidate, names: Sequence[str], change: Change) -> tuple[
 
 
 def _moving(candidate: Candidate, names: Sequence[str]) -> Explanation:
-    """Of a set that part which moves predictions: a spread of the sensors does not change what one of them has."""
+    """The explanation of the mechanisms of a set that move predictions: the spread of the sensors does not change a
+    sensor's d33."""
     mechanisms = candidate.problem.lines.mechanisms
     explanation = candidate.explained(frozenset(name for name in names if mechanisms[name].moves_predictions))
     assert explanation is not None
