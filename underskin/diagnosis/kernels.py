@@ -115,9 +115,7 @@ def spread_sums(both: Floats, with_y: Floats, moving: NDArray[np.int64], uv: Flo
                 pair += 1
 
 
-_ROWS_TOGETHER = (
-    8  # factors of the determinant whose logarithm is taken together: below 1e38 each, they do not overflow
-)
+_ROWS_TOGETHER = 8  # factors of the determinant that share one logarithm: below 1e38 each, they do not overflow
 _NONE = 1e-17  # of x: smaller losses are below the sum's rounding
 _SUMS = "float64[:, :, ::1]"
 _ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
@@ -249,9 +247,7 @@ def subtract_pickup_slopes(
                         vv[point, recording_index, p, q] -= loss * (of_p.real * of_q.real + of_p.imag * of_q.imag)
 
 
-_PIVOTS_TOGETHER = (
-    8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
-)
+_PIVOTS_TOGETHER = 8  # factors of a determinant that share one logarithm: below 1e38 each, they do not overflow
 _LOWEST, _HIGHEST = -1.0, 5.0  # of log κ
 _TOLERANCE = 1e-3
 _SECTION = 0.6180339887498949  # golden

@@ -124,8 +124,8 @@ _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are spl
 _STRAIGHT = 3.0  # standard deviations of χ² about a straight line above which a block is split
 _LEAST_NOISE = 2e-5  # of the range of force: resolution of numbers with five digits
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which changes of force are summed, standard deviations of noise
-_NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # from it, where blocks begin: in samples, or in
-# as many of them as hide the travel, since a law of single displacements that are noisy is biased where it bends
+_NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # first samples of blocks, from a jump: in
+# samples, or in steps as large as the noise of the travel, since noisy single displacements bias a non-linear law
 _SIDE_SAMPLES = 5  # samples on either side of the deepest one
 _STEP = 0.2  # of the larger step of both ways, which the smaller must exceed for their lines to meet in a corner
 _RESTS = 1e-3  # of that step: the sphere was held where the deepest samples differ by less
@@ -145,7 +145,7 @@ def thinned(
     path_fraction = path_fractions(displacement, force, seen.noise)
     even = np.searchsorted(path_fraction, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
-    unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
+    unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel within the noise of force
     straight = ((force, seen.noise), (displacement, max(unsteady, unseen)))
     starts = _split(np.union1d(even, _starts_near_corners(seen, displacement, force, kind)), straight)
     counts = np.diff(np.append(starts, len(path_fraction)))

@@ -129,7 +129,7 @@ P_CHANGE = 0.15  # probability that a set changes from one campaign to the next 
 _BEHIND_BEST, _MOST_SETS = 12.0, 12  # nats behind a campaign's best, and how many of its sets
 _PRUNE_NATS = 30.0  # nats behind the best set of a campaign beyond which a set is in no history
 _SAME_STRENGTH = 0.9  # probability that a mechanism that remains keeps its strength
-_MOST_HISTORIES = 400  # kept from campaign to campaign
+_MOST_HISTORIES = 400  # retained from campaign to campaign
 
 Names = tuple[str, ...]
 

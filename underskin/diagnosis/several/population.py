@@ -182,7 +182,7 @@ class _Fleet:
 
     @cached_property
     def populations(self) -> Populations:
-        log_weights = np.array(list(self.log_weights_by_states.values()))  # (sets, makes, spreads)
+        log_weights = np.array(list(self.log_weights_by_states.values()))  # (sets, batches, spreads)
         share = np.exp(log_weights - np.logaddexp.reduce(log_weights, axis=None))
         of_sets = share.sum(axis=(1, 2))
         departs = tuple(

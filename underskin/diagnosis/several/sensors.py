@@ -151,7 +151,7 @@ class Change:
     value: float
     uncertainty: float  # of its logarithm
     probability: float
-    causes: tuple[str, ...] = ()  # of a change of all: mechanisms that would make it
+    causes: tuple[str, ...] = ()  # of a change of all sensors: mechanisms that could have caused it
     exchanged_with: str | None = None  # the sensor with which it exchanged its d33
 
     @property
