@@ -209,7 +209,7 @@ def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
     skin = problem.lines.campaign.skin
     off = skin.tolerances or Tolerances()
     best = explanation.best
-    indices = {parameter.name: rows for rows, parameter in enumerate(explanation.model.parameters)}
+    indices = {parameter.name: index for index, parameter in enumerate(explanation.model.parameters)}
     rows = {name: best.hypothesis.mean_indices.index(indices[name]) for name in ("d33", "youngs_modulus", "thickness")}
     variance = (_by_sensor_radius(problem) * off.sensor_radius_percent / 100) ** 2
     percents = {"youngs_modulus": off.youngs_modulus_percent, "thickness": off.thickness_percent}
