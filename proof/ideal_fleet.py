@@ -24,7 +24,7 @@ def departures(joint: Joint) -> dict[str, float]:
     declared = [experiment.skin.youngs_modulus_mpa, experiment.skin.thickness_mm, experiment.skin.d33_pc_per_n]
     make = Batch(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
     found = populations(skins, [make], SPREADS)
-    return {document.skin: 1 - own[REGULAR] for document, own in zip(joint.documents, found.departs, strict=True)}
+    return {document.skin: 1 - own[REGULAR] for document, own in zip(joint.documents, found.departures, strict=True)}
 
 
 def _states(document: JointDocument) -> list[State]:

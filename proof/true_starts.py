@@ -72,7 +72,7 @@ def with_true_values(begun: Explanation, effects: Mapping[str, Values]) -> Expla
     """An explanation moved to the true values; parameters without a counterpart stay where they are."""
     known = {name: value for effect, values in effects.items() for name, value in true_values(effect, values).items()}
     moved = begun.point.fit.copy()
-    for place, parameter in enumerate(begun.model.parameters[: begun.best.hypothesis.own_parameters]):
+    for place, parameter in enumerate(begun.model.parameters[: begun.best.hypothesis.mechanism_parameter_count]):
         if parameter.name in known:
             moved[place] = _coordinate(parameter, known[parameter.name])
     return replace(begun, best=replace(begun.best, point=replace(begun.point, fit=moved)))

@@ -73,7 +73,7 @@ def test_likelihood_whole_covariance_matrix(made: Made, has_position_scatter: bo
     hypothesis = problem.hypothesis(made.mechanisms, has_position_scatter, whole=True)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, made.parameters, strict=False)]
     fitter, used = Fitter([hypothesis]), hypothesis.lines
-    at = fitter.begin([np.array([own])], slopes=True)
+    at = fitter.initial([np.array([own])], slopes=True)
     levels, curvature = fitter.levels(at.points.covariance).first, fitter.curvature
     factor = np.exp(0.5 * levels.position**2 * curvature.laplacian)[used.recording]
     prediction = hypothesis.model.predict(at.points.fit[0])
@@ -104,7 +104,7 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
     hypothesis = problem.hypothesis(names, has_position_scatter=False)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, values, strict=False)]
     fitter = Fitter([hypothesis])
-    return laplace(fitter, fitter.improve(fitter.begin([np.array([own])]).points))
+    return laplace(fitter, fitter.improve(fitter.initial([np.array([own])]).points))
 
 
 @pytest.mark.parametrize(("names", "values"), [CASES[index] for index in first(3, (0, 1, 17, 10, 4))])
@@ -143,7 +143,7 @@ def importance(found: Evidence) -> float:
     posterior = Posterior(fitter, point)
     values, vectors = np.linalg.eigh(fitter.covariance_equations(found.at)[1][0])
     levels = (vectors / np.maximum(values, 0.6)) @ vectors.T
-    centre = np.concatenate([point.fit[found.hypothesis.mean_places], point.covariance])
+    centre = np.concatenate([point.fit[found.hypothesis.mean_indices], point.covariance])
     proposal = multivariate_t(centre, 2 * block_diag(found.covariance, levels), df=4, seed=1)
     draws = proposal.rvs(4000)
     weights = np.array([posterior.log_density(x) for x in draws]) - proposal.logpdf(draws)

@@ -24,7 +24,7 @@ class Posterior:
         """`around` gives the place where the sensors' gains are linearised first."""
         self.fitter, self._around = fitter, around
         hypothesis = fitter.hypotheses[0]
-        self._places = hypothesis.mean_places
+        self._places = hypothesis.mean_indices
         self._mean = [hypothesis.model.parameters[place] for place in self._places]
         self._covariance = [_quantiles(entry) for entry in fitter.covariance]
         bounds = [*(entry.bounds for entry in self._mean), *((entry.low, entry.high) for entry in fitter.covariance)]

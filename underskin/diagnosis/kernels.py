@@ -1,14 +1,8 @@
-"""Compiled sums over the lines of FRFs.
+"""Compiled sums over rows: the likelihood of the roughness of lines, products of dynamic factors with their
+derivatives, corrections of sums for mains pick-up, and the evidence of laws with several amplitudes.
 
-How probable the roughness of lines is under their noise, and what each line's variance does to it.
-Products of what a dynamic factor is on each line with its derivatives, for the sums of `products`.
-
-What sums over rows lose to mains pick-up, at many sets of noise levels.
-
-A row of variance κ² d² has κ² d² + q² with pick-up, so that its weight 1/d² in the sums (over κ²) becomes
+A row of variance κ² d² has κ² d² + q² with pick-up: its weight 1/d² in the sums (over κ²) becomes
 1/d² · 1/(1 + x), x = (q/κ)²/d², and log|C| grows by 2 log(1 + x).
-
-What laws of several amplitudes gain, from their features' moments.
 """
 
 import numpy as np
@@ -17,7 +11,7 @@ from numpy.typing import NDArray
 from underskin.compiled import compiled
 from underskin.units import Array, Complexes, Floats, Indices
 
-_VARIANCES_TOGETHER = 4  # factors, of 1e-70 to 1e70 each, whose logarithm is taken of their product
+_VARIANCES_TOGETHER = 4  # factors, of 1e-70 to 1e70 each, that share one logarithm
 
 
 @compiled("float64(float64[::1], int64[::1], float64[::1], float64[::1], float64, float64[::1])")
@@ -31,7 +25,7 @@ def roughness_cost(
     variance
         d² (rows,).
     middle, share, rough
-        The rows j that are compared with their neighbours, λ, and half the square of what they are off.
+        The rows j that are compared with their neighbours, λ, and half the square of their deviations.
     freedom
         ν.
     by_variance
@@ -60,87 +54,85 @@ _THREE, _FOUR = "float64[:, :, ::1]", "float64[:, :, :, ::1]"
 
 
 @compiled(f"void(complex128[:, :, ::1], {_THREE}, {_THREE}, {_THREE})")
-def line_products(each: Array, products: Floats, real: Floats, imag: Floats) -> None:
+def line_products(values: Array, products: Floats, real: Floats, imag: Floats) -> None:
     """Re x*y of all pairs of functions on the lines.
 
     Parameters
     ----------
-    each
+    values
         The functions (points, functions, lines).
     products
         (points, pairs, lines) the pairs in the order of the upper triangle, to be filled.
     real, imag
         (points, functions, lines) the functions' parts, to be filled.
     """
-    points, functions, lines = each.shape
+    points, functions, lines = values.shape
     for point in range(points):
-        for one in range(functions):
+        for first in range(functions):
             for line in range(lines):
-                real[point, one, line] = each[point, one, line].real
-                imag[point, one, line] = each[point, one, line].imag
+                real[point, first, line] = values[point, first, line].real
+                imag[point, first, line] = values[point, first, line].imag
         pair = 0
-        for one in range(functions):
-            re, im = real[point, one], imag[point, one]
-            for other in range(one, functions):
-                own, re_other, im_other = products[point, pair], real[point, other], imag[point, other]
+        for first in range(functions):
+            re, im = real[point, first], imag[point, first]
+            for second in range(first, functions):
+                product, re_other, im_other = products[point, pair], real[point, second], imag[point, second]
                 for line in range(lines):
-                    own[line] = re[line] * re_other[line] + im[line] * im_other[line]
+                    product[line] = re[line] * re_other[line] + im[line] * im_other[line]
                 pair += 1
 
 
 @compiled(f"void({_THREE}, {_THREE}, int64[::1], {_THREE}, {_THREE}, {_FOUR})")
 def spread_sums(both: Floats, with_y: Floats, moving: NDArray[np.int64], uv: Floats, vy: Floats, vv: Floats) -> None:
-    """The sums with derivatives at the places of their parameters.
+    """Place the sums with derivatives at the indices of their parameters.
 
     Parameters
     ----------
     both
         (points, pairs, recordings) of u and its derivatives, the pairs in the order of the upper triangle.
     with_y
-        (points, 1 + derivatives, recordings) of each with what was measured.
+        (points, 1 + derivatives, recordings) of each with the measured values.
     moving
         (derivatives,) the parameters that they are by.
     uv, vy, vv
-        (points, recordings, parameters), twice, and (points, recordings, parameters, parameters), of which what differs
-        from 0 is filled.
+        (points, recordings, parameters), twice, and (points, recordings, parameters, parameters), of which the elements
+        that differ from 0 are filled.
     """
     points, _, recordings = both.shape
     count = len(moving)
     for point in range(points):
-        for one in range(count):
-            p = moving[one]
+        for first in range(count):
+            p = moving[first]
             for recording in range(recordings):
-                uv[point, recording, p] = both[point, 1 + one, recording]
-                vy[point, recording, p] = with_y[point, 1 + one, recording]
+                uv[point, recording, p] = both[point, 1 + first, recording]
+                vy[point, recording, p] = with_y[point, 1 + first, recording]
         pair = 1 + count
-        for one in range(count):
-            for other in range(one, count):
-                p, q = moving[one], moving[other]
+        for first in range(count):
+            for second in range(first, count):
+                p, q = moving[first], moving[second]
                 for recording in range(recordings):
                     vv[point, recording, p, q] = vv[point, recording, q, p] = both[point, pair, recording]
                 pair += 1
 
 
-_ROWS_TOGETHER = (
-    8  # factors of the determinant whose logarithm is taken together: below 1e38 each, they do not overflow
-)
-_NONE = 1e-17  # of x, below which a row loses nothing that its sum could tell
+_ROWS_TOGETHER = 8  # factors of the determinant that share one logarithm: below 1e38 each, they do not overflow
+_NONE = 1e-17  # of x: smaller losses are below the sum's rounding
 _SUMS = "float64[:, :, ::1]"
 _ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
 
 
 @compiled()
-def _take(taken: Floats, uu: Floats, uy: Floats, yy: Floats, point: int, recording: int) -> None:
-    """Take what a recording's rows lose (3, sets) from its sums, and begin anew."""
-    for number in range(taken.shape[1]):
-        uu[point, number, recording] -= taken[0, number]
-        uy[point, number, recording] -= taken[1, number]
-        yy[point, number, recording] -= taken[2, number]
-    taken[:] = 0.0
+def _subtract_losses(losses: Floats, uu: Floats, uy: Floats, yy: Floats, point: int, recording: int) -> None:
+    """Subtract the losses (3, sets) of a recording's rows from its sums, and reset them."""
+    for number in range(losses.shape[1]):
+        uu[point, number, recording] -= losses[0, number]
+        uy[point, number, recording] -= losses[1, number]
+        yy[point, number, recording] -= losses[2, number]
+    losses[:] = 0.0
 
 
 @compiled(f"void(float64[:, :, ::1], {_ROWS}, complex128[:, ::1], {_SUMS}, {_SUMS}, {_SUMS}, float64[:, ::1])")
-def lost(
+def subtract_pickup(
     pickup: Floats,
     alike: NDArray[np.int64],
     precision: Floats,
@@ -153,42 +145,42 @@ def lost(
     yy: Floats,
     log_determinant: Floats,
 ) -> None:
-    """Take from `uu`, `uy` and `yy` (points, sets, recordings) what rows lose, x/(1 + x)/d² of each, and add 2 log(1 +
-    x) to `log_determinant` (points, sets).
+    """Subtract each row's loss x/(1 + x)/d² from `uu`, `uy` and `yy` (points, sets, recordings), and add 2 log(1 + x)
+    to `log_determinant` (points, sets).
 
     Parameters
     ----------
     pickup
         (q/κ)² (points, distinct, sets).
     alike, precision, recording, y, line
-        Of each row: which of the distinct q it has, 1/d², the recording, the measured value and the line.
+        Of each row: the index of its distinct q, 1/d², the recording, the measured value and the line.
     u
         The direction (points, lines).
     """
     points, distinct, sets = pickup.shape
-    factors, total, taken, largest = np.empty(sets), np.empty(sets), np.zeros((3, sets)), np.empty(distinct)
+    factors, total, losses, largest = np.empty(sets), np.empty(sets), np.zeros((3, sets)), np.empty(distinct)
     for point in range(points):
         factors[:], total[:] = 1.0, 0.0
-        count, of = 0, 0
+        count, current_recording = 0, 0
         for number in range(distinct):
             largest[number] = pickup[point, number].max()
         for row in range(len(y)):
-            kind, weight = alike[row], precision[row]
-            if largest[kind] * weight <= _NONE:
+            deviation_index, weight = alike[row], precision[row]
+            if largest[deviation_index] * weight <= _NONE:
                 continue
-            if recording[row] != of:
-                _take(taken, uu, uy, yy, point, of)
-                of = recording[row]
-            at, measured = u[point, line[row]], y[row]
-            uu_row = at.real * at.real + at.imag * at.imag
-            uy_row = at.real * measured.real + at.imag * measured.imag
+            if recording[row] != current_recording:
+                _subtract_losses(losses, uu, uy, yy, point, current_recording)
+                current_recording = recording[row]
+            direction, measured = u[point, line[row]], y[row]
+            uu_row = direction.real * direction.real + direction.imag * direction.imag
+            uy_row = direction.real * measured.real + direction.imag * measured.imag
             yy_row = measured.real * measured.real + measured.imag * measured.imag
             for number in range(sets):
-                x = pickup[point, kind, number] * weight
-                less = x / (1 + x) * weight
-                taken[0, number] += less * uu_row
-                taken[1, number] += less * uy_row
-                taken[2, number] += less * yy_row
+                x = pickup[point, deviation_index, number] * weight
+                loss = x / (1 + x) * weight
+                losses[0, number] += loss * uu_row
+                losses[1, number] += loss * uy_row
+                losses[2, number] += loss * yy_row
                 factors[number] *= 1 + x
             count += 1
             if count == _ROWS_TOGETHER:
@@ -196,7 +188,7 @@ def lost(
                     total[number] += np.log(factors[number])
                     factors[number] = 1.0
                 count = 0
-        _take(taken, uu, uy, yy, point, of)
+        _subtract_losses(losses, uu, uy, yy, point, current_recording)
         for number in range(sets):
             log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
 
@@ -205,7 +197,7 @@ def lost(
     f"void(float64[:, ::1], {_ROWS}, complex128[:, ::1], complex128[:, :, ::1], {_SUMS}, {_SUMS}, "
     "float64[:, :, :, ::1])"
 )
-def slopes_lost(
+def subtract_pickup_slopes(
     pickup: Floats,
     alike: NDArray[np.int64],
     precision: Floats,
@@ -218,14 +210,14 @@ def slopes_lost(
     vy: Floats,
     vv: Floats,
 ) -> None:
-    """Take from `uv`, `vy` (points, recordings, P) and `vv` (points, recordings, P, P) what rows lose.
+    """Subtract the rows' losses from `uv`, `vy` (points, recordings, P) and `vv` (points, recordings, P, P).
 
     Parameters
     ----------
     pickup
         (q/κ)² (points, distinct).
     alike, precision, recording, y, line
-        See `lost`.
+        See `subtract_pickup`.
     u, v
         The direction (points, lines), and its derivatives (points, P, lines).
     """
@@ -242,22 +234,20 @@ def slopes_lost(
         for row in range(len(y)):
             x = pickup[point, alike[row]] * precision[row]
             if x > _NONE and moves:
-                less, of, at = x / (1 + x) * precision[row], recording[row], line[row]
+                loss, recording_index, at = x / (1 + x) * precision[row], recording[row], line[row]
                 direction, measured = u[point, at], y[row]
-                for one in range(moves):
-                    p = moving[one]
+                for first in range(moves):
+                    p = moving[first]
                     of_p = v[point, p, at]
-                    uv[point, of, p] -= less * (direction.real * of_p.real + direction.imag * of_p.imag)
-                    vy[point, of, p] -= less * (measured.real * of_p.real + measured.imag * of_p.imag)
-                    for other in range(moves):
-                        q = moving[other]
+                    uv[point, recording_index, p] -= loss * (direction.real * of_p.real + direction.imag * of_p.imag)
+                    vy[point, recording_index, p] -= loss * (measured.real * of_p.real + measured.imag * of_p.imag)
+                    for second in range(moves):
+                        q = moving[second]
                         of_q = v[point, q, at]
-                        vv[point, of, p, q] -= less * (of_p.real * of_q.real + of_p.imag * of_q.imag)
+                        vv[point, recording_index, p, q] -= loss * (of_p.real * of_q.real + of_p.imag * of_q.imag)
 
 
-_PIVOTS_TOGETHER = (
-    8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
-)
+_PIVOTS_TOGETHER = 8  # factors of a determinant that share one logarithm: below 1e38 each, they do not overflow
 _LOWEST, _HIGHEST = -1.0, 5.0  # of log κ
 _TOLERANCE = 1e-3
 _SECTION = 0.6180339887498949  # golden
@@ -303,14 +293,14 @@ def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) ->
 
 @compiled("void(float64[:, ::1], int64[::1], int64[::1], float64[:, ::1], float64[:, :, :, ::1])")
 def less_shared(weights: Floats, rows: Indices, first: Indices, columns: Floats, grams: Floats) -> None:
-    """Take Σ sₙ sₙᵀ off products of columns, sₙ = Σ w x over the n-th sensor's recordings.
+    """Subtract Σ sₙ sₙᵀ from products of columns, sₙ = Σ w x over the n-th sensor's recordings.
 
     Parameters
     ----------
     weights
-        w at each scatter (scatters, pairs), the pairs of a sensor one after another.
+        w at each scatter (scatters, pairs), the pairs of a sensor contiguous.
     rows, first
-        The row of `columns` of each pair, and where the pairs of each sensor begin (sensors + 1,).
+        The row of `columns` of each pair, and the first pair of each sensor (sensors + 1,).
     columns
         x (rows, sets · features).
     grams

@@ -25,7 +25,7 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines, recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
+from underskin.diagnosis.inference.residuals import Residuals, residuals, row_prediction
 from underskin.units import Array, Floats, Indices, Mask
 
 _ONE_SIGN = 0.8
@@ -489,7 +489,7 @@ def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Sha
     """The best forms of the residual, relative to each curve's largest force, over displacement and over time."""
     lines = problem.lines
     assert lines.smooth is not None
-    relative = (lines.value - whole_prediction(problem, explanation)).real / lines.smooth.scale
+    relative = (lines.value - row_prediction(problem, explanation)).real / lines.smooth.scale
     weight = (lines.smooth.scale / lines.deviation) ** 2
     forms = []
     for name in ALONG_CURVES:

@@ -1,46 +1,39 @@
 """The noise of lines, curves, gains and positions, and its priors.
 
-Priors of the noise that every hypothesis shares.
+Priors that every hypothesis shares:
 
-- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, falling off outside to
-  a tenth at 0.3 and at 11 %: a careful rig is better than 1 %, a poor one worse than 5 %;
-- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm, falling off outside
+- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, decreasing outside to
+  a tenth at 0.3 and at 11 %: careful rigs are better than 1 %, poor ones worse than 5 %;
+- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm, decreasing outside
   to a tenth at 0.02 and at 0.6 mm;
 - line noise: its level as estimated from the lines' roughness, times a factor near 1.
 
-How large each kind of noise is, as the likelihood takes them: s, κ, p, τ, q and η.
-
-What the samples of a curve share under every hypothesis: what the cell adds, and that no law is exact.
-
-A cell shows its zero F0 and a drift b in time (without times, in the order of the samples) or along the travel beside
-the force (its gain is the recording's, as of FRFs): columns P with normal coefficients, whose scale is the prior's
-standard deviation. Where samples in the air show the zero, F0 is as good as free; else a tared cell is within a
-hundredth of what it measures. The drift over the curve is 2 % of the largest force, or as much as a plain drift or
-the air before a snap-in shows where that is more, and none is looked for where no air shows it.
-
-The position of the surface, friction in a stage and the idealisation of every law bend a curve a little. Neighbouring
-samples share that error too. Within each curve, with s the force (or, near the contact's beginning and in the air, 0.7
-and 0.2 of the largest), x the place along the curve from 0 to 1 and η the size,
+Error that the samples of a curve share under every hypothesis. A cell has a zero F0 and a drift b in time (without
+times, in the order of the samples) or along the travel (its gain is the recording's, as of FRFs): columns P with normal
+coefficients, scaled to the prior's standard deviation. Where samples in the air show the zero, F0 is practically free;
+else a tared cell is within a hundredth of the largest force. The drift over the curve is 2 % of the largest force, or a
+larger one that the air shows; without air there is none. The position of the surface, friction in a stage and the
+idealisation of every law also bend a curve a little. With s the force (at least 0.7 of the largest near the beginning
+of contact and 0.2 in the air), x the position along the curve from 0 to 1 and η the size,
 
     ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
 
 k the mean of Matérn-3/2 kernels of length 0.025 and 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
-idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, slowly
+idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, decreasing outside, slowly
 downwards.
 
-The noise of single lines, from how rough the lines are along frequency.
-
-Real and imaginary part each have variance d² = rel(f)² A² + floor², A the recording's amplitude around the line.
-What all recordings share at a frequency is taken off, then each line is compared with its two neighbours,
+Noise of single lines, from their roughness along frequency. Real and imaginary part each have variance
+d² = rel(f)² A² + floor², A the recording's amplitude around the line. The part common to all recordings at a frequency
+is subtracted, then each line is compared with its two neighbours,
     e_j = z_j − λ z_(j−1) − (1−λ) z_(j+1)   (linear in log f),   E|e_j|²/2 = d_j² + λ² d_(j−1)² + (1−λ)² d_(j+1)²,
-which smooth misfit hardly reaches. A steep course, such as the flank of a resonance that moves with the preload, does
-reach it: where a law describes that, its prediction (`expected`) is taken off as well (see search.py).
-log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that single wild lines
-(mains, a resonance between two lines) do not count, and the level is set by the median of |e|².
-Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it. It may miss
-noise that is not averaged, alike in all recordings: of many recordings it says little more than of a few.
-Where lines are known to be `uneven` (of a time series whose force has more power at one than at the next), rel is that
-much larger.
+which smooth misfit hardly affects. Steep changes, such as the flank of a resonance that moves with the preload, do
+affect it: where a law describes them, its prediction (`expected`) is subtracted too (see search.py).
+log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that outliers (mains, a
+resonance between two lines) do not count, and the level is set by the median of |e|².
+Where `coherence` γ² is given, (1 − γ²)/γ² is proportional to (d/A)² (with an unknown number of averages) and
+stabilises it. It may miss noise that is not averaged, common to all recordings: many recordings carry little more
+information on it than a few. Where lines are `uneven` (of a time series whose force has more power at one than at the
+next), rel is larger by that factor.
 """
 
 import itertools
@@ -62,9 +55,9 @@ POSITION_FALL = (0.4, 0.3)  # the same of positions
 
 @dataclass(frozen=True)
 class Plateau:
-    """A density of a logarithm: constant between two values, falling off as half Gaussians outside.
+    """A density of a logarithm: constant between two values, decreasing as half Gaussians outside.
 
-    Normal where the two are one; uniform where `area`, the integral of what is 1 at the plateau, counts only the range.
+    Normal where the two values are equal; uniform where `area`, the integral with height 1, counts only the range.
     """
 
     low: float
@@ -91,7 +84,7 @@ class Plateau:
 
     @property
     def row(self) -> tuple[float, float, float, float, float]:
-        """Its numbers, with the logarithm of the area, as compiled functions take them."""
+        """Its numbers, with the logarithm of the area, for compiled functions."""
         return self.low, self.high, self.fall_low, self.fall_high, float(np.log(self.area))
 
     def log_density(self, x: Floats | float) -> Floats:
@@ -100,14 +93,14 @@ class Plateau:
         return np.asarray(-0.5 * outside**2 - np.log(self.area))
 
 
-START_GAIN = 0.03  # scatter of gains while nothing was fitted yet
+START_GAIN = 0.03  # scatter of gains before any fit
 GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 POSITION_PRIOR = Plateau.of(POSITION_RANGE, POSITION_FALL)
-# No rig's: something that nobody named moves the recordings
 
 
 def level_prior(log_level_sd: float) -> Plateau:
-    """Of the factor on the lines' deviations; wider than the estimate's own error: noise is not quite normal."""
+    """Prior of the factor on the lines' deviations; wider than the estimate's own error, as noise is not exactly
+    normal."""
     return Plateau.normal(0.0, float(np.hypot(log_level_sd, 0.05)))
 
 
@@ -125,7 +118,7 @@ class NoiseLevels:
 
 @dataclass(frozen=True)
 class SeveralLevels:
-    """Sets of noise levels (…, 1); of pick-up its distinct deviations (…, distinct)."""
+    """Sets of noise levels (…, 1); `pickup` has the distinct deviations (…, distinct)."""
 
     gain: Floats
     level: Floats
@@ -161,10 +154,10 @@ _COLUMNS = 3
 
 @dataclass(frozen=True)
 class CurveError:
-    """Of all rows of a campaign's curves, one curve after another."""
+    """The error that samples share, for all rows of a campaign's curves, one curve after another."""
 
     scale: Floats  # (rows,) [N]: the deviation is η times this
-    place: Floats  # (rows,) along the curve, 0 to 1
+    path_fraction: Floats  # (rows,) along the curve, 0 to 1
     columns: Floats  # (rows, columns) [N] of each curve's own coefficients
     count: Floats  # (rows,) raw samples that each row is the mean of
     slope: Floats  # (rows,) [N per sample] of the straight line through these
@@ -180,51 +173,55 @@ class CurveError:
             return np.concatenate([*(getattr(part, name) for part in parts), np.zeros(0)])
 
         return cls(
-            of("scale"), of("place"), np.concatenate(columns), *map(of, ("count", "slope", "about_line", "slow"))
+            of("scale"),
+            of("path_fraction"),
+            np.concatenate(columns),
+            *map(of, ("count", "slope", "about_line", "slow")),
         )
 
     def part(self, order: Indices) -> Self:
         """Of some of the rows."""
-        rows = (self.scale, self.place, self.columns, self.count, self.slope, self.about_line, self.slow)
-        return type(self)(*(entry[order] for entry in rows))
+        rows = (self.scale, self.path_fraction, self.columns, self.count, self.slope, self.about_line, self.slow)
+        return type(self)(*(values[order] for values in rows))
 
     def within(self, force: Floats, curves: Sequence[slice]) -> float:
-        """The sum of squares [N²] of raw samples about a law beyond that of their means, of whole curves.
+        """The sum of squares [N²] of raw samples about a law beyond that of their means, for complete curves.
 
-        The law's force (rows,) is straight between rows, and so are the samples of a row but for their noise.
+        The law's force (rows,) is taken as straight between rows, as are the samples of a row apart from their noise.
         """
         middle = np.cumsum(self.count) - self.count / 2
-        slope = np.concatenate([np.gradient(force[own], middle[own]) for own in curves])
+        slope = np.concatenate([np.gradient(force[span], middle[span]) for span in curves])
         square = self.count * (self.count**2 - 1) / 12
         return float((self.about_line + square * (self.slope - slope) ** 2).sum())
 
     def covariance(self, size: float) -> Floats:
-        """Of rows that are one curve's, with η = `size` (rows, rows)."""
-        return np.asarray(size**2 * np.outer(self.scale, self.scale) * _likeness(self.place))
+        """Covariance of rows of one curve, with η = `size` (rows, rows)."""
+        return np.asarray(size**2 * np.outer(self.scale, self.scale) * _correlation(self.path_fraction))
 
 
 def instrument_columns(displacement: Floats, time: Floats, zero: float, drift: float) -> Floats:
     """P of one curve (rows, 3): zero, drift in time, drift along the travel; `zero` and `drift` are deviations [N]."""
     columns = np.zeros((len(displacement), _COLUMNS))
     columns[:, 0] = zero
-    for place, axis in ((1, time), (2, displacement)):
+    for column, axis in ((1, time), (2, displacement)):
         if np.ptp(axis) > 0:
-            columns[:, place] = drift * ((axis - axis[0]) / np.ptp(axis))
+            columns[:, column] = drift * ((axis - axis[0]) / np.ptp(axis))
     return columns
 
 
 class Whitening:
-    """κ² D + η² B as κ² times a unit matrix: each curve's rows over d, turned to where B is diagonal, and weighed."""
+    """κ² D + η² B as κ² times a diagonal matrix: each curve's rows divided by d and rotated to the eigenvectors of
+    B."""
 
     def __init__(self, error: CurveError, deviation: Floats, recording: Indices) -> None:
-        """Find the directions of each curve; `deviation` is D's square root (rows,)."""
+        """Compute the eigenvectors of each curve; `deviation` is D's square root (rows,)."""
         self._deviation = deviation
         edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
         self._spans = [slice(low, high) for low, high in pairwise(edges)]
         self._turns, sizes = [], []
         for span in self._spans:
             relative = error.scale[span] / deviation[span]
-            size, turn = np.linalg.eigh(relative[:, None] * _likeness(error.place[span]) * relative)
+            size, turn = np.linalg.eigh(relative[:, None] * _correlation(error.path_fraction[span]) * relative)
             self._turns.append(turn.T)
             sizes.append(np.maximum(size, 0.0))
         self._size = np.concatenate(sizes)
@@ -235,21 +232,21 @@ class Whitening:
         return np.asarray(np.log1p(ratio**2 * self._size).sum(axis=-1, keepdims=True))
 
     def weight(self, ratio: Floats) -> Floats:
-        """What products of turned rows weigh at ratios η/κ (…, 1): (…, rows)."""
+        """Weights of products of transformed rows at ratios η/κ (…, 1): (…, rows)."""
         return np.asarray(1 / (1 + ratio**2 * self._size))
 
     def turned(self, rows: Floats) -> Floats:
-        """The rows (…, rows), forces, such that their covariance is κ² diag(1/weight)."""
+        """The rows (…, rows), forces, transformed so that their covariance is κ² diag(1/weight)."""
         scaled = rows / self._deviation
         parts = [scaled[..., span] @ turn.T for span, turn in zip(self._spans, self._turns, strict=True)]
         return np.concatenate(parts, axis=-1)
 
 
-def _likeness(place: Floats) -> Floats:
-    """k between all places of a curve."""
-    total = np.zeros((len(place), len(place)))
+def _correlation(path_fraction: Floats) -> Floats:
+    """k between all positions along a curve."""
+    total = np.zeros((len(path_fraction), len(path_fraction)))
     for length in _LENGTHS:
-        distance = np.sqrt(3.0) * np.abs(place[:, None] - place) / length
+        distance = np.sqrt(3.0) * np.abs(path_fraction[:, None] - path_fraction) / length
         total += (1 + distance) * np.exp(-distance) / len(_LENGTHS)
     return total
 
@@ -257,15 +254,15 @@ def _likeness(place: Floats) -> Floats:
 _KNOTS_PER_DECADE = 2.0
 _SMOOTH = 1.0  # sd of the second difference of log rel² between knots
 _FREEDOM = 6.0
-_TYPICAL, _TYPICAL_SD = 1e-4, 3.0  # rel², and the sd of its logarithm: where hardly any line says anything
-_SHARED = 8  # recordings at a frequency from which what they share is taken off
+_TYPICAL, _TYPICAL_SD = 1e-4, 3.0  # rel², and the sd of its logarithm: prior where lines carry little information
+_SHARED = 8  # least recordings at a frequency whose common part is subtracted
 _WINDOW = 5
-_BLOCK = 10_000  # windows that are copied at a time
+_BLOCK = 10_000  # windows that are copied at once
 
 
 @dataclass(frozen=True)
 class LineNoise:
-    """`deviation` (rows,) of real and imaginary part [C/N], and how well its level is known (sd of its logarithm)."""
+    """`deviation` (rows,) of real and imaginary part [C/N], and the uncertainty of its level (sd of its logarithm)."""
 
     deviation: Floats
     log_level_sd: float
@@ -280,9 +277,9 @@ def line_noise(
     uneven: Floats,
     expected: Complexes | None = None,
 ) -> LineNoise:
-    """The noise of the rows, which run over recordings one after another, sorted by frequency within each.
+    """The noise of the rows, which are sorted by recording and by frequency within each.
 
-    `expected` (rows,) is a prediction whose course along frequency is no noise.
+    `expected` (rows,) is a prediction whose change with frequency is not noise.
     """
     from underskin.diagnosis.kernels import roughness_cost
 
@@ -298,9 +295,11 @@ def line_noise(
     rough /= scale**2
     size2 = (amplitude / scale) ** 2
     weighed2 = size2 * uneven**2
-    known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
-    from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
-    certainty = 1 / (_COHERENCE_VARIANCE + _OF_ALL_VARIANCE * np.bincount(line[known], minlength=1)[line[known]])
+    has_coherence = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
+    from_coherence = np.log((1 - coherence[has_coherence]) / coherence[has_coherence]) if has_coherence.any() else None
+    certainty = 1 / (
+        _COHERENCE_VARIANCE + _OF_ALL_VARIANCE * np.bincount(line[has_coherence], minlength=1)[line[has_coherence]]
+    )
 
     def variance(p: Floats) -> Floats:
         return np.exp(hats @ p[:-2])[line] * weighed2 + np.exp(p[-2])
@@ -311,18 +310,20 @@ def line_noise(
         by_d2 = np.zeros(len(d2))
         cost = roughness_cost(d2, middle, share, rough, _FREEDOM, by_d2)
         if from_coherence is not None:
-            # Noisy, and with an unknown n: loose Gaussians; p[-1] is log(1/2n).
-            gap = np.log(d2[known] / size2[known]) - from_coherence - p[-1]
+            # Noisy, with an unknown number of averages n: wide Gaussians; p[-1] is log(1/2n).
+            gap = np.log(d2[has_coherence] / size2[has_coherence]) - from_coherence - p[-1]
             cost += 0.5 * np.sum(certainty * gap**2)
-            by_d2[known] += certainty * gap / d2[known]
-        bend = np.diff(p[:-2], 2) / _SMOOTH
-        cost += 0.5 * bend @ bend + 0.5 * np.sum(((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2)
+            by_d2[has_coherence] += certainty * gap / d2[has_coherence]
+        second_difference = np.diff(p[:-2], 2) / _SMOOTH
+        cost += 0.5 * second_difference @ second_difference + 0.5 * np.sum(
+            ((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2
+        )
         cost += 0.5 * ((p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2 + 0.5 * (p[-1] + 3.5) ** 2
         by_p = np.zeros(len(p))
         by_p[:-2] = (
             hats.T @ np.bincount(line, by_d2 * relative, len(distinct)) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
         )
-        by_p[:-2] += np.convolve(bend, [1, -2, 1]) / _SMOOTH if len(bend) else 0.0
+        by_p[:-2] += np.convolve(second_difference, [1, -2, 1]) / _SMOOTH if len(second_difference) else 0.0
         by_p[-2] = by_d2.sum() * floor + (p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
         by_p[-1] = (p[-1] + 3.5) - (certainty @ gap if from_coherence is not None else 0.0)
         return float(cost), by_p
@@ -342,8 +343,8 @@ def line_noise(
     return LineNoise(scale * np.sqrt(d2), sd, float(scale * np.exp(p[-2] / 2)))
 
 
-_COHERENCE_VARIANCE = 0.5  # of the logarithm of what one recording's says
-_OF_ALL_VARIANCE = 0.1  # and of what all have in common at a frequency
+_COHERENCE_VARIANCE = 0.5  # of the logarithm of one recording's coherence estimate
+_OF_ALL_VARIANCE = 0.1  # and of the part common to all at a frequency
 
 
 def local_amplitude(value: Complexes, recording: Indices) -> Floats:
@@ -354,8 +355,8 @@ def local_amplitude(value: Complexes, recording: Indices) -> Floats:
     if len(size) >= _WINDOW:
         windows = np.lib.stride_tricks.sliding_window_view(size, _WINDOW)
         for low in range(0, len(windows), _BLOCK):
-            some = windows[low : low + _BLOCK]
-            smooth[half + low : half + low + len(some)] = np.partition(some, half, axis=1)[:, half]
+            batch = windows[low : low + _BLOCK]
+            smooth[half + low : half + low + len(batch)] = np.partition(batch, half, axis=1)[:, half]
     edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
     for low, high in itertools.pairwise(edges.tolist()):
         if high - low < _WINDOW:
@@ -369,8 +370,8 @@ def _interior(recording: Indices, frequency: Floats) -> Indices:
     """Rows with a lower and a higher neighbour in their own recording."""
     inner = np.arange(1, len(recording) - 1)
     same = (recording[inner - 1] == recording[inner]) & (recording[inner + 1] == recording[inner])
-    apart = (frequency[inner] > frequency[inner - 1]) & (frequency[inner + 1] > frequency[inner])
-    return inner[same & apart & (frequency[inner - 1] > 0)]
+    increasing = (frequency[inner] > frequency[inner - 1]) & (frequency[inner + 1] > frequency[inner])
+    return inner[same & increasing & (frequency[inner - 1] > 0)]
 
 
 def _roughness(z: Complexes, frequency: Floats, recording: Indices) -> tuple[Indices, Floats, Floats]:
@@ -382,8 +383,8 @@ def _roughness(z: Complexes, frequency: Floats, recording: Indices) -> tuple[Ind
 
 
 def _without_shared(value: Complexes, frequency: Floats, recording: Indices, rest: Complexes) -> Complexes:
-    """`rest` (rows,), the lines or what is left of them, less each recording's level times what all recordings have of
-    it at that frequency, where many have it."""
+    """`rest` (rows,), the lines or their remainder, minus each recording's level times the part common to all
+    recordings at that frequency, where there are at least `_SHARED`."""
     edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
     level = np.array([np.median(value.real[low:high]) for low, high in itertools.pairwise(edges.tolist())])
     ratio = rest / np.where(level == 0, 1.0, level)[recording]
@@ -409,5 +410,5 @@ def _hats(log_f: Floats, knots: Floats) -> Floats:
     """The piecewise linear functions (rows, knots) that are 1 at one knot and 0 at the others."""
     if len(knots) == 1:
         return np.ones((len(log_f), 1))
-    place = (log_f - knots[0]) / (knots[1] - knots[0])
-    return np.clip(1 - np.abs(place[:, None] - np.arange(len(knots))), 0, None)
+    position = (log_f - knots[0]) / (knots[1] - knots[0])
+    return np.clip(1 - np.abs(position[:, None] - np.arange(len(knots))), 0, None)

@@ -10,7 +10,7 @@ import scipy
 
 from underskin.diagnosis.data.dataset import Inspected, curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.residuals import residuals, whole_prediction
+from underskin.diagnosis.inference.residuals import residuals, row_prediction
 from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, describe, effect, in_region, locate, region
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
@@ -240,7 +240,7 @@ def _located(
     against_base = residuals(problem, nothing, gain, levels.position)
     axes = locate(problem.lines, against_base)
     ranges = region(problem.lines, against_base, axes)
-    prediction = whole_prediction(problem, nothing)
+    prediction = row_prediction(problem, nothing)
     return axes, ranges, effect(problem.lines, prediction, in_region(problem.lines, ranges), gain, levels.level)
 
 

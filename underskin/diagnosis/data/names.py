@@ -1,12 +1,12 @@
-"""What answers and models are called, in reports and in sentences."""
+"""Names of answers and models, in reports and in sentences."""
 
 from collections.abc import Mapping, Sequence
 
 from underskin.mechanisms.base import Kind
 
-EXPLAINED = 0.8  # least probability of an answer that is stated without its rivals
+EXPLAINED = 0.8  # least probability of an answer that is stated without alternatives
 NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
-SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is called, of each kind of recording
+SIMPLEST: Mapping[Kind, str] = {  # the name of the model without mechanisms, for each kind of recording
     "frf": "the paper's model",
     "indentation": "Hertz's law",
     "compression": "the neo-Hookean law",
@@ -14,13 +14,13 @@ SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is 
 
 
 def in_words(names: Sequence[str]) -> str:
-    """An answer's names as a sentence has them."""
+    """An answer's names in a sentence."""
     special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something without a name"}
     return " and ".join(special.get(name, name.replace("_", " ")) for name in names)
 
 
 def quantity_in_words(parameter: str) -> str:
-    """A quantity of a skin, or `mechanism.parameter`, as a sentence has it: "tip mass of contact resonance"."""
+    """A quantity of a skin, or `mechanism.parameter`, in a sentence: "tip mass of contact resonance"."""
     mechanism, _, name = parameter.rpartition(".")
     called = {"youngs_modulus": "Young's modulus"}.get(name, name.replace("_", " "))
     return f"{called} of {in_words([mechanism])}" if mechanism else called

@@ -126,9 +126,9 @@ class Evidence:
 
 def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
     """By the quadratics around most probable points, which are first brought to where their whole gradients vanish."""
-    unknown = np.flatnonzero(~fitter.grown(at))
+    unknown = np.flatnonzero(~fitter.has_log_slope_gradient(at))
     if len(unknown):
-        at = fitter.replaced(at, unknown, fitter.with_growth(at[unknown]))
+        at = fitter.replaced(at, unknown, fitter.with_log_slope_gradient(at[unknown]))
     moving = np.arange(len(at))
     for _ in range(_POLISHING_CURVES if fitter.lines.curves else _POLISHING):
         moving, at = _polish(fitter, at, moving)
@@ -381,7 +381,7 @@ def _integrate_over_weak_parameter(evidence: list[Evidence]) -> list[Evidence]:
     integrals = []
     for number, (entry, place) in enumerate(zip(evidence, known, strict=True)):
         low, high = held.low[number, place], held.high[number, place]
-        deviation = float(np.sqrt(np.diag(entry.covariance)[entry.hypothesis.mean_places.index(place)]))
+        deviation = float(np.sqrt(np.diag(entry.covariance)[entry.hypothesis.mean_indices.index(place)]))
         stride = min(deviation, (high - low) / _FEWEST_STRIDES)
         integrals.append(_Integral(float(entry.point.fit[place]), stride, low, high))
     better: dict[int, Evidence] = {}
@@ -423,8 +423,8 @@ def _loosest(evidence: Evidence) -> int | None:
     hypothesis = evidence.hypothesis
     deviations = {
         place: float(np.sqrt(variance))
-        for place, variance in zip(hypothesis.mean_places, np.diag(evidence.covariance), strict=True)
-        if place < hypothesis.own_parameters and hypothesis.model.parameters[place].scale == "log"
+        for place, variance in zip(hypothesis.mean_indices, np.diag(evidence.covariance), strict=True)
+        if place < hypothesis.mechanism_parameter_count and hypothesis.model.parameters[place].scale == "log"
     }
     place = max(deviations, key=lambda place: deviations[place], default=None)
     return place if place is not None and deviations[place] > _LOOSE else None
@@ -437,7 +437,7 @@ def held_points(
     fits = np.zeros((len(numbers), held.low.shape[1]))
     for row, (number, value) in enumerate(zip(numbers, values.tolist(), strict=True)):
         entry, place = evidence[number], places[number]
-        mean = entry.hypothesis.mean_places
+        mean = entry.hypothesis.mean_indices
         index = mean.index(place)
         along = entry.covariance[:, index] / entry.covariance[index, index]
         fits[row, : len(entry.point.fit)] = entry.point.fit
@@ -542,8 +542,8 @@ def parts(evidence: Evidence, place: int) -> list[Part]:
     found = _along(evidence, open_place, values)
     logs = np.array([entry.log_evidence for entry in found])
     shares = np.exp(logs - np.logaddexp.reduce(logs))
-    mean_places = np.array(evidence.hypothesis.mean_places)
-    free, cell = np.flatnonzero(mean_places != open_place), int(np.flatnonzero(mean_places == open_place)[0])
+    mean_indices = np.array(evidence.hypothesis.mean_indices)
+    free, cell = np.flatnonzero(mean_indices != open_place), int(np.flatnonzero(mean_indices == open_place)[0])
     each = []
     for share, entry in zip(shares.tolist(), found, strict=True):
         covariance = np.zeros_like(evidence.covariance)
@@ -577,12 +577,16 @@ def _traded(evidence: Evidence, place: int) -> int | None:
     """The place of the mechanisms' parameter between bounds alone that a parameter trades against; None for none."""
     hypothesis = evidence.hypothesis
     deviations = np.sqrt(np.diag(evidence.covariance))
-    row = hypothesis.mean_places.index(place)
+    row = hypothesis.mean_indices.index(place)
     correlations = np.abs(evidence.covariance[row]) / (deviations[row] * deviations)
-    for index, other in enumerate(hypothesis.mean_places):
+    for index, other in enumerate(hypothesis.mean_indices):
         entry = hypothesis.model.parameters[other]
         low, high = entry.bounds
-        between = other < hypothesis.own_parameters and isinstance(entry.prior, Uniform) and entry.scale == "linear"
+        between = (
+            other < hypothesis.mechanism_parameter_count
+            and isinstance(entry.prior, Uniform)
+            and entry.scale == "linear"
+        )
         if between and correlations[index] > _TRADED and deviations[index] > _OPEN * (high - low):
             return other
     return None

@@ -20,7 +20,7 @@ from scipy.ndimage import minimum_filter
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence, around
 from underskin.diagnosis.inference.evidence import integrated as over_all_values
-from underskin.diagnosis.inference.fit import POSITION, Fitter, softer, with_contact_points
+from underskin.diagnosis.inference.fit import POSITION, Fitter, with_contact_points, with_softer_moduli
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import (
     Curvature,
@@ -28,11 +28,11 @@ from underskin.diagnosis.inference.hypothesis import (
     FitPoint,
     Hypothesis,
     Points,
-    alone,
     curvature,
-    own_places,
+    joined_points,
+    parameter_slices,
+    points_of,
     stacked,
-    together,
 )
 from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, Plateau
@@ -69,8 +69,8 @@ def best_starts(fitter: Fitter, beginnings: Sequence[StartingPoint]) -> list[Poi
     """Of each hypothesis the best of the local minima of a grid over the new mechanisms' prior quantiles, and of what
     recordings suggest."""
     grids = [_Grid(*pair) for pair in zip(fitter.hypotheses, beginnings, strict=True)]
-    begun = fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings])
-    settles = fitter.own.size and all(entry.parent is None for entry in beginnings)
+    begun = fitter.initial([grid.own for grid in grids], [entry.begin for entry in beginnings])
+    settles = fitter.covariance_indices.size and all(entry.parent is None for entry in beginnings)
     tried = fitter.update_noise_levels(begun, _SETTLING_ALONE if settles else _SETTLING)
     edges = np.cumsum([0, *(len(grid.own) for grid in grids)])
     starts = []
@@ -95,7 +95,7 @@ class _Grid:
     """
 
     def __init__(self, hypothesis: Hypothesis, beginning: StartingPoint) -> None:
-        places = own_places(hypothesis.model.names, hypothesis.lines)
+        places = parameter_slices(hypothesis.model.names, hypothesis.lines)
         known = beginning.parent or {}
         # New too is what has other parameters beside the mechanism that was added.
         self.new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
@@ -117,7 +117,7 @@ class _Grid:
         alone = [value for name in self.new for value in beginning.alone.get(name, ())]
         if self.new and len(alone) == len(free):
             points.append(tuple(alone))
-        self.own = np.zeros((len(points), hypothesis.own_parameters))
+        self.own = np.zeros((len(points), hypothesis.mechanism_parameter_count))
         for name, values in known.items():
             if name not in self.new:
                 self.own[:, places[name]] = values
@@ -132,18 +132,18 @@ def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[st
     alone = len(fitter.hypotheses[0].model.names) == 1
     sticks = alone and any(fitter.lines.mechanisms[name].moves_contact_points for name in new)
     if fitter.lines.kind == "indentation" and (sticks or beginning.begin is None):
-        several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
+        several = with_contact_points(fitter, with_softer_moduli(fitter, several) if sticks else several)
     guesses = any(fitter.lines.mechanisms[name].begins_at_guesses for name in new)
     kept = _KEPT_OF_PARENT if beginning.parent is not None and not guesses else _KEPT_STARTS
     chosen = several.points[np.sort(_cheapest(several)[:kept])]
     if new and beginning.parent is not None and beginning.begin is not None:
-        chosen = together(chosen, _without_effect(fitter, new, beginning.parent, beginning.begin))
+        chosen = joined_points(chosen, _without_effect(fitter, new, beginning.parent, beginning.begin))
     if not (sticks and guessed):
         return chosen
     # What the null hypothesis made of modulus and contact points may lead away from where the jumps are.
-    own = fitter.hypotheses[0].own_parameters
-    begun = fitter.begin([lowest.points.fit[count:, :own]], [None])
-    return together(chosen, begun.points[_cheapest(begun)[:1]])
+    own = fitter.hypotheses[0].mechanism_parameter_count
+    begun = fitter.initial([lowest.points.fit[count:, :own]], [None])
+    return joined_points(chosen, begun.points[_cheapest(begun)[:1]])
 
 
 def _without_effect(
@@ -151,8 +151,8 @@ def _without_effect(
 ) -> Points:
     """Where a set's fit stands, with the mechanisms that were added to it as near as may be to no effect."""
     (hypothesis,) = fitter.hypotheses
-    own = np.zeros((1, hypothesis.own_parameters))
-    for name, place in own_places(hypothesis.model.names, hypothesis.lines).items():
+    own = np.zeros((1, hypothesis.mechanism_parameter_count))
+    for name, place in parameter_slices(hypothesis.model.names, hypothesis.lines).items():
         own[0, place] = (
             [_of_no_effect(one) for one in hypothesis.model.parameters[place]] if name in new else parent.get(name, ())
         )
@@ -205,7 +205,7 @@ def with_scatter(hypotheses: Sequence[Hypothesis], points: Mapping[int, Points])
     for members in groups(points, hypotheses):
         fitter = Fitter([hypotheses[number] for number in members])
         begun = fitter.with_scatter(stacked([points[number] for number in members]))
-        starts |= {number: alone(begun, owner, fitter.counts[owner]) for owner, number in enumerate(members)}
+        starts |= {number: points_of(begun, owner, fitter.counts[owner]) for owner, number in enumerate(members)}
     return starts
 
 
@@ -273,7 +273,7 @@ class Explanation:
 
     def own(self, name: str) -> list[float]:
         """The fit coordinates of one of its mechanisms."""
-        return list(self.point.fit[own_places(self.names, self.best.hypothesis.lines)[name]])
+        return list(self.point.fit[parameter_slices(self.names, self.best.hypothesis.lines)[name]])
 
 
 @dataclass(frozen=True)
@@ -466,7 +466,7 @@ def _fitted(
             owners = improved.points.owner[shown].tolist()
             evidence = dict(zip(owners, around(fitter, improved[np.array(shown)]), strict=True))
         for owner, number in enumerate(members):
-            fits.append((number, alone(improved.points, owner, fitter.counts[owner]), evidence.get(owner)))
+            fits.append((number, points_of(improved.points, owner, fitter.counts[owner]), evidence.get(owner)))
     return fits
 
 

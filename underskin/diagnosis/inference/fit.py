@@ -1,8 +1,8 @@
-"""Hypotheses fitted: costs and their derivatives at many points at once, begun, settled and improved.
+"""Fits of hypotheses: costs and their derivatives at many points at once, starting points, and their improvement.
 
-Mean parameters take damped Gauss–Newton steps within the bounds; each point has its own damping, and rests once it has
-converged. What only enters the covariance (gain and position scatter, line level, and a mechanism's spread or pick-up)
-follows by Newton steps on the likelihood of the predictions at hand, which cost no model evaluation.
+Mean parameters take damped Gauss–Newton steps within the bounds, with a damping for each point, until it converges.
+Parameters of the covariance only (gain and position scatter, line level, sensor spread, pick-up) take Newton steps on
+the likelihood of fixed predictions, which need no model evaluation.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -23,7 +23,7 @@ from underskin.diagnosis.inference.hypothesis import (
     Points,
     log_likelihoods,
     normal_equations,
-    own_places,
+    parameter_slices,
 )
 from underskin.diagnosis.inference.least_squares import LeastSquares
 from underskin.diagnosis.inference.products import FrfProducts, Products, joined
@@ -34,12 +34,16 @@ from underskin.mechanisms.models.frf import FrfModels
 from underskin.recordings.campaign import curves_of
 from underskin.units import Floats, Indices, Mask
 
-GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
-SMOOTH = 2  # of curves, which have no place
-_FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
+GAIN, LEVEL, POSITION = 0, 1, 2  # indices of the covariance parameters, the last if there is positioning scatter
+SMOOTH = 2  # index of the smooth error of curves, which have no positioning scatter
+_FREE_SPREAD = 0.02  # above this sd of b, e^b is linearised at the most probable b, not at 0
 _NUMBERS_AT_ONCE = 500_000
 _PREDICTED_AT_ONCE = 1_000_000
-_BENDINGS, _BENT, _LARGEST_SENSOR_LOG_GAIN = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
+_GAIN_ROUNDS, _GAIN_CHANGE, _LARGEST_SENSOR_LOG_GAIN = (
+    6,
+    3e-3,
+    2.0,
+)  # most rounds, change that ends them, and bounds of b
 _LARGEST_D33_STEP = 1.0  # of log d33
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 _SETTLING = 20
@@ -48,62 +52,68 @@ _SOFTER = (1.0, 0.25, 0.06)
 _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
 _SMOOTH_STARTS = (np.log(1e-3), np.log(3e-2))  # of curves: close fit, and loose
 _CURVE_SETTLING = 8
-_PROMISED, _MARGIN = 10.0, 2.0  # times what the gradient says, and nats beyond, that a fit may still gain
+_PROMISED, _MARGIN = 10.0, 2.0  # times the gain by the gradient, and nats beyond it, that a fit may still gain
 _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's slopes
 _LARGEST_MEAN_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _LEAST_CURVATURE = 1e-10
 _MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
-Target = Callable[[Evaluated], Floats]  # costs (points,) that points must get below to be of any use
+CostToBeat = Callable[[Evaluated], Floats]  # costs (points,) that points must get below
 
 
 class Fitter:
-    """Evaluates, begins and improves points of hypotheses of the same recordings, which have the same covariance
+    """Evaluates, starts and improves points of hypotheses of the same recordings with the same covariance
     parameters."""
 
     def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[Collection[int]] | None = None) -> None:
-        """Prepare the names and bounds; the parameters of each hypothesis at `held` stay where a point has them, and
-        have no prior."""
+        """Prepare names and bounds; the parameters of each hypothesis with indices `held` are fixed and have no
+        prior."""
         self.hypotheses = tuple(hypotheses)
         first = hypotheses[0]
         self.lines, self.curvature, self.has_position_scatter = first.lines, first.curvature, first.has_position_scatter
         self.covariance = first.covariance
-        self._covariance_prior = np.array([entry.prior.row for entry in self.covariance])
-        self._lowest = np.array([entry.low for entry in self.covariance])
-        self._highest = np.array([entry.high for entry in self.covariance])
-        self.counts = [len(entry.model.parameters) for entry in hypotheses]
+        self._covariance_prior = np.array([parameter.prior.row for parameter in self.covariance])
+        self._lowest = np.array([parameter.low for parameter in self.covariance])
+        self._highest = np.array([parameter.high for parameter in self.covariance])
+        self.counts = [len(hypothesis.model.parameters) for hypothesis in hypotheses]
         shape = len(hypotheses), max(self.counts)
         self.free = np.zeros(shape, dtype=bool)
         self.low, self.high, self._precision, self._centre = (np.zeros(shape) for _ in range(4))
         self._freedom = np.full(shape, np.inf)
         self._log_prior_height = np.zeros(len(hypotheses))
         for number, hypothesis in enumerate(hypotheses):
-            places = [place for place in hypothesis.mean_places if held is None or place not in held[number]]
-            self.free[number, places] = True
+            indices = [index for index in hypothesis.mean_indices if held is None or index not in held[number]]
+            self.free[number, indices] = True
             self.low[number, : self.counts[number]], self.high[number, : self.counts[number]] = hypothesis.bounds
-            of_priors = hypothesis.priors[:, places]
-            self._precision[number, places], self._centre[number, places] = of_priors[:2]
-            self._log_prior_height[number], self._freedom[number, places] = of_priors[2].sum(), of_priors[3]
+            priors = hypothesis.priors[:, indices]
+            self._precision[number, indices], self._centre[number, indices] = priors[:2]
+            self._log_prior_height[number], self._freedom[number, indices] = priors[2].sum(), priors[3]
         self._range = self.high - self.low
-        each = [entry.knowledge for entry in hypotheses]
-        self._known = GaussianBatch(each, shape[1]) if any(one is not None for one in each) else None
-        # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
-        self.own = np.array(
+        gaussians = [hypothesis.knowledge for hypothesis in hypotheses]
+        self._gaussians = (
+            GaussianBatch(gaussians, shape[1]) if any(gaussian is not None for gaussian in gaussians) else None
+        )
+        # Indices of each hypothesis's covariance parameters that belong to mechanisms; these come last.
+        self.covariance_indices = np.array(
             [
-                [place for place, entry in enumerate(one.model.parameters) if entry.moves_covariance]
-                for one in hypotheses
+                [index for index, parameter in enumerate(hypothesis.model.parameters) if parameter.moves_covariance]
+                for hypothesis in hypotheses
             ],
             dtype=np.intp,
         ).reshape(len(hypotheses), -1)
-        own = [first.model.parameters[place] for place in self.own[0]]
-        self._common = len(self.covariance) - len(own)
-        spreads = [self._common + place for place, entry in enumerate(own) if entry.acts_on == "gain_spread"]
+        mechanism_parameters = [first.model.parameters[index] for index in self.covariance_indices[0]]
+        self._shared_count = len(self.covariance) - len(mechanism_parameters)
+        spreads = [
+            self._shared_count + index
+            for index, parameter in enumerate(mechanism_parameters)
+            if parameter.acts_on == "gain_spread"
+        ]
         self._spread = spreads[0] if spreads else None
 
     @property
     def no_sensor_log_gain(self) -> Floats:
-        """Log gains of the sensors that are all 0."""
+        """Log gains of 0 (sensors,)."""
         return np.zeros(self.lines.sensors.shape[1])
 
     def at(self, point: FitPoint) -> Points:
@@ -111,12 +121,12 @@ class Fitter:
         return Points(np.zeros(1, dtype=np.intp), point.fit[None], point.covariance[None], point.sensor_log_gain[None])
 
     def evaluate(self, points: Points, *, slopes: bool = True) -> Evaluated:
-        """Predict, with derivatives unless they are not needed, and weigh."""
+        """Predict, with derivatives if `slopes`, and compute the costs."""
         products = self.products(points, slopes=slopes, place=self.has_position_scatter)
         return self.weighed(points, products)
 
     def products(self, points: Points, *, slopes: bool, place: bool) -> Products:
-        """The inner products at points."""
+        """The inner products at points; with derivatives if `slopes`, with position slopes if `place`."""
         if self.lines.curves:
             edges = np.searchsorted(points.owner, np.arange(len(self.hypotheses) + 1))
             parts = [
@@ -128,10 +138,10 @@ class Fitter:
             ]
             return joined(parts, max(self.counts))
         several = self._at_once(points, max(self.counts) if slopes else 0)
-        return joined([self._frf_products(points[some], slopes, place) for some in several], max(self.counts))
+        return joined([self._frf_products(points[batch], slopes, place) for batch in several], max(self.counts))
 
     def _at_once(self, points: Points, variables: int) -> list[slice]:
-        """Which points are worked out at once, so that arrays with derivatives by so many variables stay small."""
+        """Slices of points small enough that arrays with derivatives by so many variables stay small."""
         largest = max(hypothesis.frf_model.numbers(variables) for hypothesis in self.hypotheses)
         count = max(_PREDICTED_AT_ONCE // largest, 1)
         return [slice(first, first + count) for first in range(0, len(points), count)]
@@ -141,64 +151,65 @@ class Fitter:
         return FrfModels([hypothesis.frf_model for hypothesis in self.hypotheses])
 
     def place_slopes(self, points: Points) -> Floats:
-        """∂m/∂x and ∂m/∂y of recordings, before the dynamics (2, points, recordings)."""
+        """∂m/∂x and ∂m/∂y of recordings, without the dynamics (2, points, recordings)."""
         slopes = np.empty((2, len(points), self.lines.recordings))
-        for some in self._at_once(points, 0):
-            part = points[some]
+        for batch in self._at_once(points, 0):
+            part = points[batch]
             for rows, response in self._models.respond(part.owner, part.fit, slopes=False, place=True, lines=False):
-                slopes[:, some][:, rows] = response.place_slopes
+                slopes[:, batch][:, rows] = response.place_slopes
         return slopes
 
     def _frf_products(self, points: Points, slopes: bool, place: bool) -> FrfProducts:
-        """The inner products at points that are worked out at once."""
+        """The inner products at points that are evaluated at once."""
         parts = self._models.respond(points.owner, points.fit, slopes=slopes, place=place)
-        each = []
+        products = []
         for rows, response in parts:
-            own = self.hypotheses[points.owner[rows[0]]]
-            each.append(FrfProducts.of(own.frf_lines, own.pickup_rows, response))
+            hypothesis = self.hypotheses[points.owner[rows[0]]]
+            products.append(FrfProducts.of(hypothesis.frf_lines, hypothesis.pickup_rows, response))
         order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        if len(parts) == 1:  # whose points come in the order of what presses their contacts
-            return each[0] if (np.diff(order) == 1).all() else each[0][order]
-        return FrfProducts.joined(each, max(self.counts))[order]
+        if len(parts) == 1:  # whose points may be ordered by contact
+            return products[0] if (np.diff(order) == 1).all() else products[0][order]
+        return FrfProducts.joined(products, max(self.counts))[order]
 
     def weighed(self, points: Points, products: Products) -> Evaluated:
-        """Points whose predictions are known, with the sensors' gains that belong to them where these are free."""
+        """Points with known predictions and their costs; where the sensors' gains are free, at the most probable
+        gains."""
         if self._spread is not None:
-            for _ in range(_BENDINGS):
+            for _ in range(_GAIN_ROUNDS):
                 levels = self.levels(points.covariance[:, None])
                 gains = Likelihoods(self.lines, self.curvature, products, levels, points.sensor_log_gain).sensor_gains
                 free = levels.spread[:, 0] >= _FREE_SPREAD
                 sensor_log_gain = np.where(
                     free, np.clip(gains, -_LARGEST_SENSOR_LOG_GAIN, _LARGEST_SENSOR_LOG_GAIN), points.sensor_log_gain
                 )
-                bent = np.abs(sensor_log_gain - points.sensor_log_gain).max()
-                if bent < _BENT:
+                change = np.abs(sensor_log_gain - points.sensor_log_gain).max()
+                if change < _GAIN_CHANGE:
                     break
                 points = replace(points, sensor_log_gain=sensor_log_gain)
         return Evaluated(points, products, self._costs(points, products, points.covariance[:, None])[:, 0])
 
     def marginal(self, at: Evaluated) -> Likelihoods:
-        """The likelihoods at points."""
+        """The terms of the likelihood at points."""
         levels = self.levels(at.points.covariance[:, None])
         return Likelihoods(self.lines, self.curvature, at.products, levels, at.points.sensor_log_gain)
 
     def levels(self, covariance: Floats) -> SeveralLevels:
-        """The noise levels that covariance parameters (…, parameters) hold, (…, 1)."""
+        """The noise levels (…, 1) of covariance parameters (…, parameters)."""
         values = np.exp(covariance[..., None])
         shape = (*covariance.shape[:-1], 1)
-        own = {entry.name: values[..., column, :] for column, entry in enumerate(self.covariance)}
+        values_by_name = {parameter.name: values[..., column, :] for column, parameter in enumerate(self.covariance)}
         pickup = self.hypotheses[0].model.pickup
         return SeveralLevels(
             gain=values[..., GAIN, :],
             level=values[..., LEVEL, :],
             position=values[..., POSITION, :] if self.has_position_scatter else np.zeros(shape),
             spread=np.full(shape, SENSOR_SPREAD) if self._spread is None else values[..., self._spread, :],
-            pickup=None if pickup is None else pickup.deviation(own),
+            pickup=None if pickup is None else pickup.deviation(values_by_name),
             smooth=values[..., SMOOTH, :] if self.lines.curves else np.zeros(shape),
         )
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
-        """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
+        """The costs (points, sets) with covariance parameters (points, sets, parameters), at fixed predictions."""
         from underskin.diagnosis.inference.kernels import log_priors
 
         pickup = self.hypotheses[0].model.pickup
@@ -209,13 +220,17 @@ class Fitter:
                 parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
                 return np.concatenate([self._costs(points[part], products[part], covariances[part]) for part in parts])
         covariances = contiguous(covariances)
-        each = log_likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.sensor_log_gain)
+        log_posterior = log_likelihoods(
+            self.lines, self.curvature, products, self.levels(covariances), points.sensor_log_gain
+        )
         bounds = self.free, self.low, self.high, self._precision, self._centre
         heights = self._freedom, self._log_prior_height
-        log_priors(points.owner, contiguous(points.fit), *bounds, *heights, covariances, self._covariance_prior, each)
-        if self._known is not None:
-            each += self._known.log_densities(points)[:, None]
-        return -each
+        log_priors(
+            points.owner, contiguous(points.fit), *bounds, *heights, covariances, self._covariance_prior, log_posterior
+        )
+        if self._gaussians is not None:
+            log_posterior += self._gaussians.log_densities(points)[:, None]
+        return -log_posterior
 
     def costs(self, at: Evaluated, covariances: Floats) -> Floats:
         """The costs (points, sets) at the same predictions with other covariance parameters (points, sets, …)."""
@@ -224,7 +239,7 @@ class Fitter:
     def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
         """Information and gradient of the log posterior in the mean parameters (points, parameters, parameters).
 
-        What is held or no parameter has gradient 0 and information 1 of its own.
+        Held and padded parameters have gradient 0 and information 1.
         """
         levels, sensor_log_gain = self.levels(at.points.covariance[:, None]), at.points.sensor_log_gain
         information, gradient = normal_equations(
@@ -232,46 +247,50 @@ class Fitter:
         )
         owner = at.points.owner
         free = self.free[owner]
-        away = at.points.fit - self._centre[owner]
-        precision = self._prior_precision(owner, away)
-        if self._known is not None:
-            of_others, towards = self._known.equations(at.points)
+        offset = at.points.fit - self._centre[owner]
+        precision = self._prior_precision(owner, offset)
+        if self._gaussians is not None:
+            of_others, towards = self._gaussians.equations(at.points)
             information, gradient = information + of_others, gradient + towards
-        gradient = np.where(free, gradient - precision * away, 0.0)
+        gradient = np.where(free, gradient - precision * offset, 0.0)
         information = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
         diagonal = np.arange(free.shape[1])
         information[:, diagonal, diagonal] += np.where(free, precision, 1.0)
         return information, gradient
 
-    def _prior_precision(self, owner: Indices, away: Floats) -> Floats:
-        """What a quadratic with the prior's gradient has for its precision, so far `away` from the centres (points,
-        parameters): less and less in heavy tails."""
+    def _prior_precision(self, owner: Indices, offset: Floats) -> Floats:
+        """Precision of the quadratic with the prior's gradient at the `offset` from the centres (points, parameters);
+        it decreases with the offset in heavy tails."""
         precision, freedom = self._precision[owner], self._freedom[owner]
         with np.errstate(invalid="ignore"):
-            weight = (freedom + 1) / (freedom + precision * away**2)
+            weight = (freedom + 1) / (freedom + precision * offset**2)
         return np.where(np.isfinite(freedom), weight, 1.0) * precision
 
     def with_covariance(self, points: Points, covariance: Floats) -> Points:
-        """The points with other covariance parameters, a mechanism's own among the coordinates of the fit."""
+        """The points with other covariance parameters; those of mechanisms are also coordinates of the fit."""
         fit = points.fit.copy()
-        np.put_along_axis(fit, self.own[points.owner], covariance[:, self._common :], axis=1)
+        np.put_along_axis(fit, self.covariance_indices[points.owner], covariance[:, self._shared_count :], axis=1)
         return replace(points, covariance=covariance, fit=fit)
 
     def update_noise_levels(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
         """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.
 
-        Several of a mechanism's own hang together, so that steps of one at a time would creep.
+        Where mechanisms have covariance parameters these are correlated, so the steps are joint.
         """
-        if isinstance(at.products, FrfProducts) and not self.own.size and self.hypotheses[0].model.pickup is None:
-            return self._settled_apart(at, at.products, steps, held)
+        if (
+            isinstance(at.products, FrfProducts)
+            and not self.covariance_indices.size
+            and self.hypotheses[0].model.pickup is None
+        ):
+            return self._update_independently(at, at.products, steps, held)
         from underskin.diagnosis.inference.kernels import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
 
         low, high = self._lowest, self._highest
         points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
         products = at.products.values
         for _ in range(steps):
-            part = Evaluated(points, products, cost.copy()).some(moving)
-            gradient, hessian = self.covariance_equations(part, first_mixed=self._common)
+            part = Evaluated(points, products, cost.copy()).subset(moving)
+            gradient, hessian = self.covariance_equations(part, first_mixed=self._shared_count)
             if held is not None:
                 hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0
             eigenvalues, vectors = np.linalg.eigh(hessian)
@@ -285,7 +304,7 @@ class Fitter:
             trying = np.arange(len(part))
             for _ in range(TRIES):
                 tried = np.clip(here[trying] + step[trying], low, high)
-                costs = self.costs(part.some(trying), tried[:, None])[:, 0]
+                costs = self.costs(part.subset(trying), tried[:, None])[:, 0]
                 lower = costs < part.cost[trying]
                 better = trying[lower]
                 covariance[better], reached[better] = tried[lower], costs[lower]
@@ -294,27 +313,29 @@ class Fitter:
                 if not len(trying):
                     break
                 step = step / SHORTER
-            whole = points.covariance.copy()
-            whole[moving] = covariance
-            points = self.with_covariance(points, whole)
+            all_covariances = points.covariance.copy()
+            all_covariances[moving] = covariance
+            points = self.with_covariance(points, all_covariances)
             cost[moving] = reached
             moving = moving[gained >= LEAST_GAIN]
             if not len(moving):
                 break
         return Evaluated(points, at.products, cost, at.log_slope_gradient)
 
-    def _settled_apart(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
-        """The same where no mechanism acts on the covariance: each parameter moves on its own."""
+    def _update_independently(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
+        """The same where no mechanism acts on the covariance: each parameter takes its own steps."""
         from underskin.diagnosis.inference.kernels import update_noise_levels
 
         covariance, cost = at.points.covariance.copy(), at.cost.copy()
         about_means, numbers = self.lines.about_means
-        place = products.place_slopes
-        size = (
-            np.zeros((len(at), 0)) if place is None or not self.has_position_scatter else place[0] ** 2 + place[1] ** 2
+        slopes = products.place_slopes
+        squared_slopes = (
+            np.zeros((len(at), 0))
+            if slopes is None or not self.has_position_scatter
+            else slopes[0] ** 2 + slopes[1] ** 2
         )
         update_noise_levels(
-            *map(contiguous, (products.level, products.uu, products.uy, products.yy, size)),
+            *map(contiguous, (products.level, products.uu, products.uy, products.yy, squared_slopes)),
             self.lines.sensor,
             contiguous(at.points.sensor_log_gain),
             self.curvature.laplacian,
@@ -334,8 +355,8 @@ class Fitter:
         return replace(at, points=replace(at.points, covariance=covariance), cost=cost)
 
     def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
-        """Gradient and Hessian of the costs in the covariance parameters, by differences; without mixed terms of the
-        parameters before the `first_mixed`."""
+        """Gradient and Hessian of the costs in the covariance parameters, by differences; without the mixed terms of
+        parameters before `first_mixed`."""
         from underskin.diagnosis.inference.kernels import STEP
 
         here = at.points.covariance
@@ -348,43 +369,52 @@ class Fitter:
         shifts = np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)])
         costs = self.costs(at, centre[:, None] + shifts)
         middle, up, down = costs[:, :1], costs[:, 1 : count + 1], costs[:, count + 1 : 2 * count + 1]
-        alone = up + down - 2 * middle
+        second_differences = up + down - 2 * middle
         gradient = (up - down) / (2 * STEP)
-        hessian = alone[:, :, None] / STEP**2 * np.eye(count)
-        together = costs[:, 2 * count + 1 :].reshape(len(at), 2, -1).sum(axis=1) - 2 * middle
-        for place, (a, b) in enumerate(pairs):
-            hessian[:, a, b] = (together[:, place] - alone[:, a] - alone[:, b]) / (2 * STEP**2)
+        hessian = second_differences[:, :, None] / STEP**2 * np.eye(count)
+        mixed_differences = costs[:, 2 * count + 1 :].reshape(len(at), 2, -1).sum(axis=1) - 2 * middle
+        for index, (a, b) in enumerate(pairs):
+            hessian[:, a, b] = (mixed_differences[:, index] - second_differences[:, a] - second_differences[:, b]) / (
+                2 * STEP**2
+            )
             hessian[:, b, a] = hessian[:, a, b]
         return gradient + np.einsum("nij,nj->ni", hessian, here - centre), hessian
 
-    def start(self, own: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
-        """Points of each hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
-        parent or at their centre; noise as it is usual."""
-        owner = np.repeat(np.arange(len(own)), [len(entry) for entry in own])
+    def start(self, mechanism_fits: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
+        """Points of each hypothesis with these coordinates of its mechanisms (points, parameters), nuisances from a
+        parent or at their priors' centres, and usual noise levels."""
+        owner = np.repeat(np.arange(len(mechanism_fits)), [len(coordinates) for coordinates in mechanism_fits])
         fit = np.zeros((len(owner), max(self.counts)))
-        for number, (entry, values, parent) in enumerate(zip(self.hypotheses, own, parents, strict=True)):
-            count, mechanisms = self.counts[number], entry.own_parameters
-            nuisances = [parameter.start for parameter in entry.model.parameters[mechanisms:]]
+        for number, (hypothesis, values, parent) in enumerate(
+            zip(self.hypotheses, mechanism_fits, parents, strict=True)
+        ):
+            count, mechanisms = self.counts[number], hypothesis.mechanism_parameter_count
+            nuisances = [parameter.start for parameter in hypothesis.model.parameters[mechanisms:]]
             if parent is not None:
                 nuisances = parent.fit[len(parent.fit) - (count - mechanisms) :].tolist()
             rows = owner == number
             fit[rows, :mechanisms], fit[rows, mechanisms:count] = values, nuisances
-        common = [GAIN_PRIOR.middle, 0.0]
+        shared = [GAIN_PRIOR.middle, 0.0]
         if self.has_position_scatter:
-            common.append(POSITION_PRIOR.middle)
+            shared.append(POSITION_PRIOR.middle)
         if self.lines.curves:
-            common.append(self.hypotheses[0].smooth.middle)
-        of_mechanisms = np.take_along_axis(fit, self.own[owner], axis=1)
-        covariance = np.concatenate([np.tile(common, (len(owner), 1)), of_mechanisms], axis=1)
+            shared.append(self.hypotheses[0].smooth.middle)
+        of_mechanisms = np.take_along_axis(fit, self.covariance_indices[owner], axis=1)
+        covariance = np.concatenate([np.tile(shared, (len(owner), 1)), of_mechanisms], axis=1)
         return Points(owner, fit, covariance, np.tile(self.no_sensor_log_gain, (len(owner), 1)))
 
-    def begin(
-        self, own: Sequence[Floats], parents: Sequence[FitPoint | None] | None = None, *, slopes: bool = False
+    def initial(
+        self,
+        mechanism_fits: Sequence[Floats],
+        parents: Sequence[FitPoint | None] | None = None,
+        *,
+        slopes: bool = False,
     ) -> Evaluated:
-        """The starts of each hypothesis with these coordinates, d33 as the data would have it, evaluated."""
-        points = self.start(own, parents or [None] * len(own))
+        """The starting points of each hypothesis with these coordinates, evaluated, with d33 estimated from the
+        data."""
+        points = self.start(mechanism_fits, parents or [None] * len(mechanism_fits))
         products = self.products(points, slopes=slopes, place=self.has_position_scatter)
-        if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
+        if not any(parameter.proportional for parameter in self.hypotheses[0].model.parameters):
             return self.weighed(points, products)
         ratio = self._ratio(points, products)
         if isinstance(products, FrfProducts):
@@ -392,7 +422,7 @@ class Fitter:
         return self.evaluate(self._times(points, ratio)[0], slopes=slopes)
 
     def _ratio(self, points: Points, products: Products) -> Floats:
-        """What measured recordings are of the predicted ones (points,): their mean, weighed by noise and scatter."""
+        """Mean ratio of measured to predicted recordings (points,), weighted by noise and scatter."""
         sums = products.summed(self.levels(points.covariance[:, None]))
         uu, uy = sums.uu[:, 0], sums.uy[:, 0]
         level = products.level
@@ -400,19 +430,22 @@ class Fitter:
         return np.asarray((weight * level * uy).sum(axis=1) / np.maximum((weight * level**2 * uu).sum(axis=1), 1e-300))
 
     def with_scatter(self, points: Points) -> Points:
-        """For each point fitted without positioning scatter, the best of a few scales of it, d33 following each.
+        """For each point fitted without positioning scatter, the best of a few scales of it, with d33 estimated for
+        each.
 
-        Where the scatter is large, what was fitted without it may be far off: also from the nuisances' centres.
+        Large scatter may have biased the fit without it, so the nuisances' centres are tried as well.
         """
         fresh = points.fit.copy()
         for number, (hypothesis, count) in enumerate(zip(self.hypotheses, self.counts, strict=True)):
-            nuisances = slice(hypothesis.own_parameters, count)
-            starts = [entry.start for entry in hypothesis.model.parameters[nuisances]]
+            nuisances = slice(hypothesis.mechanism_parameter_count, count)
+            starts = [parameter.start for parameter in hypothesis.model.parameters[nuisances]]
             fresh[points.owner == number, nuisances] = starts
         scales = np.log(_POSITION_STARTS)
-        gain, level, own = points.covariance[:, :1], points.covariance[:, 1:2], points.covariance[:, 2:]
-        common = np.minimum(gain, GAIN_PRIOR.middle), level
-        covariances = [np.concatenate([*common, np.full_like(gain, scale), own], axis=1) for scale in scales]
+        gain, level, mechanism_levels = points.covariance[:, :1], points.covariance[:, 1:2], points.covariance[:, 2:]
+        shared = np.minimum(gain, GAIN_PRIOR.middle), level
+        covariances = [
+            np.concatenate([*shared, np.full_like(gain, scale), mechanism_levels], axis=1) for scale in scales
+        ]
         twice = np.repeat(np.arange(len(points)), 2)
         is_fresh = np.tile([False, True], len(points))
         both = points[twice]
@@ -420,68 +453,73 @@ class Fitter:
         products = self.products(both, slopes=True, place=True)
         both, products = self._scaled(both, products, np.where(is_fresh, self._ratio(both, products), 1.0))
         rows = np.repeat(np.arange(len(both)), len(scales))
-        each = np.stack(covariances, axis=1)[twice].reshape(len(rows), -1)
-        at = self._with_d33(self.weighed(self.with_covariance(both[rows], each), products[rows]))
-        sets = 2 * len(scales)
-        return at.points[at.cost.reshape(-1, sets).argmin(axis=1) + sets * np.arange(len(points))]
+        covariance = np.stack(covariances, axis=1)[twice].reshape(len(rows), -1)
+        at = self._with_d33(self.weighed(self.with_covariance(both[rows], covariance), products[rows]))
+        candidates = 2 * len(scales)
+        return at.points[at.cost.reshape(-1, candidates).argmin(axis=1) + candidates * np.arange(len(points))]
 
     def _scaled(self, points: Points, products: Products, ratio: Floats) -> tuple[Points, Products]:
-        """Points with d33 so many times as large (points,), and what they predict."""
+        """Points with d33 multiplied by `ratio` (points,), and their predictions."""
         assert isinstance(products, FrfProducts)
         moved, factor = self._times(points, ratio)
         return moved, products.scaled(factor)
 
     def _times(self, points: Points, ratio: Floats) -> tuple[Points, Floats]:
-        """With d33 so many times as large (points,), within its bounds, and by how much; as it is where not above 0."""
-        number, place = np.arange(len(points)), self._d33[points.owner]
+        """Points with d33 multiplied by `ratio` (points,) within its bounds, and the factor applied; 1 where the ratio
+        is not positive."""
+        number, index = np.arange(len(points)), self._d33[points.owner]
         fit = points.fit.copy()
         change = np.log(np.where(ratio > 0, ratio, 1.0))
-        low, high = self.low[points.owner, place], self.high[points.owner, place]
-        fit[number, place] = np.clip(fit[number, place] + change, low, high)
-        return replace(points, fit=fit), np.exp(fit[number, place] - points.fit[number, place])
+        low, high = self.low[points.owner, index], self.high[points.owner, index]
+        fit[number, index] = np.clip(fit[number, index] + change, low, high)
+        return replace(points, fit=fit), np.exp(fit[number, index] - points.fit[number, index])
 
     def _with_d33(self, at: Evaluated) -> Evaluated:
-        """With the d33 that the data would have at these noise levels: no further prediction."""
+        """With the most probable d33 at these noise levels; needs no further prediction."""
         information, gradient = self.posterior_equations(at)
-        number, place = np.arange(len(at)), self._d33[at.points.owner]
+        number, index = np.arange(len(at)), self._d33[at.points.owner]
         step = np.clip(
-            gradient[number, place] / information[number, place, place], -_LARGEST_D33_STEP, _LARGEST_D33_STEP
+            gradient[number, index] / information[number, index, index], -_LARGEST_D33_STEP, _LARGEST_D33_STEP
         )
         return self.update_noise_levels(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
 
     @cached_property
     def _d33(self) -> Indices:
-        """Where each hypothesis has the parameter that the prediction is proportional to."""
-        proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
-        return np.array([own.index(True) for own in proportional])
+        """Index of the parameter of each hypothesis that the prediction is proportional to."""
+        proportional = [
+            [parameter.proportional for parameter in hypothesis.model.parameters] for hypothesis in self.hypotheses
+        ]
+        return np.array([flags.index(True) for flags in proportional])
 
     @cached_property
-    def _moves_place(self) -> Mask:
-        """Which parameters of each hypothesis may change how σ depends on the contact's place (hypotheses, parameters),
-        relative to σ: not d33, nor those of the dynamics."""
+    def _moves_position_slopes(self) -> Mask:
+        """Parameters of each hypothesis that may change ∇σ/σ at the contact (hypotheses, parameters): not d33, nor
+        those of the dynamics."""
         moves = np.zeros(self.low.shape, dtype=bool)
         for number, hypothesis in enumerate(self.hypotheses):
-            moves[number, : self.counts[number]] = [not entry.proportional for entry in hypothesis.model.parameters]
-            for name, own in own_places(hypothesis.model.names, self.lines).items():
-                moves[number, own] &= not self.lines.mechanisms[name].needs_lines
+            moves[number, : self.counts[number]] = [
+                not parameter.proportional for parameter in hypothesis.model.parameters
+            ]
+            for name, span in parameter_slices(hypothesis.model.names, self.lines).items():
+                moves[number, span] &= not self.lines.mechanisms[name].needs_lines
         return moves
 
-    def improve(self, start: Points, target: Target | None = None) -> Evaluated:
-        """The most probable points near the starts; only roughly where their targets will not be reached."""
+    def improve(self, start: Points, cost_to_beat: CostToBeat | None = None) -> Evaluated:
+        """The most probable points near the starts; only roughly where they will not reach `cost_to_beat`."""
         if not self.lines.curves:
             return self.update_noise_levels(
-                self.descend(self.update_noise_levels(self.evaluate(start), 3), 1, target), 2
+                self.descend(self.update_noise_levels(self.evaluate(start), 3), 1, cost_to_beat), 2
             )
-        begun = by_least_squares(self, start)
-        as_they_are = self.update_noise_levels(self.evaluate(start), _CURVE_SETTLING)
-        if as_they_are.cost.min() < begun.cost[0]:
-            begun = as_they_are[as_they_are.best()]
-        if target is not None and begun.cost[0] > target(begun)[0] + _MAY_GAIN:
-            return begun
-        return self.update_noise_levels(self._between_samples(begun).descend(begun, 1), _CURVE_SETTLING)
+        initial = by_least_squares(self, start)
+        from_starts = self.update_noise_levels(self.evaluate(start), _CURVE_SETTLING)
+        if from_starts.cost.min() < initial.cost[0]:
+            initial = from_starts[from_starts.best()]
+        if cost_to_beat is not None and initial.cost[0] > cost_to_beat(initial)[0] + _MAY_GAIN:
+            return initial
+        return self.update_noise_levels(self._between_samples(initial).descend(initial, 1), _CURVE_SETTLING)
 
     def _between_samples(self, at: Evaluated) -> Self:
-        """Of what sticks, with contact points held between the samples where they are at one point."""
+        """With contact points confined to the interval between samples that they are in, where adhesion moves them."""
         (hypothesis,) = self.hypotheses
         if not any(self.lines.mechanisms[name].moves_contact_points for name in hypothesis.model.names):
             return self
@@ -491,23 +529,23 @@ class Fitter:
         )
         return held
 
-    def descend(self, best: Evaluated, settling: int, target: Target | None = None) -> Evaluated:
-        """Steps of the mean parameters, each followed by so many of the covariance's.
+    def descend(self, best: Evaluated, settling: int, cost_to_beat: CostToBeat | None = None) -> Evaluated:
+        """Steps of the mean parameters, each followed by `settling` steps of the covariance's.
 
-        A point goes no further once it promises no cost below its target. What the gradient promises leaves out what
-        the noise levels may gain: where these are a curve's, or a mechanism's own, no point is left.
+        A point stops once the gradient promises no cost below `cost_to_beat`. As that leaves out gains by the noise
+        levels, no point of curves, or of mechanisms with covariance parameters, is stopped.
         """
-        if self.lines.curves or self.own.size:
-            target = None
+        if self.lines.curves or self.covariance_indices.size:
+            cost_to_beat = None
         damping = np.full(len(best), 1e-3)
         moving = np.arange(len(best))
         for _ in range(_MOST_ITERATIONS):
-            part = best.some(moving)
+            part = best.subset(moving)
             step, slope = self._step(part, damping[moving])
-            if target is not None:
-                promising = part.cost - _PROMISED * slope - _MARGIN < target(best)[moving]
+            if cost_to_beat is not None:
+                promising = part.cost - _PROMISED * slope - _MARGIN < cost_to_beat(best)[moving]
                 moving, part, step, slope = moving[promising], part[promising], step[promising], slope[promising]
-            resting = (slope < _CONVERGED) & self.grown(part)
+            resting = (slope < _CONVERGED) & self.has_log_slope_gradient(part)
             going = np.ones(len(part), dtype=bool)
             if resting.any():
                 settled = self.update_noise_levels(part[resting], settling)
@@ -516,7 +554,7 @@ class Fitter:
             stepping = ~resting
             if stepping.any():
                 number = moving[stepping]
-                after, damping[number], going[stepping] = self._moved_on(
+                after, damping[number], going[stepping] = self._after_step(
                     part[stepping], step[stepping], damping[number], settling
                 )
                 best = self.replaced(best, number, after)
@@ -525,10 +563,12 @@ class Fitter:
                 break
         return best
 
-    def _moved_on(self, at: Evaluated, step: Floats, damping: Floats, settling: int) -> tuple[Evaluated, Floats, Mask]:
-        """The points after steps, where these gain; their damping; and which of them are to go on.
+    def _after_step(
+        self, at: Evaluated, step: Floats, damping: Floats, settling: int
+    ) -> tuple[Evaluated, Floats, Mask]:
+        """The points after steps, where these gain; their damping; and which of them continue.
 
-        A point that gains nothing learns first how the position's slopes change, then tries shorter steps.
+        A point that does not gain first needs the gradient of its position slopes, then shorter steps.
         """
         owner = at.points.owner
         fit = np.clip(at.points.fit + step, self.low[owner], self.high[owner])
@@ -539,9 +579,9 @@ class Fitter:
             at, np.flatnonzero(better), replace(tried, log_slope_gradient=at.log_slope_gradient)[better]
         )
         stuck = ~better & ((damping > 1e4) | (np.abs(step).max(axis=1) < 1e-7))
-        blind = np.flatnonzero(~better & ~stuck & ~self.grown(at))
+        blind = np.flatnonzero(~better & ~stuck & ~self.has_log_slope_gradient(at))
         if len(blind):
-            after = self.replaced(after, blind, self.with_growth(at[blind]))
+            after = self.replaced(after, blind, self.with_log_slope_gradient(at[blind]))
         failed = ~better & ~stuck
         failed[blind] = False
         damping = np.where(better, np.maximum(damping / 10, 1e-6), damping)
@@ -549,8 +589,8 @@ class Fitter:
         idle = failed & (gained > -_CONVERGED) & (damping > 1)
         return after, damping, ~(stuck | idle | (better & (gained < _CONVERGED)))
 
-    def grown(self, at: Evaluated) -> Mask:
-        """Which points know how the position's slopes change, or have no use for it."""
+    def has_log_slope_gradient(self, at: Evaluated) -> Mask:
+        """Points whose `log_slope_gradient` is known or not needed."""
         if not self.has_position_scatter:
             return np.ones(len(at), dtype=bool)
         if at.log_slope_gradient is None:
@@ -558,7 +598,7 @@ class Fitter:
         return np.asarray(np.isfinite(at.log_slope_gradient).all(axis=(1, 2)))
 
     def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
-        """With other points in the place of some, which are in rising order."""
+        """With other points in place of those at indices `where`, in rising order."""
         if not len(where):
             return at
         if len(where) == len(at) and (at.log_slope_gradient is None or other.log_slope_gradient is not None):
@@ -566,52 +606,55 @@ class Fitter:
         order = np.arange(len(at))
         order[where] = len(at) + np.arange(len(other))
 
-        def of(one: Floats, two: Floats) -> Floats:
-            return np.concatenate([one, two])[order]
+        def merged(first: Floats, second: Floats) -> Floats:
+            return np.concatenate([first, second])[order]
 
-        one, two = at.points, other.points
+        base, replacements = at.points, other.points
         points = Points(
-            np.concatenate([one.owner, two.owner])[order],
-            of(one.fit, two.fit),
-            of(one.covariance, two.covariance),
-            of(one.sensor_log_gain, two.sensor_log_gain),
+            np.concatenate([base.owner, replacements.owner])[order],
+            merged(base.fit, replacements.fit),
+            merged(base.covariance, replacements.covariance),
+            merged(base.sensor_log_gain, replacements.sensor_log_gain),
         )
         log_slope_gradient = None
         if at.log_slope_gradient is not None or other.log_slope_gradient is not None:
             unknown = np.full((1, self.lines.recordings, max(self.counts)), np.nan)
-            log_slope_gradient = of(
+            log_slope_gradient = merged(
                 *(
-                    np.repeat(unknown, len(one), axis=0) if one.log_slope_gradient is None else one.log_slope_gradient
-                    for one in (at, other)
+                    np.repeat(unknown, len(evaluated), axis=0)
+                    if evaluated.log_slope_gradient is None
+                    else evaluated.log_slope_gradient
+                    for evaluated in (at, other)
                 )
             )
         products = joined([at.products, other.products], max(self.counts))[order]
-        return Evaluated(points, products, of(at.cost, other.cost), log_slope_gradient)
+        return Evaluated(points, products, merged(at.cost, other.cost), log_slope_gradient)
 
-    def with_growth(self, at: Evaluated) -> Evaluated:
-        """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position's slopes t, by differences."""
+    def with_log_slope_gradient(self, at: Evaluated) -> Evaluated:
+        """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position slopes t, by differences."""
         count = max(self.counts)
         owner = at.points.owner
         step = _SLOPE_STEP * (self.high - self.low)[owner]
         step = np.where(at.points.fit + step <= self.high[owner], step, -step)
-        number, place = np.nonzero(self.free[owner] & self._moves_place[owner])
+        number, index = np.nonzero(self.free[owner] & self._moves_position_slopes[owner])
         moved = at.points[number]
         fit = moved.fit.copy()
-        fit[np.arange(len(fit)), place] += step[number, place]
+        fit[np.arange(len(fit)), index] += step[number, index]
         here, there = (_log_size(self.place_slopes(points)) for points in (at.points, replace(moved, fit=fit)))
         log_slope_gradient = np.zeros((len(at), here.shape[1], count))
         log_slope_gradient[np.arange(len(at)), :, self._d33[owner]] = 2.0  # the response is proportional to d33
-        log_slope_gradient[number, :, place] = (there - here[number]) / step[number, place][:, None]
+        log_slope_gradient[number, :, index] = (there - here[number]) / step[number, index][:, None]
         return replace(at, log_slope_gradient=log_slope_gradient)
 
     def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats]:
-        """Damped Gauss–Newton steps of the mean parameters within the bounds, and what the gradients say they gain."""
+        """Damped Gauss–Newton steps of the mean parameters within the bounds, and the gains that the gradients
+        promise."""
         information, gradient = self.posterior_equations(at)
         owner, fit = at.points.owner, at.points.fit
         low, high = self.low[owner], self.high[owner]
         free, every = self.free[owner], np.arange(fit.shape[1])
         diagonal = information[:, every, every]
-        # Of curves, lest what changes nothing (the share of a second relaxation that is none) takes all of a step
+        # Of curves, so that a parameter without effect does not take all of a step
         least = self._range[owner] ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
         for _ in every:
             matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
@@ -626,68 +669,68 @@ class Fitter:
         return step, (gradient * step).sum(axis=1)
 
 
-def softer(fitter: Fitter, at: Evaluated) -> Evaluated:
-    """Of curves whose modulus is not declared: also with smaller moduli, since what sticks looks stiff."""
-    places = [place for place, entry in enumerate(fitter.hypotheses[0].model.parameters) if entry.proportional]
-    if not places:
+def with_softer_moduli(fitter: Fitter, at: Evaluated) -> Evaluated:
+    """Of curves with an undeclared modulus: also with smaller moduli, since adhesion makes a sample look stiffer."""
+    indices = [index for index, parameter in enumerate(fitter.hypotheses[0].model.parameters) if parameter.proportional]
+    if not indices:
         return at
     points = at.points[np.repeat(np.arange(len(at)), len(_SOFTER))]
     fit = points.fit.copy()
-    fit[:, places] += np.tile(np.log(_SOFTER), len(at))[:, None]
+    fit[:, indices] += np.tile(np.log(_SOFTER), len(at))[:, None]
     return fitter.evaluate(replace(points, fit=fit), slopes=False)
 
 
 def with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
-    """Of indentations: each one's contact point where it fits best, in ever finer steps of the depth.
+    """Of indentations: the best contact point of each curve, by a search with ever finer steps of the depth.
 
-    Curves are independent of each other but for what they share, so that one set of depths serves all of them.
+    Given the shared parameters curves are independent, so one set of depths serves all of them.
     """
-    (entry,) = fitter.hypotheses
-    assert isinstance(entry.model, CurveModel)
-    places = entry.model.contact_points
-    travels = [one.displacement_mm for one in curves_of(fitter.lines.campaign)]
-    deepest, span = np.array([travel.max() for travel in travels]), np.array([np.ptp(one) for one in travels])
-    covariance = np.tile([GAIN_PRIOR.middle, 0.0, entry.smooth.middle, *at.points.covariance[0, 3:]], (len(at), 1))
+    (hypothesis,) = fitter.hypotheses
+    assert isinstance(hypothesis.model, CurveModel)
+    indices = hypothesis.model.contact_points
+    travels = [curve.displacement_mm for curve in curves_of(fitter.lines.campaign)]
+    deepest, span = np.array([travel.max() for travel in travels]), np.array([np.ptp(travel) for travel in travels])
+    covariance = np.tile([GAIN_PRIOR.middle, 0.0, hypothesis.smooth.middle, *at.points.covariance[0, 3:]], (len(at), 1))
     levels = fitter.levels(covariance[:1, None])
     depth = np.repeat(span[None], len(at), axis=0)
     for ratios in _DEPTHS:
         depths = depth[:, None] * ratios[:, None]  # (starts, ratios, curves)
-        tried = np.clip(deepest - depths, fitter.low[0, places], fitter.high[0, places]).reshape(-1, len(places))
+        tried = np.clip(deepest - depths, fitter.low[0, indices], fitter.high[0, indices]).reshape(-1, len(indices))
         points = at.points[np.repeat(np.arange(len(at)), len(ratios))]
         fit = points.fit.copy()
-        fit[:, places] = tried
+        fit[:, indices] = tried
         sums = fitter.products(replace(points, fit=fit), slopes=False, place=False).summed(levels)
         uu, uy, yy = (part[:, 0] for part in (sums.uu, sums.uy, np.broadcast_to(sums.yy, sums.uu.shape)))
-        left = yy - 2 * uy + uu - (uu - uy) ** 2 / (START_GAIN**-2 + uu)
-        best = left.reshape(depths.shape).argmin(axis=1)[:, None]
+        residual = yy - 2 * uy + uu - (uu - uy) ** 2 / (START_GAIN**-2 + uu)
+        best = residual.reshape(depths.shape).argmin(axis=1)[:, None]
         depth = np.take_along_axis(depths, best, axis=1)[:, 0]
     chosen = at.points.fit.copy()
-    chosen[:, places] = np.clip(deepest - depth, fitter.low[0, places], fitter.high[0, places])
+    chosen[:, indices] = np.clip(deepest - depth, fitter.low[0, indices], fitter.high[0, indices])
     return fitter.evaluate(replace(at.points, fit=chosen, covariance=covariance), slopes=False)
 
 
 def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Bounds of fit coordinates (parameters,) that keep each contact point between the samples where it is.
 
-    Of what sticks: there the force jumps as a contact point passes a sample, and no slope says so.
+    With adhesion the force jumps as a contact point passes a sample, which no derivative shows.
     """
     assert isinstance(hypothesis.model, CurveModel)
     low, high = low.copy(), high.copy()
     curves = curves_of(hypothesis.lines.campaign)
-    for place, curve in zip(hypothesis.model.contact_points.tolist(), curves, strict=True):
+    for index, curve in zip(hypothesis.model.contact_points.tolist(), curves, strict=True):
         travel = curve.displacement_mm[: int(curve.displacement_mm.argmax()) + 1]
-        before, after = travel[travel < fit[place]], travel[travel >= fit[place]]
+        before, after = travel[travel < fit[index]], travel[travel >= fit[index]]
         if len(before) and len(after):
             first, last = float(before.max()), float(after.min())
-            low[place] = max(low[place], first + _OFF_SAMPLE * (last - first))
-            high[place] = min(high[place], last)
+            low[index] = max(low[index], first + _OFF_SAMPLE * (last - first))
+            high[index] = min(high[index], last)
     return np.minimum(low, fit), np.maximum(high, fit)
 
 
 def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
-    """The best of the least-squares fits of one hypothesis of curves from these starts, with the noise it leaves.
+    """The best least-squares fit of one hypothesis of curves from these starts, with its noise levels.
 
-    A small smooth error and a close fit, or a large one and a loose fit: each may be a maximum of its own.
+    A small smooth error with a close fit and a large one with a loose fit may both be local maxima; both are tried.
     """
     fitting = LeastSquares(fitter.hypotheses[0])
     fits, costs = zip(*(fitting.fitted(fit) for fit in start.fit), strict=True)
@@ -702,11 +745,11 @@ def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
 
 
 def _smooth_range(fitter: Fitter) -> tuple[float, float]:
-    """Where the logarithm of the smooth error of curves may begin."""
+    """Range of starting values of the log smooth error of curves."""
     smooth = fitter.hypotheses[0].smooth
     return smooth.low, max(smooth.high, float(np.log(3e-2)))
 
 
 def _log_size(slopes: Floats) -> Floats:
-    """log |t|² (points, recordings) of the position's slopes (2, points, recordings); least where there are none."""
+    """log |t|² (points, recordings) of position slopes (2, points, recordings)."""
     return np.log((slopes**2).sum(axis=0) + 1e-300)

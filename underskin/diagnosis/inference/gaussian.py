@@ -1,10 +1,10 @@
-"""Normal likelihoods of a few quantities, and mixtures of normal distributions of one.
+"""Gaussian likelihoods of a few quantities, and mixtures of normal distributions of one quantity.
 
-What the recordings of another kind, of another date or of one skin say of parameters q is kept as
+The likelihood of parameters q by recordings of another kind, date or skin is kept as
 
     ln L(q) = height + linear·q − ½ qᵀ precision q,
 
-which adds up over independent recordings and integrates in closed form over normal priors.
+which is additive over independent recordings and integrates in closed form over normal priors.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ import numpy as np
 
 from underskin.units import Floats
 
-_INFORMS = 0.2  # of a prior's precision: what recordings add at least to say anything
+_INFORMS = 0.2  # of a prior's precision: the least that informative recordings add
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class Gaussian:
         """The likelihood that turns independent normal priors, of this centre and precision (quantities,), into a
         normal posterior of this mean and covariance, with this evidence.
 
-        In directions in which that adds next to nothing to the priors the likelihood is flat: the quotient of both
-        would otherwise grow without end.
+        Flat in directions where the posterior hardly differs from the priors: there their quotient would grow without
+        limit.
         """
         root = np.sqrt(precision)
         values, vectors = np.linalg.eigh(np.linalg.inv(root[:, None] * covariance * root))
@@ -51,12 +51,14 @@ class Gaussian:
 
     @classmethod
     def mixture(cls, components: Sequence[tuple[float, "Gaussian"]], centre: Floats, precision: Floats) -> Self:
-        """A mixture of likelihoods, with log weights, as one: that of the evidence, mean and covariance which the
+        """A mixture of likelihoods, with log weights, as one Gaussian: with the evidence, mean and covariance that the
         mixture has under independent normal priors."""
-        log_weights = np.array([share + one.log_integral(centre, precision).item() for share, one in components])
+        log_weights = np.array(
+            [share + component.log_integral(centre, precision).item() for share, component in components]
+        )
         total = float(np.logaddexp.reduce(log_weights))
         weights = np.exp(log_weights - total)
-        posteriors = [one.posterior(centre, precision) for _, one in components]
+        posteriors = [component.posterior(centre, precision) for _, component in components]
         mean, covariance = moments(weights, [mean for mean, _ in posteriors], [matrix for _, matrix in posteriors])
         return cls.from_posterior(total, mean, covariance, centre, precision)
 
@@ -85,7 +87,7 @@ class Gaussian:
         return np.asarray(self.height + 0.5 * (volume + square))
 
     def of_mean(self, variance: Floats) -> "Gaussian":
-        """∫ L(q) N(q; μ, diag variance) dq as a likelihood of μ; of variances (…, quantities) a stack (…)."""
+        """∫ L(q) N(q; μ, diag variance) dq as a likelihood of μ; for variances (…, quantities) a stack (…)."""
         loosened = np.eye(self.linear.shape[-1]) + self.precision * variance[..., None, :]
         shrunk = np.linalg.inv(loosened)
         linear = shrunk @ self.linear
@@ -106,10 +108,10 @@ def _matrix(precision: Floats) -> Floats:
 
 
 def moments(shares: Floats, means: Sequence[Floats], covariances: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Mean and covariance of a mixture of distributions with these; the shares sum to 1."""
+    """Mean and covariance of a mixture of distributions; `shares` sum to 1."""
     mean = np.asarray(shares @ np.array(means))
-    away = np.array(means) - mean
-    return mean, np.tensordot(shares, np.array(covariances), 1) + (shares[:, None] * away).T @ away
+    offsets = np.array(means) - mean
+    return mean, np.tensordot(shares, np.array(covariances), 1) + (shares[:, None] * offsets).T @ offsets
 
 
 @dataclass(frozen=True)
@@ -121,11 +123,11 @@ class NormalMixture:
     deviation: Floats
 
     def times(self, factor: float) -> "NormalMixture":
-        """With every share so many times as large."""
+        """With every share multiplied by the factor."""
         return NormalMixture(factor * self.share, self.mean, self.deviation)
 
     def moved(self, by: float) -> "NormalMixture":
-        """With every mean so much larger."""
+        """With every mean shifted by `by`."""
         return NormalMixture(self.share, self.mean + by, self.deviation)
 
     @classmethod

@@ -1,23 +1,17 @@
-"""One hypothesis: a model, its priors, the points at which it is looked at, and the likelihood of its predictions.
-
-How probable the recordings are under predictions, with all of their noise marginalised exactly.
+"""A hypothesis (a model, its priors and the rows it explains), points at which it is evaluated, and its likelihood.
 
 Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + n_ij, with
     n ~ N(0, κ² d_ij² + q_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), b ~ N(0, τ²);
-q is mains pick-up, 0 on most rows.
-The contact's place scales a recording by a real factor, so m = L u and ∂m = t u have one direction u in each recording.
+q is mains pick-up, 0 on most rows. All of this noise is marginalised exactly.
+
+The contact's position scales a recording by a real factor, so m = L u and ∂m = t u with one direction u a recording.
 C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with m = a u; sensors add τ² m mᵀ over their
-recordings. All of it is taken out by Sherman and Morrison's identity, so that time is linear in rows and in
-recordings. The covariance follows the model, so log|C| stays.
+recordings. C is inverted by Sherman and Morrison's identity: the time is linear in rows and in recordings. As C depends
+on the model, log|C| is part of the likelihood.
 
-e^b is linearised at `sensor_log_gain`, the most probable b of each sensor: Laplace's method for b. Where a contact
-sits on an extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above,
-with H of the base model.
-
-What the cell of each curve adds under a prediction: its zero and drift, and the gain of the recording. How σ bends
-around each contact's commanded place, in the base model: positioning scatter in second order. Points of several
-hypotheses, one after another, and what was worked out there. One hypothesis: a model, the lines it is to explain, and
-the coordinates in which it is fitted.
+e^b is linearised at `sensor_log_gain`, the most probable b of each sensor (Laplace's method for b). Where σ has an
+extremum at the contact, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above,
+with H, the Hessian of σ, of the base model.
 """
 
 from collections.abc import Sequence
@@ -59,7 +53,7 @@ from underskin.units import Floats, Indices, Mask
 
 @dataclass(frozen=True)
 class Curvature:
-    """Of σ over the contact's place, relative to σ (recordings,) [1/m²] and [1/m⁴]: ∇²σ/σ and tr(H²)/σ²."""
+    """∇²σ/σ [1/m²] and tr(H²)/σ² [1/m⁴] over the contact's position (recordings,)."""
 
     laplacian: Floats
     square: Floats
@@ -68,23 +62,25 @@ class Curvature:
 def log_likelihoods(
     lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
 ) -> Floats:
-    """Of predictions at several points, each at some sets of noise levels (points, sets, 1): (points, sets).
+    """Log likelihoods (points, sets) of predictions at several points, at sets of noise levels (points, sets, 1).
 
-    `sensor_log_gain` (points, sensors).
+    `sensor_log_gain` is (points, sensors).
     """
     from underskin.diagnosis.inference.kernels import log_likelihoods as add
 
     sums = products.summed(levels)
     about_means, numbers = lines.about_means
     further = sums.log_determinant + 2 * numbers * np.log(levels.level) + about_means / levels.level**2
-    each = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
+    log_likelihood = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
     slopes = products.place_slopes
-    place = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    squared_slopes = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)
     yy = sums.yy if sums.yy.ndim == 3 else sums.yy[None, None]
-    arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, place))
-    add(*arrays, lines.sensor, contiguous(sensor_log_gain), curvature.laplacian, curvature.square, noise, each)
-    return each
+    arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, squared_slopes))
+    add(
+        *arrays, lines.sensor, contiguous(sensor_log_gain), curvature.laplacian, curvature.square, noise, log_likelihood
+    )
+    return log_likelihood
 
 
 def normal_equations(
@@ -95,12 +91,12 @@ def normal_equations(
     sensor_log_gain: Floats,
     log_slope_gradient: Floats | None = None,
 ) -> tuple[Floats, Floats]:
-    """Jᵀ C⁻¹ J (points, P, P), the information on the parameters, and the gradient of the log likelihood (points, P),
-    at the first set of noise levels.
+    """Information Jᵀ C⁻¹ J (points, P, P) on the parameters and gradient of the log likelihood (points, P), at the
+    first set of noise levels.
 
-    The gradient is that by the mean and by all columns that follow the model, ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r). How the
-    position's slopes t change is given by `log_slope_gradient` ∂ log |t|²/∂θ (points, recordings, P), finite where
-    known; else they are taken to change as L does, or where they lead, not at all.
+    The gradient is that of −½ log|C| − ½ rᵀC⁻¹r by the mean and by all columns of C that depend on the model.
+    `log_slope_gradient` is ∂ log |t|²/∂θ (points, recordings, P) of the position slopes t; where it is not finite, t is
+    taken to change as L does, or not at all where t dominates.
     """
     from underskin.diagnosis.inference.kernels import normal_equations as fill
 
@@ -111,7 +107,7 @@ def normal_equations(
     by_level = none if products.level_slopes is None else products.level_slopes
     turned = (none, none, none[..., None]) if slope_sums is None else (slope_sums.uv, slope_sums.vy, slope_sums.vv)
     slopes = products.place_slopes if np.any(levels.position) else None
-    place = np.zeros((points, 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    squared_slopes = np.zeros((points, 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)[:, 0]
     count = max(by_level.shape[-1], turned[0].shape[-1])
     information, gradient = np.empty((points, count, count)), np.empty((points, count))
@@ -121,15 +117,15 @@ def normal_equations(
         uu,
         uy,
         *turned,
-        place,
+        squared_slopes,
         none if log_slope_gradient is None else log_slope_gradient,
     )
-    of_place = curvature.laplacian, curvature.square
+    curvatures = curvature.laplacian, curvature.square
     fill(
         *map(contiguous, arrays),
         lines.sensor,
         contiguous(sensor_log_gain),
-        *of_place,
+        *curvatures,
         contiguous(noise),
         information,
         gradient,
@@ -138,20 +134,20 @@ def normal_equations(
 
 
 class Likelihoods:
-    """Of predictions at several points, each at some sets of noise levels."""
+    """Terms of the likelihood of predictions at several points, each at some sets of noise levels."""
 
     def __init__(
         self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
     ) -> None:
-        """Levels are (points, sets, 1), `sensor_log_gain` (points, sensors)."""
+        """`levels` (points, sets, 1), `sensor_log_gain` (points, sensors)."""
         self.levels, self._products, self._curvature = levels, products, curvature
         self._sensors = lines.sensors
-        self._bend = own = sensor_log_gain[:, None, lines.sensor]
+        self._log_gains = log_gains = sensor_log_gain[:, None, lines.sensor]
         k2, p2 = levels.level**2, levels.position**2
         sums = products.summed(levels)
-        self._factor = factor = np.exp(own + 0.5 * p2 * curvature.laplacian)
+        self._factor = factor = np.exp(log_gains + 0.5 * p2 * curvature.laplacian)
         a = products.level[:, None] * factor
-        uu, ur = sums.uu / k2, (sums.uy - a * (1 - own) * sums.uu) / k2
+        uu, ur = sums.uu / k2, (sums.uy - a * (1 - log_gains) * sums.uu) / k2
         variance = (levels.gain**2 + 0.5 * p2**2 * curvature.square) * a**2
         if products.place_slopes is not None:
             variance = variance + p2 * (products.place_slopes**2).sum(axis=0)[:, None] * factor**2
@@ -166,17 +162,17 @@ class Likelihoods:
         """The most probable b of each sensor (points, sensors), at the first set of noise levels."""
         return np.asarray((self._sensor_shrink * self._sensor_mr)[:, 0])
 
-    def along(self, position: float) -> tuple[Floats, Floats, Floats]:
-        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter, with
-        weights that leave out κ."""
+    def projections(self, position: float) -> tuple[Floats, Floats, Floats]:
+        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter [m],
+        with weights 1/d² (without κ)."""
         sums = self._products.summed(self.levels)
-        sensor_log_gain, level = self._bend[0, 0], self._products.level[0]
+        log_gain, level = self._log_gains[0, 0], self._products.level[0]
         uu, uy = np.broadcast_to(sums.uu[0, 0], level.shape), np.broadcast_to(sums.uy[0, 0], level.shape)
-        a = level * np.exp(sensor_log_gain + 0.5 * position**2 * self._curvature.laplacian)
-        return a * uu, uy - a * (1 - sensor_log_gain) * uu, uu
+        a = level * np.exp(log_gain + 0.5 * position**2 * self._curvature.laplacian)
+        return a * uu, uy - a * (1 - log_gain) * uu, uu
 
     @property
-    def slopes_along(self) -> Floats:
+    def slope_projections(self) -> Floats:
         """Re u*J of the first point's recordings (recordings, P), with the same weights."""
         uu, factor = self._products.summed(self.levels).uu[0, 0], self._factor[0, 0]
         by_level, sums = self._products.level_slopes, self._products.slope_sums(self.levels)
@@ -184,8 +180,10 @@ class Likelihoods:
         return np.asarray(along if sums is None else along + sums.uv[0] * (factor * self._products.level[0])[:, None])
 
     def information(self, uj: Floats, square: Floats) -> Floats:
-        """Jᵀ C⁻¹ J (points, P, P) of any J at the first set of noise levels, from Re u*J of the recordings (points,
-        recordings, P) and Re JᵀJ (points, P, P), both over κ²."""
+        """Jᵀ C⁻¹ J (points, P, P) of any J at the first set of noise levels.
+
+        `uj` is Re u*J (points, recordings, P), `square` is Re JᵀJ (points, P, P), both divided by κ².
+        """
         by_sensor = np.swapaxes(np.swapaxes(uj * self._weight[:, 0, :, None], 1, 2) @ self._sensors, 1, 2)
         shared = by_sensor.transpose(0, 2, 1) @ (by_sensor * self._sensor_shrink[:, 0, :, None])
         return np.asarray(square - np.einsum("nrp,nr,nrq->npq", uj, self._shrink[:, 0], uj, optimize=True) - shared)
@@ -193,43 +191,43 @@ class Likelihoods:
 
 @dataclass(frozen=True)
 class CellResponse:
-    """The most probable zero and drift (rows,) [N], gain (recordings,) relative, and the variance (rows,) [N²] that
-    not knowing them leaves."""
+    """Most probable zero and drift `offset` (rows,) [N] and relative `gain` (recordings,) of the cells, and the
+    variance (rows,) [N²] of the prediction by their uncertainty."""
 
     offset: Floats
     gain: Floats
     variance: Floats
 
     def reading(self, lines: Lines, force: Floats) -> Floats:
-        """What the cells show of a force (rows,) [N]."""
+        """The cells' readings (rows,) [N] of a force (rows,) [N]."""
         return force * (1 + self.gain[lines.recording]) + self.offset
 
 
-def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, known: Mask | None = None) -> CellResponse:
-    """From the rows that are `known` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
+def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, observed: Mask | None = None) -> CellResponse:
+    """Estimated from the rows that are `observed` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
 
-    `force` (rows,) is what is predicted without them.
+    `force` (rows,) is F, the prediction without g and c.
     """
     assert lines.smooth is not None
-    known = np.ones(len(force), dtype=bool) if known is None else known
+    observed = np.ones(len(force), dtype=bool) if observed is None else observed
     offset, variance, gain = np.zeros(len(force)), np.zeros(len(force)), []
-    for own in lines.spans:
-        design = np.column_stack([levels.gain * force[own], lines.smooth.columns[own]])
-        rows = np.flatnonzero(known[own])
-        of_known = lines.smooth.part(own.start + rows)
-        noise = of_known.covariance(levels.smooth) + np.diag((levels.level * lines.deviation[own][rows]) ** 2)
+    for span in lines.spans:
+        design = np.column_stack([levels.gain * force[span], lines.smooth.columns[span]])
+        rows = np.flatnonzero(observed[span])
+        error = lines.smooth.part(span.start + rows)
+        noise = error.covariance(levels.smooth) + np.diag((levels.level * lines.deviation[span][rows]) ** 2)
         weighed = np.linalg.solve(noise, design[rows])
         information = np.eye(design.shape[1]) + design[rows].T @ weighed
-        coefficients = np.linalg.solve(information, weighed.T @ (lines.value.real[own] - force[own])[rows])
-        offset[own] = design[:, 1:] @ coefficients[1:]
+        coefficients = np.linalg.solve(information, weighed.T @ (lines.value.real[span] - force[span])[rows])
+        offset[span] = design[:, 1:] @ coefficients[1:]
         gain.append(levels.gain * coefficients[0])
-        variance[own] = np.einsum("ri,ij,rj->r", design, np.linalg.inv(information), design)
+        variance[span] = np.einsum("ri,ij,rj->r", design, np.linalg.inv(information), design)
     return CellResponse(offset, np.array(gain), variance)
 
 
-_STEP = 0.05  # of the finite difference, in h; σ turns over lengths of 0.3 h and more
-_DIGITS = 9  # of a place beside its sensor [mm]
-_LEAST = 0.2  # of the largest σ: nearer to where σ crosses zero, its first derivative says what scatter does
+_STEP = 0.05  # of the finite difference, in h; σ varies over lengths of 0.3 h and more
+_DIGITS = 9  # of a position relative to its sensor [mm]
+_LEAST = 0.2  # of the largest σ: where σ is smaller, the first derivative describes the effect of scatter
 
 
 def curvature(lines: Lines, table: SigmaTable) -> Curvature:
@@ -238,19 +236,24 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
     assert campaign.skin.thickness_mm is not None
     step = _STEP * campaign.skin.thickness_mm
     sensors = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    contacts: dict[tuple[float, ...], tuple[int, FrfConditions]] = {}  # alike in the base model: a place among them
-    alike = []
-    for entry in frf_of(campaign):
-        x, y = entry.position_mm or sensors[entry.sensor]
-        own_x, own_y = sensors[entry.sensor]
-        key = entry.preload_n, entry.indenter_radius_mm, round(x - own_x, _DIGITS), round(y - own_y, _DIGITS)
-        alike.append(contacts.setdefault(key, (len(contacts), entry))[0])
+    contacts: dict[tuple[float, ...], tuple[int, FrfConditions]] = {}  # index of each distinct contact
+    contact_indices = []
+    for conditions in frf_of(campaign):
+        x, y = conditions.position_mm or sensors[conditions.sensor]
+        sensor_x, sensor_y = sensors[conditions.sensor]
+        key = (
+            conditions.preload_n,
+            conditions.indenter_radius_mm,
+            round(x - sensor_x, _DIGITS),
+            round(y - sensor_y, _DIGITS),
+        )
+        contact_indices.append(contacts.setdefault(key, (len(contacts), conditions))[0])
     moved = []
     for number, (x, y) in enumerate(((0.0, 0.0), (step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step))):
-        for _, entry in contacts.values():
-            place = entry.position_mm or sensors[entry.sensor]
-            here = (place[0] + x, place[1] + y)
-            moved.append(entry.without_measurements(id=f"{number} {entry.id}", position_mm=here))
+        for _, conditions in contacts.values():
+            position = conditions.position_mm or sensors[conditions.sensor]
+            moved_position = (position[0] + x, position[1] + y)
+            moved.append(conditions.without_measurements(id=f"{number} {conditions.id}", position_mm=moved_position))
     model = compose((), Conditions(campaign.name, campaign.skin, tuple(moved)), table, "frf")
     prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
     assert prediction.position_slopes is not None
@@ -259,15 +262,15 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
     hessian_x, hessian_y = (right - left) / (2e-3 * step), (up - down) / (2e-3 * step)
     scale = np.where(np.abs(value) > _LEAST * np.abs(value).max(), value, np.inf)
     square = (hessian_x**2).sum(axis=0) + (hessian_y**2).sum(axis=0)
-    return Curvature(((hessian_x[0] + hessian_y[1]) / scale)[alike], (square / scale**2)[alike])
+    return Curvature(((hessian_x[0] + hessian_y[1]) / scale)[contact_indices], (square / scale**2)[contact_indices])
 
 
 @dataclass(frozen=True)
 class Points:
-    """Where fits stand: coordinates of the models (points, parameters), of the covariance, and the sensors' log gains.
+    """Coordinates of fits: of the models (points, parameters), of the covariance, and the sensors' log gains.
 
-    `owner` says which hypothesis each point is of, in rising order; models with fewer parameters than others have
-    zeros behind their own.
+    `owner` is the index of each point's hypothesis, in rising order; rows of models with fewer parameters are padded
+    with zeros.
     """
 
     owner: Indices
@@ -282,36 +285,36 @@ class Points:
         return Points(self.owner[points], self.fit[points], self.covariance[points], self.sensor_log_gain[points])
 
 
-def together(one: Points, other: Points) -> Points:
+def joined_points(first: Points, second: Points) -> Points:
     """The points of both, which are of one hypothesis."""
     names = "owner", "fit", "covariance", "sensor_log_gain"
-    return Points(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
+    return Points(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
 
 
-def alone(points: Points, owner: int, count: int) -> Points:
-    """The points of one of several hypotheses, which has so many parameters, as those of it alone."""
-    own = points[points.owner == owner]
-    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.sensor_log_gain)
+def points_of(points: Points, owner: int, count: int) -> Points:
+    """The points of one of several hypotheses, with its `count` parameters, as points of that hypothesis only."""
+    chosen = points[points.owner == owner]
+    return Points(np.zeros_like(chosen.owner), chosen.fit[:, :count], chosen.covariance, chosen.sensor_log_gain)
 
 
-def stacked(points: Sequence[Points]) -> Points:
-    """Points of several hypotheses, of the first, the second and so on, in this order."""
-    owner = np.repeat(np.arange(len(points)), [len(entry) for entry in points])
-    fit = np.zeros((len(owner), max(entry.fit.shape[1] for entry in points)))
-    for number, entry in enumerate(points):
-        fit[owner == number, : entry.fit.shape[1]] = entry.fit
+def stacked(parts: Sequence[Points]) -> Points:
+    """Points of several hypotheses, in the order of `parts`."""
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    fit = np.zeros((len(owner), max(part.fit.shape[1] for part in parts)))
+    for number, part in enumerate(parts):
+        fit[owner == number, : part.fit.shape[1]] = part.fit
     covariance, sensor_log_gain = (
-        np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "sensor_log_gain")
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("covariance", "sensor_log_gain")
     )
     return Points(owner, fit, covariance, sensor_log_gain)
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Points with what was worked out there; `cost` is minus the log posterior density (up to what all share).
+    """Points with their products and `cost`, minus the log posterior density up to a constant that all share.
 
-    `log_slope_gradient` ∂ log |t|²/∂θ of the position's slopes (points, recordings, parameters): not finite where a
-    fit has not needed it yet.
+    `log_slope_gradient` is ∂ log |t|²/∂θ of the position slopes (points, recordings, parameters), not finite where a
+    fit has not needed it.
     """
 
     points: Points
@@ -322,8 +325,8 @@ class Evaluated:
     def __len__(self) -> int:
         return len(self.points)
 
-    def some(self, points: Indices) -> "Evaluated":
-        """At some of the points, in their order: itself where that is all of them."""
+    def subset(self, points: Indices) -> "Evaluated":
+        """Some of the points, in their order; itself where that is all of them."""
         return self if len(points) == len(self) else self[points]
 
     def __getitem__(self, points: Indices | Mask | slice) -> "Evaluated":
@@ -340,23 +343,26 @@ class Evaluated:
 
 
 class GaussianBatch:
-    """That of several hypotheses, whose parameters are padded to equally many."""
+    """Gaussian likelihoods of several hypotheses, padded to equally many parameters."""
 
-    def __init__(self, each: Sequence[Gaussian | None], most: int) -> None:
-        """None where nothing is known beside the recordings themselves."""
-        self._precision, self._linear = np.zeros((len(each), most, most)), np.zeros((len(each), most))
-        self._height = np.zeros(len(each))
-        for number, one in enumerate(each):
-            if one is not None:
-                count = len(one.linear)
-                self._precision[number, :count, :count] = one.precision
-                self._linear[number, :count], self._height[number] = one.linear, one.height
+    def __init__(self, gaussians: Sequence[Gaussian | None], parameters: int) -> None:
+        """None where only the hypothesis's own recordings inform on its parameters."""
+        self._precision, self._linear = (
+            np.zeros((len(gaussians), parameters, parameters)),
+            np.zeros((len(gaussians), parameters)),
+        )
+        self._height = np.zeros(len(gaussians))
+        for number, gaussian in enumerate(gaussians):
+            if gaussian is not None:
+                count = len(gaussian.linear)
+                self._precision[number, :count, :count] = gaussian.precision
+                self._linear[number, :count], self._height[number] = gaussian.linear, gaussian.height
 
     def log_densities(self, points: Points) -> Floats:
         """ln L at points (points,)."""
         owner, fit = points.owner, points.fit
-        bent = np.einsum("np,npq,nq->n", fit, self._precision[owner], fit)
-        return np.asarray(self._height[owner] + (self._linear[owner] * fit).sum(axis=1) - 0.5 * bent)
+        quadratic = np.einsum("np,npq,nq->n", fit, self._precision[owner], fit)
+        return np.asarray(self._height[owner] + (self._linear[owner] * fit).sum(axis=1) - 0.5 * quadratic)
 
     def equations(self, points: Points) -> tuple[Floats, Floats]:
         """Information (points, parameters, parameters) and gradient (points, parameters) of ln L."""
@@ -365,12 +371,12 @@ class GaussianBatch:
 
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
-_CURVE_LEVELS = (0.3, 5.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise
+_CURVE_LEVELS = (0.3, 5.0)  # least accuracy of a cell; larger noise would exceed the differences of neighbours
 
 
 @dataclass(frozen=True)
 class CovarianceParameter:
-    """A coordinate that moves the covariance alone: its name, bounds and prior."""
+    """A parameter that changes the covariance only: its name, and bounds and prior of its coordinate."""
 
     name: str
     low: float
@@ -380,25 +386,26 @@ class CovarianceParameter:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A model and the lines it is to explain, with or without positioning scatter, and how large scatter may be."""
+    """A model and the lines it explains, with or without positioning scatter, and the priors of the scatters."""
 
     model: Model
     lines: Lines
     curvature: Curvature
-    has_position_scatter: bool  # whether there is positioning scatter
+    has_position_scatter: bool
     gain: Plateau = GAIN_PRIOR
     position: Plateau = POSITION_PRIOR
     smooth: Plateau = USUAL  # η of curves
     knowledge: Gaussian | None = None  # from recordings of other kinds
 
     @cached_property
-    def mean_places(self) -> list[int]:
-        """The places of the model's parameters that move the mean."""
-        return [index for index, entry in enumerate(self.model.parameters) if not entry.moves_covariance]
+    def mean_indices(self) -> list[int]:
+        """The indices of the model's parameters that change the mean."""
+        return [index for index, parameter in enumerate(self.model.parameters) if not parameter.moves_covariance]
 
     @cached_property
     def covariance(self) -> tuple[CovarianceParameter, ...]:
-        """Gain scatter, line level, position scatter or smooth error where there is one, then the model's own."""
+        """Gain scatter, line level, positioning scatter or smooth error if any, then those of the model's
+        mechanisms."""
         low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
@@ -410,52 +417,53 @@ class Hypothesis:
             common.append(CovarianceParameter("position", np.log(2e-5), highest, self.position))
         if self.lines.curves:
             common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth))
-        own = [
-            CovarianceParameter(entry.name, *entry.bounds, _as_plateau(entry))
-            for entry in self.model.parameters
-            if entry.moves_covariance
+        of_model = [
+            CovarianceParameter(parameter.name, *parameter.bounds, _as_plateau(parameter))
+            for parameter in self.model.parameters
+            if parameter.moves_covariance
         ]
-        return (*common, *own)
+        return (*common, *of_model)
 
     @cached_property
     def bounds(self) -> Floats:
         """Lowest and highest coordinates of the model's parameters (2, parameters)."""
-        return np.array([entry.bounds for entry in self.model.parameters]).T
+        return np.array([parameter.bounds for parameter in self.model.parameters]).T
 
     @cached_property
     def priors(self) -> Floats:
-        """Of the model's parameters' priors precision and centre (see `curvature_of_prior`), the logarithm of their
-        height, and the degrees of freedom of their tails (4, parameters)."""
+        """Rows of precision and centre of the parameters' priors (see `curvature_of_prior`), log of their height, and
+        degrees of freedom of their tails (4, parameters)."""
         rows = []
-        for entry in self.model.parameters:
-            freedom = entry.prior.freedom if isinstance(entry.prior, Normal) else np.inf
-            rows.append((*curvature_of_prior(entry), entry.log_height, freedom))
+        for parameter in self.model.parameters:
+            freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
+            rows.append((*curvature_of_prior(parameter), parameter.log_height, freedom))
         return np.array(rows).T
 
     @cached_property
-    def own_parameters(self) -> int:
-        """How many of the model's parameters are its mechanisms' own; they come first."""
+    def mechanism_parameter_count(self) -> int:
+        """The number of parameters that belong to mechanisms; they come first."""
         mechanisms = [self.lines.mechanisms[name] for name in self.model.names]
         return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
 
     def group(self, number: int) -> object:
-        """The same for hypotheses that can be evaluated together; `number` tells those apart that cannot."""
-        own = tuple(entry.name for entry in self.covariance)
-        return number if self.lines.curves else (self.gain, self.position, own)
+        """A key that is equal for hypotheses that can be evaluated together; `number` makes it unique for those that
+        cannot."""
+        names = tuple(parameter.name for parameter in self.covariance)
+        return number if self.lines.curves else (self.gain, self.position, names)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:
         return CurveLines(self.lines)
 
     def curve_products(self, fit: Floats, *, slopes: bool) -> CurveProducts:
-        """Of curves the inner products of the model at points (points, parameters), with derivatives on request."""
+        """Of curves the inner products of the model at points (points, parameters), with derivatives if `slopes`."""
         assert isinstance(self.model, CurveModel)
         force, by_force = self.model.forces_and_slopes(fit) if slopes else (self.model.forces(fit), None)
         return CurveProducts.of(self._curve_lines, force, by_force)
 
     @property
     def frf_model(self) -> FrfModel:
-        """The model, which is one of FRFs."""
+        """The model, if it is one of FRFs."""
         assert isinstance(self.model, FrfModel)
         return self.model
 
@@ -466,51 +474,51 @@ class Hypothesis:
 
     @cached_property
     def pickup_rows(self) -> PickupRows | None:
-        """The rows that pick-up reaches, where the model has any."""
+        """The rows that mains pick-up reaches, if the model has any."""
         pickup, design = self.model.pickup, self.frf_model.design
         return None if pickup is None else pickup_rows(self.lines, pickup, design)
 
 
 @dataclass(frozen=True)
 class FitPoint:
-    """Where a fit stands: the model's coordinates, the covariance's, and each sensor's most probable log gain."""
+    """A fit's coordinates of the model and of the covariance, and each sensor's most probable log gain."""
 
     fit: Floats
     covariance: Floats
     sensor_log_gain: Floats
 
 
-def _as_plateau(entry: Parameter) -> Plateau:
+def _as_plateau(parameter: Parameter) -> Plateau:
     """A parameter's prior within its bounds, normalised there."""
-    if isinstance(entry.prior, Normal):
-        area = float(np.exp(-entry.log_height))
-        return Plateau(entry.prior.mean, entry.prior.mean, entry.prior.sd, entry.prior.sd, area)
-    low, high = entry.bounds
+    if isinstance(parameter.prior, Normal):
+        area = float(np.exp(-parameter.log_height))
+        return Plateau(parameter.prior.mean, parameter.prior.mean, parameter.prior.sd, parameter.prior.sd, area)
+    low, high = parameter.bounds
     return Plateau(low, high, 1.0, 1.0, high - low)
 
 
-def curvature_of_prior(entry: Parameter) -> tuple[float, float]:
+def curvature_of_prior(parameter: Parameter) -> tuple[float, float]:
     """Precision and centre of a parameter's prior; 0 where it is uniform."""
-    if isinstance(entry.prior, Normal):
-        return entry.prior.sd**-2, entry.prior.mean
+    if isinstance(parameter.prior, Normal):
+        return parameter.prior.sd**-2, parameter.prior.mean
     return 0.0, 0.0
 
 
-def quadratic_of_prior(entry: Parameter, fit: float) -> tuple[float, float]:
-    """Precision and centre of a quadratic that has the gradient of a parameter's prior at a fit coordinate, as the
-    covariance of a fit counts it; 0 where the prior is uniform."""
-    precision, centre = curvature_of_prior(entry)
-    freedom = entry.prior.freedom if isinstance(entry.prior, Normal) else np.inf
+def quadratic_of_prior(parameter: Parameter, fit: float) -> tuple[float, float]:
+    """Precision and centre of the quadratic with the gradient of a parameter's prior at a fit coordinate, for the
+    covariance of a fit; 0 where the prior is uniform."""
+    precision, centre = curvature_of_prior(parameter)
+    freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
     if np.isfinite(freedom):
         precision *= (freedom + 1) / (freedom + precision * (fit - centre) ** 2)
     return precision, centre
 
 
-def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
-    """Where in a composed model's parameters each mechanism's are."""
+def parameter_slices(names: Sequence[str], lines: Lines) -> dict[str, slice]:
+    """The slice of a composed model's parameters that belongs to each mechanism."""
     mechanisms = [mechanism for name, mechanism in lines.mechanisms.items() if name in names]
-    places, first = {}, 0
-    for name, own in parameters_together(mechanisms, lines.campaign, lines.kind).items():
-        places[name] = slice(first, first + len(own))
-        first += len(own)
-    return places
+    slices, first = {}, 0
+    for name, parameters in parameters_together(mechanisms, lines.campaign, lines.kind).items():
+        slices[name] = slice(first, first + len(parameters))
+        first += len(parameters)
+    return slices

@@ -1,15 +1,9 @@
-"""Compiled: the likelihood of predictions, its gradient and information, and steps of noise levels.
+"""Compiled parts of the fit (see `hypothesis` for the model of the noise): likelihood, priors, steps of noise levels
+and normal equations.
 
-Compiled: how probable recordings are under predictions (see `hypothesis`), and priors, at many sets of noise levels.
-
-Arrays are (points, sets, recordings) where an axis may be 1 and then stands for all.
-
-Compiled: Newton steps of noise levels towards the least cost, each parameter on its own, at fixed predictions.
-
-Compiled: information on the mean parameters, and the gradient of the log likelihood (see `hypothesis`).
-
-With the direction u of a recording and J its derivatives, C⁻¹ is taken apart by Sherman and Morrison's identity, first
-for each recording, then for the sensors' columns.
+Arrays are (points, sets, recordings); an axis of length 1 stands for all. The inverse of the covariance is applied by
+Sherman and Morrison's identity, first for each recording, with its direction u and the derivatives J of its
+prediction, then for the sensors' columns.
 """
 
 import numpy as np
@@ -18,7 +12,7 @@ from numpy.typing import NDArray
 from underskin.compiled import compiled
 from underskin.units import Array, Floats, Mask
 
-_TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+_TOGETHER = 8  # factors of a determinant that share one logarithm: below 1e38 each, they do not overflow
 _NONE = 1e-300  # u*u where u is 0
 
 
@@ -28,7 +22,7 @@ def log_likelihood(
     uu: Floats,
     uy: Floats,
     yy: Floats,
-    place: Floats,
+    squared_slopes: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
     laplacian: Floats,
@@ -40,40 +34,41 @@ def log_likelihood(
     """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten.
 
     With V = s'² a² + p² |t|² a recording's χ² is |y|² + ((Re u*r)²/(1 + V u*u) − (Re u*y)²)/u*u, the square completed
-    along u: |r|² less what V takes out would be rounding alone where a model predicts far more than was measured.
+    along u: |r|² minus what V takes out would cancel to rounding error where a model predicts far more than was
+    measured.
     """
     gain2, k2, p2, tau2 = noise[0] ** 2, noise[1] ** 2, noise[2] ** 2, noise[3] ** 2
     mm[:], mr[:] = 0.0, 0.0
     chi2 = log_determinant = 0.0
     determinant, inverse = 1.0, 1 / k2
     for recording in range(len(level)):
-        of = sensor[recording]
-        own = sensor_log_gain[of]
-        exponent = own + 0.5 * p2 * laplacian[recording]
+        sensor_index = sensor[recording]
+        log_gain = sensor_log_gain[sensor_index]
+        exponent = log_gain + 0.5 * p2 * laplacian[recording]
         factor = np.exp(exponent) if exponent != 0 else 1.0
         a = level[recording] * factor
-        known = a * (1 - own)
+        mean = a * (1 - log_gain)
         u, u_y = uu[recording], uy[recording]
-        u_r, u_y = (u_y - known * u) * inverse, u_y * inverse
+        u_r, u_y = (u_y - mean * u) * inverse, u_y * inverse
         u = max(u * inverse, _NONE)
         a2 = a * a
         variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
-        if len(place):
-            variance += p2 * place[recording] * factor * factor
-        left = 1 + variance * u
-        part = 1 / (left * u)
-        reduced = part * u
-        chi2 += yy[recording] * inverse + (u_r * u_r - left * u_y * u_y) * part
-        mm[of] += a2 * u * reduced
-        mr[of] += a * u_r * reduced
-        determinant *= left
+        if len(squared_slopes):
+            variance += p2 * squared_slopes[recording] * factor * factor
+        inflation = 1 + variance * u
+        scale = 1 / (inflation * u)
+        reduced = scale * u
+        chi2 += yy[recording] * inverse + (u_r * u_r - inflation * u_y * u_y) * scale
+        mm[sensor_index] += a2 * u * reduced
+        mr[sensor_index] += a * u_r * reduced
+        determinant *= inflation
         if recording % _TOGETHER == 0:
             log_determinant += np.log(determinant)
             determinant = 1.0
     log_determinant += np.log(determinant)
-    for of in range(len(mm)):
-        chi2 -= tau2 / (1 + tau2 * mm[of]) * mr[of] ** 2
-        log_determinant += np.log1p(tau2 * mm[of])
+    for sensor_index in range(len(mm)):
+        chi2 -= tau2 / (1 + tau2 * mm[sensor_index]) * mr[sensor_index] ** 2
+        log_determinant += np.log1p(tau2 * mm[sensor_index])
     return -0.5 * (chi2 + log_determinant)
 
 
@@ -86,15 +81,15 @@ def log_likelihoods(
     uu: Floats,
     uy: Floats,
     yy: Floats,
-    place: Floats,
+    squared_slopes: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
     laplacian: Floats,
     square: Floats,
     noise: Floats,
-    each: Floats,
+    totals: Floats,
 ) -> None:
-    """−½ of what noise levels make of χ² and log|C|: added to `each` (points, sets).
+    """Add −½ of the terms of χ² and log|C| that depend on the noise levels to `totals` (points, sets).
 
     Parameters
     ----------
@@ -102,26 +97,26 @@ def log_likelihoods(
         (points, recordings).
     uu, uy, yy
         The sums Re u*u, Re u*y and |y|².
-    place
-        (points, recordings) |t|² of the position's slopes, (points, 0) where there are none.
+    squared_slopes
+        (points, recordings) |t|² of the position slopes, (points, 0) without positioning scatter.
     sensor
         (recordings,).
-    bend
+    sensor_log_gain
         (points, sensors).
     laplacian, square
-        (recordings,) of σ over the place, relative to it.
+        (recordings,) of σ over the contact's position, relative to σ.
     noise
         (points, sets, 4): gain, level, position and spread.
     """
     mm, mr = np.empty(sensor_log_gain.shape[1]), np.empty(sensor_log_gain.shape[1])
-    for point in range(each.shape[0]):
-        for number in range(each.shape[1]):
-            each[point, number] += log_likelihood(
+    for point in range(totals.shape[0]):
+        for number in range(totals.shape[1]):
+            totals[point, number] += log_likelihood(
                 level[point],
                 uu[min(point, uu.shape[0] - 1), min(number, uu.shape[1] - 1)],
                 uy[min(point, uy.shape[0] - 1), min(number, uy.shape[1] - 1)],
                 yy[min(point, yy.shape[0] - 1), min(number, yy.shape[1] - 1)],
-                place[point],
+                squared_slopes[point],
                 sensor,
                 sensor_log_gain[point],
                 laplacian,
@@ -136,11 +131,11 @@ def log_likelihoods(
 def log_plateaus(covariance: Floats, plateaus: Floats) -> float:
     """The log prior density of covariance parameters (parameters,)."""
     total = 0.0
-    for place in range(len(covariance)):
-        value = covariance[place]
-        below = max((plateaus[place, 0] - value) / plateaus[place, 2], 0.0)
-        above = max((value - plateaus[place, 1]) / plateaus[place, 3], 0.0)
-        total -= 0.5 * (below + above) ** 2 + plateaus[place, 4]
+    for index in range(len(covariance)):
+        value = covariance[index]
+        below = max((plateaus[index, 0] - value) / plateaus[index, 2], 0.0)
+        above = max((value - plateaus[index, 1]) / plateaus[index, 3], 0.0)
+        total -= 0.5 * (below + above) ** 2 + plateaus[index, 4]
     return total
 
 
@@ -160,33 +155,37 @@ def log_priors(
     height: Floats,
     covariances: Floats,
     plateaus: Floats,
-    each: Floats,
+    totals: Floats,
 ) -> None:
-    """The logarithms of the prior densities, added to `each` (points, sets).
+    """Add the log prior densities to `totals` (points, sets).
 
     Of the coordinates `fit` (points, parameters) that are free in each point's hypothesis a normal or uniform density
     within bounds, or one of Student's t with so many degrees of `freedom`, where these are finite; of the covariance's
-    coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the logarithm
-    of the area (parameters, 5).
+    coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the log of the
+    area (parameters, 5).
     """
     for point in range(len(fit)):
-        of = owner[point]
-        of_mean = height[of]
-        for place in range(fit.shape[1]):
-            if free[of, place]:
-                value = fit[point, place]
-                if value < low[of, place] or value > high[of, place]:
-                    of_mean = -np.inf
-                square = precision[of, place] * (value - centre[of, place]) ** 2
-                tail = freedom[of, place]
-                of_mean -= 0.5 * (square if tail == np.inf else (tail + 1) * np.log1p(square / tail))
+        hypothesis = owner[point]
+        log_prior = height[hypothesis]
+        for index in range(fit.shape[1]):
+            if free[hypothesis, index]:
+                value = fit[point, index]
+                if value < low[hypothesis, index] or value > high[hypothesis, index]:
+                    log_prior = -np.inf
+                square = precision[hypothesis, index] * (value - centre[hypothesis, index]) ** 2
+                tail = freedom[hypothesis, index]
+                log_prior -= 0.5 * (square if tail == np.inf else (tail + 1) * np.log1p(square / tail))
         for number in range(covariances.shape[1]):
-            each[point, number] += of_mean + log_plateaus(covariances[point, number], plateaus)
+            totals[point, number] += log_prior + log_plateaus(covariances[point, number], plateaus)
 
 
 STEP = 0.05  # of the finite differences in the covariance's logarithms
 LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
-TRIES, SHORTER, LEAST_GAIN = 4, 4.0, 1e-3  # of a step that may gain nothing; gain that ends the steps
+TRIES, SHORTER, LEAST_GAIN = (
+    4,
+    4.0,
+    1e-3,
+)  # tries of a step without gain, its shortening, and the gain that ends the steps
 
 
 @compiled()
@@ -195,11 +194,12 @@ def _cost(
     noise: Floats,
     of_point: tuple[Array, ...],
     sums: tuple[Floats, Floats],
-    known: tuple[float, float, bool, Floats],
+    constants: tuple[float, float, bool, Floats],
 ) -> float:
-    """The cost with covariance parameters (parameters,), up to what no noise level changes; `noise` and `sums` are
-    overwritten."""
-    about_means, numbers, has_position_scatter, plateaus = known
+    """The cost with covariance parameters (parameters,), up to terms without noise levels; `noise` and `sums` are
+    overwritten.
+    """
+    about_means, numbers, has_position_scatter, plateaus = constants
     noise[0], noise[1] = np.exp(covariance[0]), np.exp(covariance[1])
     if has_position_scatter:
         noise[2] = np.exp(covariance[2])
@@ -208,8 +208,8 @@ def _cost(
 
 
 @compiled()
-def _inside(here: Floats, step: Floats, lowest: Floats, highest: Floats, moved: Floats) -> None:
-    """`moved` becomes where a step from here leads, within the bounds (parameters,)."""
+def _move_within_bounds(here: Floats, step: Floats, lowest: Floats, highest: Floats, moved: Floats) -> None:
+    """Set `moved` to `here` + `step`, clipped to the bounds (parameters,)."""
     for parameter in range(len(here)):
         moved[parameter] = min(max(here[parameter] + step[parameter], lowest[parameter]), highest[parameter])
 
@@ -223,24 +223,26 @@ def _newton_step(
     noise: Floats,
     of_point: tuple[Array, ...],
     sums: tuple[Floats, Floats],
-    known: tuple[float, float, bool, Floats],
+    constants: tuple[float, float, bool, Floats],
     step: Floats,
 ) -> None:
-    """`step` becomes that of each parameter on its own, by central differences; 0 where it would leave the bounds."""
+    """Set `step` to each parameter's own Newton step, by central differences; 0 where it would leave the bounds."""
     centre = np.empty(len(here))
-    _inside(here, 0 * here, lowest + 2 * STEP, highest - 2 * STEP, centre)  # far enough inside for the differences
-    middle = _cost(centre, noise, of_point, sums, known)
+    _move_within_bounds(
+        here, 0 * here, lowest + 2 * STEP, highest - 2 * STEP, centre
+    )  # far enough inside for the differences
+    middle = _cost(centre, noise, of_point, sums, constants)
     largest = 1e-12
     for parameter in range(len(here)):
         value = centre[parameter]
         centre[parameter] = value + STEP
-        up = _cost(centre, noise, of_point, sums, known)
+        up = _cost(centre, noise, of_point, sums, constants)
         centre[parameter] = value - STEP
-        down = _cost(centre, noise, of_point, sums, known)
+        down = _cost(centre, noise, of_point, sums, constants)
         centre[parameter] = value
-        bent = (up + down - 2 * middle) / STEP**2
-        slope = (up - down) / (2 * STEP) + bent * (here[parameter] - value)
-        step[parameter] = -slope / max(abs(bent), 1.0)
+        curvature = (up + down - 2 * middle) / STEP**2
+        slope = (up - down) / (2 * STEP) + curvature * (here[parameter] - value)
+        step[parameter] = -slope / max(abs(curvature), 1.0)
         low, high = here[parameter] <= lowest[parameter], here[parameter] >= highest[parameter]
         if parameter == held or (low and step[parameter] < 0) or (high and step[parameter] > 0):
             step[parameter] = 0.0
@@ -258,7 +260,7 @@ def update_noise_levels(
     uu: Floats,
     uy: Floats,
     yy: Floats,
-    place: Floats,
+    squared_slopes: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
     laplacian: Floats,
@@ -275,25 +277,25 @@ def update_noise_levels(
     covariance: Floats,
     cost: Floats,
 ) -> None:
-    """Newton steps of gain, level and, where `has_position_scatter`, position scatter, each on its own: `covariance`
-    (points, parameters) and `cost` (points,) are overwritten with where they end.
+    """Newton steps of gain, level and, if `has_position_scatter`, position scatter, each on its own: `covariance`
+    (points, parameters) and `cost` (points,) are overwritten with the results.
 
     Parameters
     ----------
-    level, uu, uy, place
-        (points, recordings); `place` may be (points, 0).
+    level, uu, uy, squared_slopes
+        (points, recordings); `squared_slopes` may be (points, 0).
     yy, sensor, laplacian, square
         (recordings,).
-    bend
+    sensor_log_gain
         (points, sensors).
     about_means, numbers
-        What lines scatter about their recordings' means, and how many numbers all lines are.
+        Sum of squares of lines about their recordings' means, and how many real numbers all lines are.
     spread
         Of the sensors' gains.
     plateaus, lowest, highest
         Prior (parameters, 5) and bounds (parameters,).
     steps, held
-        Steps at most, and the parameter that stays; -1 for none.
+        Most steps, and the index of the parameter that is fixed; -1 for none.
     """
     count = covariance.shape[1]
     noise, step, tried = np.zeros(4), np.empty(count), np.empty(count)
@@ -308,20 +310,20 @@ def update_noise_levels(
             uu[point],
             uy[point],
             yy,
-            place[point],
+            squared_slopes[point],
             sensor,
             sensor_log_gain[point],
             laplacian,
             square,
         )
-        known = about_means, numbers, has_position_scatter, plateaus
-        best = begun = _cost(here, noise, of_point, sums, known)
+        constants = about_means, numbers, has_position_scatter, plateaus
+        best = initial_cost = _cost(here, noise, of_point, sums, constants)
         for _ in range(steps):
-            _newton_step(here, lowest, highest, held, noise, of_point, sums, known, step)
+            _newton_step(here, lowest, highest, held, noise, of_point, sums, constants, step)
             gained = 0.0
             for _ in range(TRIES):
-                _inside(here, step, lowest, highest, tried)
-                reached = _cost(tried, noise, of_point, sums, known)
+                _move_within_bounds(here, step, lowest, highest, tried)
+                reached = _cost(tried, noise, of_point, sums, constants)
                 if reached < best:
                     gained = best - reached
                     best = reached
@@ -330,23 +332,23 @@ def update_noise_levels(
                 step /= SHORTER
             if gained < LEAST_GAIN:
                 break
-        cost[point] += best - begun
+        cost[point] += best - initial_cost
 
 
-_FROM_SLOPES = 1e-3  # m: a recording whose response changes by more than itself over this way is led by its slopes
+_FROM_SLOPES = 1e-3  # m: the slopes dominate where the response changes by more than itself over this distance
 _OF_PARAMETERS, _OF_PAIRS = "float64[:, :, ::1]", "float64[:, :, :, ::1]"
 
 
 _TERMS = 8
-_FACTOR, _A, _KNOWN, _UU, _UR, _REDUCED, _AS_MODEL, _MOVED = range(_TERMS)  # of each recording
+_FACTOR, _A, _MEAN, _UU, _UR, _REDUCED, _AS_MODEL, _MOVED = range(_TERMS)  # of each recording
 
 
 @compiled()
-def _scatter(
+def _fill_terms(
     level: Floats,
     uu: Floats,
     uy: Floats,
-    place: Floats,
+    squared_slopes: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
     laplacian: Floats,
@@ -354,18 +356,18 @@ def _scatter(
     levels: Floats,
     terms: Floats,
 ) -> None:
-    """What each recording's scatter makes of it: `terms` (recordings, 8), with V = s'² a² + p² |t|²."""
+    """Fill `terms` (recordings, 8) with each recording's scatter, V = s'² a² + p² |t|²."""
     gain2, k2, p2, _ = levels
     for r in range(len(level)):
-        own = sensor_log_gain[sensor[r]]
-        factor = np.exp(own + 0.5 * p2 * laplacian[r])
+        log_gain = sensor_log_gain[sensor[r]]
+        factor = np.exp(log_gain + 0.5 * p2 * laplacian[r])
         a = level[r] * factor
-        known = a * (1 - own)
+        mean = a * (1 - log_gain)
         as_model = gain2 + 0.5 * p2 * p2 * square[r]
-        moved = p2 * place[r] * factor * factor if len(place) else 0.0
+        moved = p2 * squared_slopes[r] * factor * factor if len(squared_slopes) else 0.0
         u = uu[r] / k2
-        terms[r, _FACTOR], terms[r, _A], terms[r, _KNOWN] = factor, a, known
-        terms[r, _UU], terms[r, _UR] = u, (uy[r] - known * uu[r]) / k2
+        terms[r, _FACTOR], terms[r, _A], terms[r, _MEAN] = factor, a, mean
+        terms[r, _UU], terms[r, _UR] = u, (uy[r] - mean * uu[r]) / k2
         terms[r, _REDUCED] = 1 / (1 + (as_model * a * a + moved) * u)  # 1 − (share of u taken out)
         terms[r, _AS_MODEL], terms[r, _MOVED] = as_model, moved
 
@@ -377,25 +379,27 @@ def _shrink(terms: Floats) -> float:
 
 
 @compiled()
-def _along(level_slopes: Floats, uv: Floats, vy: Floats, inverse: float, terms: Floats, uj: Floats, jr: Floats) -> None:
-    """Re u*J and, with a recording's own scatter taken out, Re J*r, both over κ² (recordings, P)."""
+def _project_derivatives(
+    level_slopes: Floats, uv: Floats, vy: Floats, inverse: float, terms: Floats, uj: Floats, jr: Floats
+) -> None:
+    """Re u*J and, with each recording's own scatter taken out, Re J*r, both over κ² (recordings, P)."""
     leveled, turned = level_slopes.shape[1] > 0, uv.shape[1] > 0
     for r in range(len(terms)):
-        of = terms[r]
+        row = terms[r]
         for p in range(uj.shape[1]):
             along = with_r = 0.0
             if leveled:
-                along += level_slopes[r, p] * of[_FACTOR] * of[_UU]
-                with_r += level_slopes[r, p] * of[_FACTOR] * of[_UR]
+                along += level_slopes[r, p] * row[_FACTOR] * row[_UU]
+                with_r += level_slopes[r, p] * row[_FACTOR] * row[_UR]
             if turned:
-                along += of[_A] * uv[r, p] * inverse
-                with_r += of[_A] * (vy[r, p] - of[_KNOWN] * uv[r, p]) * inverse
+                along += row[_A] * uv[r, p] * inverse
+                with_r += row[_A] * (vy[r, p] - row[_MEAN] * uv[r, p]) * inverse
             uj[r, p] = along
-            jr[r, p] = with_r - along * _shrink(of) * of[_UR]
+            jr[r, p] = with_r - along * _shrink(row) * row[_UR]
 
 
 @compiled()
-def _over_sensors(
+def _sum_over_sensors(
     sensor: NDArray[np.int64],
     tau2: float,
     terms: Floats,
@@ -407,41 +411,41 @@ def _over_sensors(
     """mᵀC⁻¹J of recordings and of sensors; of sensors mᵀC⁻¹m, mᵀC⁻¹r, τ²/(1 + τ² mᵀC⁻¹m) and the most probable b."""
     of_sensors[:], by_sensor[:] = 0.0, 0.0
     for r in range(len(terms)):
-        of, own = terms[r], sensor[r]
-        weight = of[_A] * of[_REDUCED]
-        of_sensors[own, 0] += of[_A] * of[_UU] * weight
-        of_sensors[own, 1] += of[_UR] * weight
+        row, sensor_index = terms[r], sensor[r]
+        weight = row[_A] * row[_REDUCED]
+        of_sensors[sensor_index, 0] += row[_A] * row[_UU] * weight
+        of_sensors[sensor_index, 1] += row[_UR] * weight
         for p in range(uj.shape[1]):
             mj[r, p] = uj[r, p] * weight
-            by_sensor[own, p] += mj[r, p]
-    for own in range(len(of_sensors)):
-        of_sensors[own, 2] = tau2 / (1 + tau2 * of_sensors[own, 0])
-        of_sensors[own, 3] = of_sensors[own, 2] * of_sensors[own, 1]
+            by_sensor[sensor_index, p] += mj[r, p]
+    for sensor_index in range(len(of_sensors)):
+        of_sensors[sensor_index, 2] = tau2 / (1 + tau2 * of_sensors[sensor_index, 0])
+        of_sensors[sensor_index, 3] = of_sensors[sensor_index, 2] * of_sensors[sensor_index, 1]
 
 
 @compiled()
-def _informed(
-    level_slopes: Floats, uv: Floats, vv: Floats, inverse: float, terms: Floats, uj: Floats, whole: Floats
+def _add_information(
+    level_slopes: Floats, uv: Floats, vv: Floats, inverse: float, terms: Floats, uj: Floats, information: Floats
 ) -> None:
-    """Add Jᵀ C⁻¹ J, without the sensors' columns, to the lower half."""
+    """Add Jᵀ C⁻¹ J, without the sensors' columns, to the lower half of `information`."""
     leveled, turned = level_slopes.shape[1] > 0, uv.shape[1] > 0
     for r in range(len(terms)):
-        of = terms[r]
-        shrink, f, a = _shrink(of), of[_FACTOR], of[_A]
+        row = terms[r]
+        shrink, f, a = _shrink(row), row[_FACTOR], row[_A]
         for p in range(uj.shape[1]):
             for q in range(p + 1):
                 both = -uj[r, p] * shrink * uj[r, q]
                 if leveled:
-                    both += level_slopes[r, p] * f * f * of[_UU] * level_slopes[r, q]
+                    both += level_slopes[r, p] * f * f * row[_UU] * level_slopes[r, q]
                 if turned:
                     both += a * a * inverse * vv[r, p, q]
                 if leveled and turned:
                     both += f * a * inverse * (level_slopes[r, p] * uv[r, q] + uv[r, p] * level_slopes[r, q])
-                whole[p, q] += both
+                information[p, q] += both
 
 
 @compiled()
-def _with_sensors(
+def _add_mean_gradient(
     sensor: NDArray[np.int64],
     terms: Floats,
     of_sensors: Floats,
@@ -450,25 +454,26 @@ def _with_sensors(
     jr_sensor: Floats,
     slope: Floats,
 ) -> None:
-    """Add the gradient by the mean and by what follows the model in a recording, the sensors' columns in C as well."""
+    """Add the gradient by the mean and by the columns of C that follow it in each recording, with the sensors' columns
+    in C."""
     jr_sensor[:] = 0.0
     for r in range(len(terms)):
-        of, own = terms[r], sensor[r]
-        _, _, shrink, gain = of_sensors[own]
-        weight = of[_A] * of[_REDUCED]
-        mm = of[_A] * of[_UU] * weight
-        mr_left, left = of[_UR] * weight - mm * gain, 1 - shrink * mm
+        row, sensor_index = terms[r], sensor[r]
+        _, _, shrink, gain = of_sensors[sensor_index]
+        weight = row[_A] * row[_REDUCED]
+        mm = row[_A] * row[_UU] * weight
+        mr_residual, mm_factor = row[_UR] * weight - mm * gain, 1 - shrink * mm
         for p in range(len(slope)):
             with_r = jr[r, p] - mj[r, p] * gain
-            jr_sensor[own, p] += with_r
-            slope[p] += with_r + of[_AS_MODEL] * (with_r * mr_left - mj[r, p] * left)
+            jr_sensor[sensor_index, p] += with_r
+            slope[p] += with_r + row[_AS_MODEL] * (with_r * mr_residual - mj[r, p] * mm_factor)
 
 
 @compiled()
-def _of_place(
+def _add_position_gradient(
     level: Floats,
     level_slopes: Floats,
-    place: Floats,
+    squared_slopes: Floats,
     log_slope_gradient: Floats,
     uv: Floats,
     vy: Floats,
@@ -478,26 +483,26 @@ def _of_place(
     of_sensors: Floats,
     slope: Floats,
 ) -> None:
-    """Add the gradient by the column that the position's slopes are."""
+    """Add the gradient by the column of the position slopes."""
     for r in range(len(terms)):
-        of = terms[r]
+        row = terms[r]
         _, _, shrink, gain = of_sensors[sensor[r]]
-        weight = of[_A] * of[_REDUCED]
-        um = of[_UU] * weight
-        explained = of[_UR] * of[_REDUCED] - um * gain  # uᵀ C⁻¹ r
-        taken = of[_UU] * of[_REDUCED] - shrink * um * um  # uᵀ C⁻¹ u
-        led = _FROM_SLOPES**2 * place[r] > level[r] ** 2
+        weight = row[_A] * row[_REDUCED]
+        um = row[_UU] * weight
+        explained = row[_UR] * row[_REDUCED] - um * gain  # uᵀ C⁻¹ r
+        u_information = row[_UU] * row[_REDUCED] - shrink * um * um  # uᵀ C⁻¹ u
+        slopes_dominate = _FROM_SLOPES**2 * squared_slopes[r] > level[r] ** 2
         for p in range(len(slope)):
-            grows = log_slope_gradient[r, p] if log_slope_gradient.shape[1] else np.nan
-            if np.isnan(grows):
-                grows = 0.0 if led else 2 * level_slopes[r, p] / level[r]
-            by_growth = 0.5 * (explained * explained - taken) * grows
+            log_gradient = log_slope_gradient[r, p] if log_slope_gradient.shape[1] else np.nan
+            if np.isnan(log_gradient):
+                log_gradient = 0.0 if slopes_dominate else 2 * level_slopes[r, p] / level[r]
+            by_slopes = 0.5 * (explained * explained - u_information) * log_gradient
             if uv.shape[1]:
-                along, with_r = uv[r, p] * inverse, (vy[r, p] - of[_KNOWN] * uv[r, p]) * inverse
+                along, with_r = uv[r, p] * inverse, (vy[r, p] - row[_MEAN] * uv[r, p]) * inverse
                 mv = along * weight
-                by_growth += (with_r - along * _shrink(of) * of[_UR] - mv * gain) * explained
-                by_growth -= along * of[_REDUCED] - shrink * um * mv
-            slope[p] += of[_MOVED] * by_growth
+                by_slopes += (with_r - along * _shrink(row) * row[_UR] - mv * gain) * explained
+                by_slopes -= along * row[_REDUCED] - shrink * um * mv
+            slope[p] += row[_MOVED] * by_slopes
 
 
 @compiled(
@@ -513,7 +518,7 @@ def normal_equations(
     uv: Floats,
     vy: Floats,
     vv: Floats,
-    place: Floats,
+    squared_slopes: Floats,
     log_slope_gradient: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
@@ -532,10 +537,10 @@ def normal_equations(
     uu, uy, uv, vy, vv
         The sums Re u*u, Re u*y (points, recordings), with the derivatives v of u Re u*v, Re v*y (points, recordings,
         P) and Re v*v (points, recordings, P, P), or P = 0 where u does not change.
-    place, growth
-        |t|² of the position's slopes (points, recordings), or (points, 0) where there are none, and ∂ log |t|²/∂θ
-        (points, recordings, P), NaN where t is taken to change as L does, or where it leads, not at all; or P = 0.
-    sensor, bend, laplacian, square
+    squared_slopes, log_slope_gradient
+        |t|² of the position slopes (points, recordings), or (points, 0) without positioning scatter, and ∂ log |t|²/∂θ
+        (points, recordings, P); NaN where t is taken to change as L does, or not at all where t dominates; or P = 0.
+    sensor, sensor_log_gain, laplacian, square
         See `log_likelihoods`.
     noise
         (points, 4): gain, level, position and spread.
@@ -548,12 +553,12 @@ def normal_equations(
     by_sensor = np.empty((2, sensors, count))
     for point in range(points):
         levels = noise[min(point, len(noise) - 1)] ** 2
-        at = min(point, len(place) - 1)
-        _scatter(
+        at = min(point, len(squared_slopes) - 1)
+        _fill_terms(
             level[point],
             uu[point],
             uy[point],
-            place[at],
+            squared_slopes[at],
             sensor,
             sensor_log_gain[point],
             laplacian,
@@ -561,24 +566,26 @@ def normal_equations(
             levels,
             terms,
         )
-        _along(level_slopes[point], uv[point], vy[point], 1 / levels[1], terms, uj, jr)
-        _over_sensors(sensor, levels[3], terms, uj, mj, of_sensors, by_sensor[0])
-        whole, slope = information[point], gradient[point]
-        whole[:], slope[:] = 0.0, 0.0
-        _informed(level_slopes[point], uv[point], vv[point], 1 / levels[1], terms, uj, whole)
-        for of in range(sensors):
+        _project_derivatives(level_slopes[point], uv[point], vy[point], 1 / levels[1], terms, uj, jr)
+        _sum_over_sensors(sensor, levels[3], terms, uj, mj, of_sensors, by_sensor[0])
+        point_information, slope = information[point], gradient[point]
+        point_information[:], slope[:] = 0.0, 0.0
+        _add_information(level_slopes[point], uv[point], vv[point], 1 / levels[1], terms, uj, point_information)
+        for sensor_index in range(sensors):
             for p in range(count):
                 for q in range(p + 1):
-                    whole[p, q] -= by_sensor[0, of, p] * of_sensors[of, 2] * by_sensor[0, of, q]
+                    point_information[p, q] -= (
+                        by_sensor[0, sensor_index, p] * of_sensors[sensor_index, 2] * by_sensor[0, sensor_index, q]
+                    )
         for p in range(count):
             for q in range(p):
-                whole[q, p] = whole[p, q]
-        _with_sensors(sensor, terms, of_sensors, jr, mj, by_sensor[1], slope)
-        if place.shape[1]:
-            _of_place(
+                point_information[q, p] = point_information[p, q]
+        _add_mean_gradient(sensor, terms, of_sensors, jr, mj, by_sensor[1], slope)
+        if squared_slopes.shape[1]:
+            _add_position_gradient(
                 level[point],
                 level_slopes[point],
-                place[point],
+                squared_slopes[point],
                 log_slope_gradient[point],
                 uv[point],
                 vy[point],
@@ -588,9 +595,9 @@ def normal_equations(
                 of_sensors,
                 slope,
             )
-        for of in range(sensors):
-            mm, mr, shrink, gain = of_sensors[of]
+        for sensor_index in range(sensors):
+            mm, mr, shrink, gain = of_sensors[sensor_index]
             for p in range(count):
                 slope[p] += levels[3] * (
-                    by_sensor[1, of, p] * (mr - mm * gain) - by_sensor[0, of, p] * (1 - shrink * mm)
+                    by_sensor[1, sensor_index, p] * (mr - mm * gain) - by_sensor[0, sensor_index, p] * (1 - shrink * mm)
                 )

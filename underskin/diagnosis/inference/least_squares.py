@@ -1,10 +1,10 @@
-"""Curves fitted by least squares, where fits begin: residuals in units of a law's usual error, with the parameters'
-priors, a gain of each recording, and the zero and drift of its cell taken out (variable projection).
+"""Least-squares fits of curves: starting points of the fit, and plain least squares for comparison.
 
-Scipy's trust-region reflective algorithm finds from far away what steps on the whole likelihood, whose covariance moves
-with the fit, do not. Where a sphere snaps in, the force jumps at the contact point, and no slope leads past a sample
-there: contact points begin where a snap-in is seen, and the curve is fitted again between those samples where it fits
-best.
+The residuals are in units of a law's usual error, with the parameters' priors, a gain of each recording, and zero and
+drift of its cell taken out (variable projection). Scipy's trust-region reflective algorithm converges from far away,
+where steps on the likelihood, whose covariance depends on the model, do not. With adhesion the force jumps at the
+contact point, and no derivative leads past a sample there: contact points start where a snap-in is seen, and the curve
+is fitted again between the samples where it fits best.
 """
 
 from collections.abc import Callable
@@ -22,16 +22,20 @@ from underskin.recordings.curve_course import course, touch
 from underskin.units import Floats, Mask
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
-_TOLERANCE, _OF_STARTS, _EVALUATIONS = 1e-4, 1e-3, 40  # of the sum of squares; the likelihood goes on from starts
+_TOLERANCE, _OF_STARTS, _EVALUATIONS = (
+    1e-4,
+    1e-3,
+    40,
+)  # of the sum of squares, the same for starting points, and most evaluations
 _STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far wider than a snap-in is deep
-_PASSED = 4  # samples at most, either way, past which a contact point is moved
+_PASSED = 4  # most samples, either way, that a contact point is moved past
 _RETURN = 0.5  # of the range of displacement: a way back that may end a contact
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
-_SAME = 1e-9  # of the range of displacement: what rounding alone tells apart
+_SAME = 1e-9  # of the range of displacement: smaller differences are rounding
 
 
 class LeastSquares:
-    """Of one hypothesis of curves."""
+    """Least-squares fits of one hypothesis of curves."""
 
     def __init__(self, hypothesis: Hypothesis) -> None:
         """Prepare the measured samples and the projections."""
@@ -41,79 +45,79 @@ class LeastSquares:
         self._model = model
         self._recording = lines.recording
         self._spans = lines.spans
-        largest = np.array([np.abs(lines.value[own]).max() for own in lines.spans])
+        largest = np.array([np.abs(lines.value[span]).max() for span in lines.spans])
         self._unit = _ERROR * np.maximum(largest, 1e-300)[lines.recording]
-        self._taken = []
-        for own in lines.spans:
-            columns = lines.smooth.columns[own] / self._unit[own, None]
+        self._cell_projections = []
+        for span in lines.spans:
+            columns = lines.smooth.columns[span] / self._unit[span, None]
             solved = np.linalg.solve(np.eye(columns.shape[1]) + columns.T @ columns, columns.T)
-            self._taken.append((columns, solved))
+            self._cell_projections.append((columns, solved))
         self._measured = lines.value.real
-        self._low, self._high = np.array([entry.bounds for entry in model.parameters]).T
-        priors = np.array([curvature_of_prior(entry) for entry in model.parameters])
+        self._low, self._high = np.array([parameter.bounds for parameter in model.parameters]).T
+        priors = np.array([curvature_of_prior(parameter) for parameter in model.parameters])
         self._precision, self._centre = np.sqrt(priors[:, 0]), priors[:, 1]
-        travels = [entry.displacement_mm for entry in curves_of(lines.campaign)]
+        travels = [curve.displacement_mm for curve in curves_of(lines.campaign)]
         self._approach = [_distinct(travel[: int(travel.argmax()) + 1]) for travel in travels]
-        self._jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
-        curves = curves_of(lines.campaign) if self._jumps else []
-        self._snapped = [_snapped(entry) for entry in curves]
-        seen = [_seen_contact(entry) for entry in curves]
-        each = [one for one in seen if one is not None]
-        self._seen = np.concatenate(each) if each and len(each) == len(seen) else None
+        self._has_jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
+        curves = curves_of(lines.campaign) if self._has_jumps else []
+        self._snap_in_intervals = [_snap_in_interval(curve) for curve in curves]
+        contacts = [_visible_contact(curve) for curve in curves]
+        visible = [contact for contact in contacts if contact is not None]
+        self._visible_contact = np.concatenate(visible) if visible and len(visible) == len(contacts) else None
 
     def fitted(self, start: Floats) -> tuple[Floats, float]:
         """The fit coordinates (parameters,) from a start, and half the sum of squares there."""
-        begin, low, high = np.append(start, np.zeros(len(self._spans))), self._low.copy(), self._high.copy()
-        for place, gap in zip(self._model.contact_points.tolist(), self._snapped, strict=False):
-            if gap is not None and low[place] < gap[0] < gap[2] < high[place]:
-                low[place], begin[place], high[place] = gap
-        if self._seen is not None:  # while the parameters are far off, contact is where the jumps show it
-            begin, _ = self._descended(begin, low, high, self._seen)
-        x, cost = self._descended(begin, low, high)
-        if self._jumps:
-            other, less = self._descended(*self._between_samples(x))
+        initial, low, high = np.append(start, np.zeros(len(self._spans))), self._low.copy(), self._high.copy()
+        for index, interval in zip(self._model.contact_points.tolist(), self._snap_in_intervals, strict=False):
+            if interval is not None and low[index] < interval[0] < interval[2] < high[index]:
+                low[index], initial[index], high[index] = interval
+        if self._visible_contact is not None:  # first with the contact fixed to where the jumps show it
+            initial, _ = self._minimised(initial, low, high, self._visible_contact)
+        x, cost = self._minimised(initial, low, high)
+        if self._has_jumps:
+            other, less = self._minimised(*self._between_samples(x))
             x, cost = (other, less) if less < cost else (x, cost)
-        return np.clip(x[: len(start)], self._low, self._high), cost  # which rounding may pass
+        return np.clip(x[: len(start)], self._low, self._high), cost  # rounding may exceed the bounds
 
     def _between_samples(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Fit coordinates and gains with each contact point amid those two samples of the approach, near where it is,
-        between which its curve fits best; and bounds that keep it there."""
-        count, places = len(self._low), self._model.contact_points
-        lower, upper = (np.empty((2 * _PASSED + 1, len(places))) for _ in range(2))
+        """Fit coordinates and gains with each contact point in the interval of the approach, near its present one,
+        where its curve fits best; and bounds that keep it there."""
+        count, indices = len(self._low), self._model.contact_points
+        lower, upper = (np.empty((2 * _PASSED + 1, len(indices))) for _ in range(2))
         for curve, travel in enumerate(self._approach):
-            first = np.searchsorted(travel, x[places[curve]]) - 1 - _PASSED
+            first = np.searchsorted(travel, x[indices[curve]]) - 1 - _PASSED
             cells = np.clip(first + np.arange(len(lower)), 0, max(len(travel) - 2, 0))
             lower[:, curve], upper[:, curve] = travel[cells], travel[np.minimum(cells + 1, len(travel) - 1)]
-        lower, upper = (np.clip(edge, self._low[places], self._high[places]) for edge in (lower, upper))
-        shut = lower >= upper  # gaps beyond the contact point's bounds, which then stay as they are
-        lower, upper = np.where(shut, self._low[places], lower), np.where(shut, self._high[places], upper)
+        lower, upper = (np.clip(edge, self._low[indices], self._high[indices]) for edge in (lower, upper))
+        shut = lower >= upper  # intervals outside the contact point's bounds: these are kept
+        lower, upper = np.where(shut, self._low[indices], lower), np.where(shut, self._high[indices], upper)
         fits = np.tile(x[:count], (len(lower), 1))
-        fits[:, places] = (lower + upper) / 2
+        fits[:, indices] = (lower + upper) / 2
         force = (1 + x[count:][self._recording]) * self._model.forces(fits)
-        left = self._projected((self._measured - force) / self._unit)[:, : len(self._measured)]
-        best = np.add.reduceat(left**2, [own.start for own in self._spans], axis=1).argmin(axis=0)
-        curves = np.arange(len(places))
+        residuals = self._projected((self._measured - force) / self._unit)[:, : len(self._measured)]
+        best = np.add.reduceat(residuals**2, [span.start for span in self._spans], axis=1).argmin(axis=0)
+        curves = np.arange(len(indices))
         moved, low, high = x.copy(), self._low.copy(), self._high.copy()
-        moved[places], low[places], high[places] = fits[best, places], lower[best, curves], upper[best, curves]
+        moved[indices], low[indices], high[indices] = fits[best, indices], lower[best, curves], upper[best, curves]
         return moved, low, high
 
-    def _descended(self, start: Floats, low: Floats, high: Floats, held: Mask | None = None) -> tuple[Floats, float]:
-        """Fit coordinates and gains from a start, and half the sum of squares there; `held` are in contact."""
+    def _minimised(self, start: Floats, low: Floats, high: Floats, held: Mask | None = None) -> tuple[Floats, float]:
+        """Fit coordinates and gains from a start, and half the sum of squares there; samples `held` are in contact."""
         count = len(low)
         gains = np.full(len(start) - count, 0.5)
         margin = _INSIDE * (high - low)
-        begin = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
+        initial = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
         bounds = np.append(low, -gains), np.append(high, gains)
         unit = np.append(_units(self._model, self._precision), np.ones(len(gains)))
         functions = partial(self._residuals, held=held), partial(self._jacobian, held=held)
-        return _solved(*functions, begin, bounds, unit, _OF_STARTS)
+        return _solved(*functions, initial, bounds, unit, _OF_STARTS)
 
     def _residuals(self, x: Floats, held: Mask | None) -> Floats:
         count = len(self._low)
         fit, gain = x[:count], x[count:]
         force = self._model.forces(fit[None], held)[0]
-        left = (self._measured - (1 + gain[self._recording]) * force) / self._unit
-        return np.concatenate([self._projected(left), (fit - self._centre) * self._precision, gain / START_GAIN])
+        residuals = (self._measured - (1 + gain[self._recording]) * force) / self._unit
+        return np.concatenate([self._projected(residuals), (fit - self._centre) * self._precision, gain / START_GAIN])
 
     def _jacobian(self, x: Floats, held: Mask | None) -> Floats:
         count = len(self._low)
@@ -126,46 +130,46 @@ class LeastSquares:
         return np.concatenate([rows, priors])
 
     def _projected(self, rows: Floats) -> Floats:
-        """Rows (…, rows) less what zero and drift of each cell take of them, and the coefficients of these."""
+        """Rows (…, rows) minus their projection on zero and drift of each cell, and the coefficients of these."""
         parts, coefficients = [], []
-        for own, (columns, solved) in zip(self._spans, self._taken, strict=True):
-            coefficients.append(rows[..., own] @ solved.T)
-            parts.append(rows[..., own] - coefficients[-1] @ columns.T)
+        for span, (columns, solved) in zip(self._spans, self._cell_projections, strict=True):
+            coefficients.append(rows[..., span] @ solved.T)
+            parts.append(rows[..., span] - coefficients[-1] @ columns.T)
         return np.concatenate([*parts, *coefficients], axis=-1)
 
 
 def _distinct(travel: Floats) -> Floats:
-    """The displacements in order, without those that rounding alone tells apart."""
+    """The distinct displacements in order, to within rounding."""
     values = np.unique(travel)
     return values[np.append(True, np.diff(values) > _SAME * np.ptp(values))]
 
 
-def _snapped(curve: CurveConditions) -> tuple[float, float, float] | None:
-    """Between which displacements a curve snaps into contact, and about where between them [mm]; None where no snap-in
-    is seen."""
+def _snap_in_interval(curve: CurveConditions) -> tuple[float, float, float] | None:
+    """The displacements [mm] of the samples before and after a snap-in, with the estimated contact point as the middle
+    one; None where no snap-in is seen."""
     seen = course(curve.displacement_mm, curve.force_n, curve.time_s) if isinstance(curve, CurveRecording) else None
     if seen is None or not seen.snap_in:
         return None
     before, after = curve.displacement_mm[seen.snap_in - 1 : seen.snap_in + 1].tolist()
-    begins = touch(curve.displacement_mm, seen.snap_in)
-    return (before, begins, after) if before < begins < after else None
+    contact_point = touch(curve.displacement_mm, seen.snap_in)
+    return (before, contact_point, after) if before < contact_point < after else None
 
 
-def _seen_contact(curve: CurveConditions) -> Mask | None:
+def _visible_contact(curve: CurveConditions) -> Mask | None:
     """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
     if not isinstance(curve, CurveRecording):
         return None
     seen = course(curve.displacement_mm, curve.force_n, curve.time_s)
     number = np.arange(len(curve.force_n))
-    back = float(curve.displacement_mm[seen.turn] - curve.displacement_mm[-1])
-    if seen.snap_in is None or (seen.pull_off is None and back > _RETURN * float(np.ptp(curve.displacement_mm))):
+    retraction = float(curve.displacement_mm[seen.turn] - curve.displacement_mm[-1])
+    if seen.snap_in is None or (seen.pull_off is None and retraction > _RETURN * float(np.ptp(curve.displacement_mm))):
         return None
     return (number >= seen.snap_in) & (number < (len(number) if seen.pull_off is None else seen.pull_off))
 
 
 def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, float]:
-    """The fit (parameters,) of the law by plain least squares, and the root mean square that it leaves of all raw
-    samples [% of the force's own].
+    """The fit (parameters,) of the law by plain least squares, and the root mean square residual of all raw samples
+    [% of the force's own].
 
     Without priors and gains: the parameters and a zero of each curve are free, and its drift where that is plain in the
     air. From a start (parameters,).
@@ -175,13 +179,15 @@ def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, 
     assert lines.smooth is not None
     count = lines.smooth.count
     root, measured = np.sqrt(count), lines.value.real
-    drifts = [_cell_columns(lines.smooth.columns[own], root[own], measured[own]) for own in lines.spans]
+    bases = [_cell_columns(lines.smooth.columns[span], root[span], measured[span]) for span in lines.spans]
 
     def about_zero(rows: Floats) -> Floats:
         """Weighed rows (…, rows) less what zero and drift of each curve take of them."""
         weighed = root * rows
-        parts = [weighed[..., own] for own in lines.spans]
-        return np.concatenate([part - part @ own @ own.T for part, own in zip(parts, drifts, strict=True)], axis=-1)
+        parts = [weighed[..., span] for span in lines.spans]
+        return np.concatenate(
+            [part - part @ basis @ basis.T for part, basis in zip(parts, bases, strict=True)], axis=-1
+        )
 
     def residuals(x: Floats) -> Floats:
         return about_zero(measured - model.forces(x[None])[0]) / unit
@@ -190,31 +196,31 @@ def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, 
         return -about_zero(model.forces_and_slopes(x[None])[1][0]).T / unit
 
     unit = float(np.sqrt((about_zero(measured) ** 2).sum()))
-    low, high = np.array([entry.bounds for entry in model.parameters]).T
+    low, high = np.array([parameter.bounds for parameter in model.parameters]).T
     margin = _INSIDE * (high - low)
-    begin = np.clip(start, low + margin, high - margin)
-    precision = np.sqrt([curvature_of_prior(entry)[0] for entry in model.parameters])
-    best, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision), _TOLERANCE)
-    left = 2 * cost * unit**2 + lines.smooth.within(model.forces(best[None])[0], lines.spans)
-    return best, 100 * float(np.sqrt(left / (count * measured**2).sum()))
+    initial = np.clip(start, low + margin, high - margin)
+    precision = np.sqrt([curvature_of_prior(parameter)[0] for parameter in model.parameters])
+    best, cost = _solved(residuals, jacobian, initial, (low, high), _units(model, precision), _TOLERANCE)
+    square_sum = 2 * cost * unit**2 + lines.smooth.within(model.forces(best[None])[0], lines.spans)
+    return best, 100 * float(np.sqrt(square_sum / (count * measured**2).sum()))
 
 
 def least_squares_reading(lines: Lines, force: Floats) -> Floats:
-    """What the cells show of a force (rows,) [N] by plain least squares: with the zero that leaves least of each curve,
-    and its drift where that is plain in the air."""
+    """The cells' readings of a force (rows,) [N] by plain least squares: with the best zero of each curve, and its
+    drift where that is plain in the air."""
     assert lines.smooth is not None
     root, measured = np.sqrt(lines.smooth.count), lines.value.real
     reading = force.copy()
-    for own in lines.spans:
-        taken = _cell_columns(lines.smooth.columns[own], root[own], measured[own])
-        rest = root[own] * (measured[own] - force[own])
-        reading[own] += taken @ (taken.T @ rest) / root[own]
+    for span in lines.spans:
+        basis = _cell_columns(lines.smooth.columns[span], root[span], measured[span])
+        rest = root[span] * (measured[span] - force[span])
+        reading[span] += basis @ (basis.T @ rest) / root[span]
     return reading
 
 
 def _cell_columns(columns: Floats, root: Floats, force: Floats) -> Floats:
-    """An orthonormal basis (rows, 1 or 2) of the zero of one curve and, where more of it than usual is expected, its
-    drift in time; `root` are the roots of the rows' weights."""
+    """An orthonormal basis (rows, 1 or 2) of the zero of one curve and, where more than usual is expected, its drift in
+    time; `root` are the square roots of the rows' weights."""
     time = columns[:, 1]
     plain = float(np.abs(time).max()) > 1.001 * USUAL_DRIFT * float(np.abs(force).max())
     return np.asarray(
@@ -223,7 +229,7 @@ def _cell_columns(columns: Floats, root: Floats, force: Floats) -> Floats:
 
 
 def _units(model: CurveModel, precision: Floats) -> Floats:
-    """Of the fit coordinates (parameters,): of contact points their prior's deviation, else 1."""
+    """Scales of the fit coordinates (parameters,): the prior's deviation of contact points, else 1."""
     units = np.ones(len(precision))
     units[model.contact_points] = 1 / precision[model.contact_points]
     return units
@@ -239,8 +245,8 @@ def _solved(
 ) -> tuple[Floats, float]:
     """The solution and half the sum of squares there.
 
-    Coordinates are shifted to the start and scaled by `unit`, so that the tolerance on steps does not depend on where
-    the displacement has its zero.
+    Coordinates are shifted to the start and scaled by `unit`, so that the tolerance on steps does not depend on the
+    zero of the displacement.
     """
     low, high = bounds
 

@@ -1,10 +1,10 @@
-"""All inner products over rows that the likelihood of predictions needs, at several points of the fit coordinates.
+"""Inner products over rows for the likelihood of predictions, at several points of the fit coordinates.
 
-A prediction is m = L u in each recording: of FRFs L is the level, which is real, and u the dynamics' factor line by
-line, 1 where there are none; of curves L = 1 and u is the force, turned such that samples are independent. With 1/d² as
-the weight of rows (of curves what whitening makes of it), the sums of each recording are Re u*u, Re u*y and |y|², and
-with the derivatives v of u, Re u*v, Re v*y and Re v*v. Arrays are (points, recordings, …). Rows that mains pick-up
-reaches weigh less, the more of it there is, and sums over rows lose as much.
+A prediction is m = L u in each recording: of FRFs L is the level, which is real, and u the factor of the dynamics on
+each line, 1 without dynamics; of curves L = 1 and u is the force, transformed so that samples are independent. With
+1/d² as the weight of rows (of curves the weight of the whitening), the sums of each recording are Re u*u, Re u*y and
+|y|², and with the derivatives v of u, Re u*v, Re v*y and Re v*v. Arrays are (points, recordings, …). Rows with mains
+pick-up weigh less, and the sums are corrected for it.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from underskin.weak_cache import cached_while_alive
 
 @dataclass(frozen=True)
 class Sums:
-    """Re u*u, Re u*y and |y|² of each recording, and what the noise levels add to the log of the determinant.
+    """Re u*u, Re u*y and |y|² of each recording, and the noise levels' contribution to log|C|.
 
     Of FRFs |y|² is that of each recording's mean: the rest is the same in all models (`Lines.about_means`).
     """
@@ -55,14 +55,14 @@ class SlopeSums:
 
 
 class PickupRows:
-    """Of all rows of the lines, those that pick-up reaches, in order of recordings.
+    """The rows that mains pick-up reaches, in order of recordings.
 
-    Attributes: `lines`, which of a model's distinct lines they are on; `line`, which of these each row is on; `every`,
-    the rows themselves.
+    Attributes: `lines`, which of a model's distinct lines they are on; `line`, the index of each row's line among
+    these; `row_numbers`, the indices of the rows.
     """
 
     def __init__(self, lines: Lines, pickup: Pickup, design: FrfDesign) -> None:
-        """The design says which distinct line each row of all is."""
+        """`design` gives the distinct line of each row."""
         rows = pickup.rows
         self._precision = lines.deviation[rows] ** -2.0
         self._value = contiguous(lines.value[rows])
@@ -71,47 +71,47 @@ class PickupRows:
         self._alike = np.arange(len(rows)) if pickup.alike is None else pickup.alike
         self.lines, line = np.unique(design.line[rows], return_inverse=True)
         self.line: Indices = line.reshape(-1)
-        self.every: Indices = np.arange(len(rows))
+        self.row_numbers: Indices = np.arange(len(rows))
 
-    def less(self, sums: Sums, line: Indices, u: Array, pickup: Floats, level: Floats) -> Sums:
-        """The sums less what rows lose to pick-up of these distinct deviations (points, sets, distinct), at the
-        directions u (points, lines) of the rows on these lines (rows,)."""
-        from underskin.diagnosis.kernels import lost
+    def without_pickup(self, sums: Sums, line: Indices, u: Array, pickup: Floats, level: Floats) -> Sums:
+        """The sums corrected for pick-up of these distinct deviations (points, sets, distinct), at the directions u
+        (points, lines) of the rows on these lines (rows,)."""
+        from underskin.diagnosis.kernels import subtract_pickup
 
         shape = *level.shape[:2], self._recordings
         uu, uy, yy = (np.broadcast_to(x, shape).copy() for x in (sums.uu, sums.uy, sums.yy))
         log_determinant = np.zeros(shape[:2])
         square = np.ascontiguousarray(np.swapaxes((pickup / level) ** 2, 1, 2))
-        of_rows = self._alike, self._precision, self._recording, self._value, line
-        lost(square, *of_rows, contiguous(u.astype(complex, copy=False)), uu, uy, yy, log_determinant)
+        row_arrays = self._alike, self._precision, self._recording, self._value, line
+        subtract_pickup(square, *row_arrays, contiguous(u.astype(complex, copy=False)), uu, uy, yy, log_determinant)
         return Sums(uu, uy, yy, log_determinant[..., None])
 
-    def slopes_less(
+    def slopes_without_pickup(
         self, sums: SlopeSums, line: Indices, u: Array, v: Array, pickup: Floats, level: Floats
     ) -> SlopeSums:
-        """The sums with derivatives v (points, parameters, lines) less what rows lose, likewise; deviations are
-        (points, distinct), levels (points,)."""
-        from underskin.diagnosis.kernels import slopes_lost
+        """The sums with derivatives v (points, parameters, lines), corrected likewise; deviations are (points,
+        distinct), levels (points,)."""
+        from underskin.diagnosis.kernels import subtract_pickup_slopes
 
         square = contiguous((pickup / level[:, None]) ** 2)
-        of_rows = self._alike, self._precision, self._recording, self._value, line
+        row_arrays = self._alike, self._precision, self._recording, self._value, line
         directions = (contiguous(x.astype(complex, copy=False)) for x in (u, v))
         uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
-        slopes_lost(square, *of_rows, *directions, uv, vy, vv)
+        subtract_pickup_slopes(square, *row_arrays, *directions, uv, vy, vv)
         return SlopeSums(uv, vy, vv)
 
 
-@cached_while_alive  # a diagnosis weighs dozens of models of one design
+@cached_while_alive  # a diagnosis evaluates dozens of models of one design
 def pickup_rows(lines: Lines, pickup: Pickup, design: FrfDesign) -> PickupRows:
-    """Those of these lines that a pick-up reaches, for models of this design."""
+    """The rows of these lines that a pick-up reaches, for models of this design."""
     return PickupRows(lines, pickup, design)
 
 
 class CurveLines:
-    """The measured samples of curves, turned to where their covariance is diagonal."""
+    """The measured samples of curves, transformed so that their covariance is diagonal."""
 
     def __init__(self, lines: Lines) -> None:
-        """Turn them; needs the lines' smooth error."""
+        """Transform them; the lines must have a smooth error."""
         assert lines.whitening is not None
         self.whitening = lines.whitening
         self.first = lines.first
@@ -125,7 +125,7 @@ class CurveLines:
 
 @dataclass(frozen=True)
 class CurveProducts:
-    """Of curves: forces (points, samples) and derivatives (points, parameters, samples) on turned samples."""
+    """Of curves: forces (points, samples) and derivatives (points, parameters, samples) on transformed samples."""
 
     lines: CurveLines
     force: Floats
@@ -159,37 +159,37 @@ class CurveProducts:
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
-        taken = _Taken(self.lines, levels)
+        woodbury = _WoodburyProducts(self.lines, levels)
         force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
-        by_force, by_measured = taken.along(force), taken.along(measured)
-        uu = taken.products(force, force, by_force, by_force)
-        uy = taken.products(force, measured, by_force, by_measured)
-        yy = taken.products(measured, measured, by_measured, by_measured)
-        return Sums(uu, uy, yy, taken.log_determinant)
+        by_force, by_measured = woodbury.projections(force), woodbury.projections(measured)
+        uu = woodbury.products(force, force, by_force, by_force)
+        uy = woodbury.products(force, measured, by_force, by_measured)
+        yy = woodbury.products(measured, measured, by_measured, by_measured)
+        return Sums(uu, uy, yy, woodbury.log_determinant)
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives, at the first of the sets of noise levels."""
         slopes = self.force_slopes
         assert slopes is not None
-        taken = _Taken(self.lines, levels.at_first)
+        woodbury = _WoodburyProducts(self.lines, levels.at_first)
         force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
-        by_slopes = taken.along(slopes)  # (points, parameters, recordings, columns)
-        uv = taken.products(slopes, force, by_slopes, taken.along(force))
-        vy = taken.products(slopes, measured, by_slopes, taken.along(measured))
-        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), taken.squares(slopes, by_slopes))
+        by_slopes = woodbury.projections(slopes)  # (points, parameters, recordings, columns)
+        uv = woodbury.products(slopes, force, by_slopes, woodbury.projections(force))
+        vy = woodbury.products(slopes, measured, by_slopes, woodbury.projections(measured))
+        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), woodbury.squares(slopes, by_slopes))
 
-    def of_rows(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
+    def with_force_changes(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
         """Re u*J (recordings, P) and Re JᵀJ (P, P) of changes of the force J (P, samples), at the first point and set
         of noise levels."""
-        taken = _Taken(self.lines, levels.at_first)
+        woodbury = _WoodburyProducts(self.lines, levels.at_first)
         turned, force = self.lines.whitening.turned(rows)[None], self.force[:1, None]
-        by_rows = taken.along(turned)
-        along = taken.products(turned, force, by_rows, taken.along(force))
-        return along[0].T, taken.squares(turned, by_rows)[0].sum(axis=0)
+        by_rows = woodbury.projections(turned)
+        by_force_changes = woodbury.products(turned, force, by_rows, woodbury.projections(force))
+        return by_force_changes[0].T, woodbury.squares(turned, by_rows)[0].sum(axis=0)
 
 
-class _Taken:
-    """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity; what P takes out of them."""
+class _WoodburyProducts:
+    """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity."""
 
     def __init__(self, lines: CurveLines, levels: SeveralLevels) -> None:
         """At noise levels (points, sets, 1)."""
@@ -197,47 +197,47 @@ class _Taken:
         self._lines = lines
         self.weight = lines.whitening.weight(ratio)  # (points, sets, rows)
         count = len(lines.columns)
-        one, other = np.triu_indices(count)
-        square = lines.sums(self.weight[..., None, :] * (lines.columns[one] * lines.columns[other]))
+        first, second = np.triu_indices(count)
+        square = lines.sums(self.weight[..., None, :] * (lines.columns[first] * lines.columns[second]))
         matrix = np.empty((*square.shape[:-2], square.shape[-1], count, count))
-        matrix[..., one, other] = matrix[..., other, one] = np.moveaxis(square, -2, -1)
+        matrix[..., first, second] = matrix[..., second, first] = np.moveaxis(square, -2, -1)
         level = levels.level[..., None, None] ** 2
-        whole = matrix + level * np.eye(count)
-        self.inverse = np.linalg.inv(whole)  # (points, sets, recordings, columns, columns)
-        _, log = np.linalg.slogdet(whole / level)
+        capacitance = matrix + level * np.eye(count)
+        self.inverse = np.linalg.inv(capacitance)  # (points, sets, recordings, columns, columns)
+        _, log = np.linalg.slogdet(capacitance / level)
         self.log_determinant = lines.whitening.log_determinant(ratio) + log.sum(axis=-1, keepdims=True)
 
-    def along(self, rows: Floats) -> Floats:
-        """Pᵀ times turned rows (points, sets, rows): (points, sets, recordings, columns)."""
+    def projections(self, rows: Floats) -> Floats:
+        """Pᵀ times transformed rows (points, sets, rows): (points, sets, recordings, columns)."""
         weighed = (self.weight * rows)[..., None, :] * self._lines.columns
         return np.moveaxis(self._lines.sums(weighed), -2, -1)
 
     def squares(self, rows: Floats, by_rows: Floats) -> Floats:
-        """Of turned rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
+        """Of transformed rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
         edges = [*self._lines.first, rows.shape[-1]]
         weighed = self.weight * rows
-        whole = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
+        unprojected = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
         columns = np.moveaxis(by_rows, 1, 2)  # (points, recordings, P, columns)
-        return np.asarray(np.stack(whole, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
+        return np.asarray(np.stack(unprojected, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
 
     def products(self, rows: Floats, others: Floats, by_rows: Floats, by_others: Floats) -> Floats:
-        """Of turned rows (points, sets, rows) of each recording."""
-        whole = self._lines.sums(self.weight * rows * others)
-        less = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
-        return np.asarray(whole - less)
+        """Of transformed rows (points, sets, rows) of each recording."""
+        unprojected = self._lines.sums(self.weight * rows * others)
+        projected = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
+        return np.asarray(unprojected - projected)
 
 
-_LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, from which on a block is dense
+_LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, above which blocks are dense
 
 
 class FrfLines:
-    """The measured lines of FRFs as sums of what a model's distinct lines have over the rows of each recording.
+    """The measured lines of FRFs, as weighted sums over the rows of each recording.
 
-    `weight` are those with 1/d², `real` and `imag` with the parts of y/d²; `uu`, `uy` and `yy` are sums for u = 1.
+    `weight` are sums with 1/d², `real` and `imag` with the parts of y/d²; `uu`, `uy` and `yy` are the sums for u = 1.
     """
 
     def __init__(self, lines: Lines, design: FrfDesign) -> None:
-        """Place the weights; the design says which distinct line each row is."""
+        """`design` gives the distinct line of each row."""
         weight = lines.deviation**-2.0
         rows = weight, weight * lines.value.real, weight * lines.value.imag
         self.weight, self.real, self.imag = (RowSums(values, lines, design) for values in rows)
@@ -246,11 +246,10 @@ class FrfLines:
 
 
 class RowSums:
-    """Sums over the rows of each recording, each row with a weight: of values on distinct lines (…, lines), (…,
-    recordings).
+    """Weighted sums over the rows of each recording: of values on distinct lines (…, lines), (…, recordings).
 
-    A contact's distinct lines stand together, so its recordings are a block of one matrix. Where blocks are large and
-    full they are dense.
+    A contact's distinct lines are contiguous, so its recordings are a block of one matrix. Blocks are dense where they
+    are large and full, else the matrix is sparse.
     """
 
     def __init__(self, weight: Floats, lines: Lines, design: FrfDesign) -> None:
@@ -262,12 +261,17 @@ class RowSums:
         self._recordings = lines.recordings
         self._blocks: list[tuple[Indices, slice, Floats]] = []
         contact = design.line_contact[design.line[lines.first]]
-        own = [np.flatnonzero(contact == number) for number in np.unique(contact)]
+        members = [np.flatnonzero(contact == number) for number in np.unique(contact)]
         edges = np.searchsorted(design.line_contact, [*np.unique(contact), contact.max() + 1])
         spans = [slice(low, high) for low, high in pairwise(edges.tolist())]
-        numbers = sum(len(some) * (span.stop - span.start) for some, span in zip(own, spans, strict=True))
-        if len(weight) > max(_LARGE * len(own), _FULL * numbers):
-            self._blocks = [(some, span, _block(sparse, some, span)) for some, span in zip(own, spans, strict=True)]
+        numbers = sum(
+            len(recordings) * (span.stop - span.start) for recordings, span in zip(members, spans, strict=True)
+        )
+        if len(weight) > max(_LARGE * len(members), _FULL * numbers):
+            self._blocks = [
+                (recordings, span, _block(sparse, recordings, span))
+                for recordings, span in zip(members, spans, strict=True)
+            ]
         else:
             self._sparse = sparse
 
@@ -287,7 +291,7 @@ def _block(sparse: csr_array, recordings: Indices, span: slice) -> Floats:
     return np.ascontiguousarray(sparse[recordings][:, span].toarray())
 
 
-@cached_while_alive  # a diagnosis weighs dozens of models of one design
+@cached_while_alive  # a diagnosis evaluates dozens of models of one design
 def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
     """The matrices of these lines for models of this design."""
     return FrfLines(lines, design)
@@ -295,7 +299,7 @@ def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
 
 @dataclass(frozen=True)
 class FrfProducts:
-    """Of FRFs; `turning` is None where u is 1, or where no derivatives were asked for."""
+    """Of FRFs; `turning`, the sums with derivatives of u, is None where u is 1 or derivatives were not requested."""
 
     yy: Floats  # (recordings,)
     uu: Floats  # (points, recordings)
@@ -308,13 +312,13 @@ class FrfProducts:
 
     @classmethod
     def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
-        """Of a model's response at several points, and the rows that its pick-up reaches."""
+        """Of a model's response at several points, with the rows of its pick-up."""
         level, factor = response.level, response.lines
         slopes = level.slopes.transpose(1, 2, 0) if len(level.slopes) else None
         uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
         turning = None
         if factor is not None:
-            uu, uy, turning = _turned(lines, factor.value, factor.slopes.transpose(1, 0, 2))
+            uu, uy, turning = _products_of_factor(lines, factor.value, factor.slopes.transpose(1, 0, 2))
             turning = None if slopes is None else turning
         of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
         return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
@@ -324,14 +328,14 @@ class FrfProducts:
 
     def __getitem__(self, points: Array | slice) -> Self:
         """At some of the points."""
-        place, slopes = self.place_slopes, self.level_slopes
+        position_slopes, level_slopes = self.place_slopes, self.level_slopes
         return replace(
             self,
             uu=self.uu[points],
             uy=self.uy[points],
             level=self.level[points],
-            level_slopes=None if slopes is None else slopes[points],
-            place_slopes=None if place is None else place[:, points],
+            level_slopes=None if level_slopes is None else level_slopes[points],
+            place_slopes=None if position_slopes is None else position_slopes[:, points],
             turning=None if self.turning is None else self.turning[points],
             pickup=None if self.pickup is None else self.pickup[points],
         )
@@ -344,8 +348,8 @@ class FrfProducts:
 
     @classmethod
     def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
-        """At the points of several, one after another, with so many parameters in all."""
-        filled = [part.filled(parameters, turning=any(one.turning for one in parts)) for part in parts]
+        """At the points of several, one after another, padded to so many parameters."""
+        filled = [part.filled(parameters, turning=any(other.turning for other in parts)) for part in parts]
 
         def of(name: str, axis: int = 0) -> Any:
             values = [getattr(part, name) for part in filled]
@@ -364,47 +368,47 @@ class FrfProducts:
         )
 
     def filled(self, parameters: int, *, turning: bool) -> Self:
-        """With derivatives that are 0 by further parameters, so many in all, also those of u where it has none."""
+        """With zero derivatives by further parameters, `parameters` in all; also those of u if `turning`."""
         slopes = self.level_slopes
         if slopes is None:
             return self
         further = parameters - slopes.shape[-1]
         slopes = np.pad(slopes, ((0, 0), (0, 0), (0, further))) if further else slopes
-        own = self.turning
-        if own is None:
+        slope_sums = self.turning
+        if slope_sums is None:
             none = np.zeros_like(slopes)
-            own = (
+            slope_sums = (
                 SlopeSums(none, none, np.broadcast_to(none[..., None], (*none.shape, parameters))) if turning else None
             )
         elif further:
-            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (own.uv, own.vy))
-            own = SlopeSums(uv, vy, np.pad(own.vv, ((0, 0), (0, 0), (0, further), (0, further))))
+            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (slope_sums.uv, slope_sums.vy))
+            slope_sums = SlopeSums(uv, vy, np.pad(slope_sums.vv, ((0, 0), (0, 0), (0, further), (0, further))))
         pickup = None if self.pickup is None else self.pickup.filled(parameters)
-        return replace(self, level_slopes=slopes, turning=own, pickup=pickup)
+        return replace(self, level_slopes=slopes, turning=slope_sums, pickup=pickup)
 
     def scaled(self, factor: Floats) -> Self:
-        """Of levels so many times as large (points,)."""
-        by = factor[:, None]
-        slopes = None if self.level_slopes is None else self.level_slopes * by[..., None]
-        place = None if self.place_slopes is None else self.place_slopes * by
-        return replace(self, level=self.level * by, level_slopes=slopes, place_slopes=place)
+        """With levels multiplied by `factor` (points,)."""
+        column = factor[:, None]
+        level_slopes = None if self.level_slopes is None else self.level_slopes * column[..., None]
+        position_slopes = None if self.place_slopes is None else self.place_slopes * column
+        return replace(self, level=self.level * column, level_slopes=level_slopes, place_slopes=position_slopes)
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
         sums = Sums(self.uu[:, None], self.uy[:, None], self.yy, 0.0)
-        return sums if self.pickup is None else self.pickup.less(sums, levels)
+        return sums if self.pickup is None else self.pickup.without_pickup(sums, levels)
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums | None:
         """The sums with derivatives, at the first of the sets of noise levels; None where u is 1."""
         if self.pickup is None or self.turning is None:
             return self.turning
-        return self.pickup.slopes_less(self.turning, levels)
+        return self.pickup.slopes_without_pickup(self.turning, levels)
 
 
 @dataclass(frozen=True)
 class PickupProducts:
-    """On the distinct lines of the rows that pick-up reaches u (points, lines) and v (points, parameters, lines), None
-    where it is 0; `line` says which of them each row is on."""
+    """u (points, lines) and v (points, parameters, lines) on the distinct lines of the rows with pick-up; v is None
+    where it is 0. `line` is the index of each row's line."""
 
     rows: PickupRows
     line: Indices
@@ -440,40 +444,42 @@ class PickupProducts:
     def _on_rows(self) -> Self:
         return replace(
             self,
-            line=self.rows.every,
+            line=self.rows.row_numbers,
             u=self.u[:, self.line],
             v=None if self.v is None else self.v[..., self.line],
         )
 
     def filled(self, parameters: int) -> Self:
-        """With derivatives that are 0 by further parameters, so many in all."""
+        """With zero derivatives by further parameters, `parameters` in all."""
         v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1]), dtype=complex) if self.v is None else self.v
         return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
 
-    def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
-        """The sums less what rows lose to pick-up."""
+    def without_pickup(self, sums: Sums, levels: SeveralLevels) -> Sums:
+        """The sums corrected for pick-up."""
         assert levels.pickup is not None
-        return self.rows.less(sums, self.line, self.u, levels.pickup, levels.level)
+        return self.rows.without_pickup(sums, self.line, self.u, levels.pickup, levels.level)
 
-    def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
-        """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
+    def slopes_without_pickup(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
+        """The sums with derivatives corrected for pick-up, at the first of the sets of noise levels."""
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        return self.rows.slopes_less(sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
+        return self.rows.slopes_without_pickup(
+            sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0]
+        )
 
 
-def _turned(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
+def _products_of_factor(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
     """Re u*u, Re u*y and the sums with the derivatives v of u (points, parameters, lines)."""
     from underskin.diagnosis.kernels import line_products, spread_sums
 
     moving, count = np.flatnonzero(slopes.any(axis=(0, 2))), slopes.shape[1]
     points, several = len(u), 1 + len(moving)
-    each = np.empty((points, several, u.shape[1]), dtype=complex)
-    each[:, 0], each[:, 1:] = u, slopes[:, moving]
+    functions = np.empty((points, several, u.shape[1]), dtype=complex)
+    functions[:, 0], functions[:, 1:] = u, slopes[:, moving]
     products = np.empty((points, several * (several + 1) // 2, u.shape[1]))
-    real, imag = np.empty(each.shape), np.empty(each.shape)
-    line_products(each, products, real, imag)
+    real, imag = np.empty(functions.shape), np.empty(functions.shape)
+    line_products(functions, products, real, imag)
     both = np.ascontiguousarray(lines.weight(products))
     with_y = np.ascontiguousarray(lines.real(real) + lines.imag(imag))
     recordings = both.shape[-1]
@@ -487,7 +493,7 @@ Products = FrfProducts | CurveProducts
 
 
 def joined(parts: Sequence[Products], parameters: int) -> Products:
-    """Products of models of the same recordings one after another, their parameters filled up to so many."""
+    """Products of models of the same recordings one after another, padded to so many parameters."""
     if len(parts) == 1:
         return parts[0]
     curves = [part for part in parts if isinstance(part, CurveProducts)]

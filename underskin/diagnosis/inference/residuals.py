@@ -1,20 +1,14 @@
-"""What an explanation leaves, what its parameters take up, and what could hide behind it.
+"""Residuals of an explanation, changes of the force beyond its parameters, and parameters that it may hide.
 
-Measured against the base model: each recording's gain residual, each line's residual, and how uncertain they are.
-
-The residual of a recording is what it lies above its model, relative; that of a line is what it lies above its own
-recording's best real multiple of the model: a recording's lines share one gain error, so their mean and their shape are
-kept apart.
-
-What a fit to curves takes up of changes of the force: their χ², and what is left beside the parameters.
-
-What a parameter would be if one more mechanism were there that the recordings hardly tell from it.
-
-A glue line that slips by the same share under every sphere only changes d33: it does not show, and a fit without it is
-as good. At places spread evenly over such a mechanism's prior all else is fitted again, the noise levels as well; each
-counts by the evidence that it leaves. Where the sensors' spread is free, the parameter is averaged over it at each.
-
-What the declared values of a skin may be off by, in d33.
+- The residual of a recording is its relative deviation from the model; that of a line its deviation from its
+  recording's best real multiple of the model. The lines of a recording share one gain error, so level and shape are
+  kept apart.
+- Changes of the force of curves: their χ² after projection on the fitted parameters.
+- A mechanism may be present without being visible: a glue line that slips by the same share under every sphere only
+  changes d33. The posterior of a parameter with that mechanism added is a mixture over values spread evenly over its
+  prior, at each of which everything else is fitted again, each weighted by its evidence. Where the sensors' spread is
+  free, the parameter is averaged over it at each value.
+- The uncertainty of d33 by the tolerances of a skin's declared values.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +24,7 @@ from underskin.diagnosis.inference.evidence import (
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, own_places
+from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, parameter_slices
 from underskin.diagnosis.inference.products import CurveProducts
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
@@ -44,7 +38,7 @@ from underskin.units import Array, Floats, Indices, to_si
 
 @dataclass(frozen=True)
 class Residuals:
-    """Against one explanation's most probable parameters."""
+    """Residuals at an explanation's most probable parameters."""
 
     gain: Floats  # (recordings,) relative
     gain_deviation: Floats  # (recordings,) expected sd: gain scatter, positioning and lines
@@ -52,18 +46,18 @@ class Residuals:
     line_weight: Floats  # (rows,) 1/variance of real and of imaginary part
 
 
-def whole_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
-    """The explanation's prediction on all lines."""
+def row_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
+    """The explanation's prediction on all rows."""
     value: Array = explanation.best.prediction.value
     return value if len(value) == len(problem.lines.value) else value[problem.lines.recording]
 
 
 def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[Array, Floats]:
-    """Each line over its recording's own best real multiple of the model, less 1, and its weight 1/variance.
+    """Each line divided by its recording's best real multiple of the model, minus 1, and its weight 1/variance.
 
-    The variance is that before the noise's level; mains pick-up adds to it.
+    The variance excludes the noise's level; mains pick-up adds to it.
     """
-    lines, prediction, best = problem.lines, whole_prediction(problem, explanation), explanation.best
+    lines, prediction, best = problem.lines, row_prediction(problem, explanation), explanation.best
     first = lines.first
     further = 0.0 if best.prediction.pickup_rows is None else best.pickup_variance / best.levels.level**2
     precision = 1 / (lines.deviation**2 + further)
@@ -75,19 +69,19 @@ def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[A
 
 
 def residuals(problem: FittingProblem, explanation: Explanation, gain: float, position: float) -> Residuals:
-    """The residuals, with the scatters that are expected of them: `gain` (relative) and `position` [m]."""
+    """The residuals, with their expected scatters: `gain` (relative) and `position` [m]."""
     lines = problem.lines
-    prediction = whole_prediction(problem, explanation)
+    prediction = row_prediction(problem, explanation)
     precision = lines.deviation**-2
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
     relative = explanation.best.relative_place_slopes
-    has_position_scatter = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
+    position_variance = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
     line, weight = line_residuals(problem, explanation)
-    return Residuals(along / size - 1, np.sqrt(gain**2 + has_position_scatter + 1 / size), line, weight)
+    return Residuals(along / size - 1, np.sqrt(gain**2 + position_variance + 1 / size), line, weight)
 
 
-_FLAT = 1e-3  # of a parameter's bounds: deviations of the least prior, for those that change nothing
+_FLAT = 1e-3  # of a parameter's bounds: weakest prior, for parameters without effect
 
 
 def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
@@ -99,122 +93,130 @@ def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
 
 
 def precision_of(hypothesis: Hypothesis) -> Floats:
-    """Of the parameters' priors (parameters,)."""
+    """Precisions of the parameters' priors (parameters,)."""
     return np.asarray(hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
 
 
 def information(explanation: Explanation, rows: Floats, noise: Explanation | None = None) -> Floats:
-    """Jᵀ C⁻¹ J of changes of the force J (changes, samples) under the noise that the explanation, or another, found."""
+    """Jᵀ C⁻¹ J of changes of the force J (changes, samples), under the noise of the explanation or of another one."""
     fitter = Fitter([explanation.best.hypothesis])
     covariance = (noise or explanation).point.covariance
     at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)))
     levels = fitter.levels(at.points.covariance[:, None])
     assert isinstance(at.products, CurveProducts)
-    along, square = at.products.of_rows(rows, levels)
+    along, square = at.products.with_force_changes(rows, levels)
     likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.sensor_log_gain)
     level2 = float(levels.level.flat[0]) ** 2
     return np.asarray(likelihood.information(along[None] / level2, square[None] / level2)[0])
 
 
-def beside(whole: Floats, places: Indices, precision: Floats) -> Floats:
-    """Of the `information` of parameters and further changes that of these changes (changes, changes), less what the
-    parameters at `places` take up; `precision` of all parameters (parameters,)."""
+def information_beyond(full: Floats, indices: Indices, precision: Floats) -> Floats:
+    """Information (changes, changes) on the changes after projection on the parameters.
+
+    `full` is the `information` on parameters and further changes, `indices` those of the parameters to project on,
+    `precision` that of all parameters (parameters,).
+    """
     first = len(precision)
-    own = whole[np.ix_(places, places)] + np.diag(precision[places])
-    shared = whole[first:, places]
-    return np.asarray(whole[first:, first:] - shared @ np.linalg.solve(own, shared.T))
+    block = full[np.ix_(indices, indices)] + np.diag(precision[indices])
+    shared = full[first:, indices]
+    return np.asarray(full[first:, first:] - shared @ np.linalg.solve(block, shared.T))
 
 
-_PLACES = {0: 1, 1: 12, 2: 24}  # for so many parameters
-_MOST_PLACES = 48
-_MOST = 600.0  # nats that shares tell: e to the power of 710 is more than a float holds
-_COUNTS = 6.0  # nats behind the fit without the mechanism within which a place counts
+_NODES = {0: 1, 1: 12, 2: 24}  # by number of parameters
+_MOST_NODES = 48
+_MOST = 600.0  # nats of the largest share: exp(710) overflows
+_NEGLIGIBLE_NATS = 6.0  # nats behind the fit without the mechanism beyond which a node is negligible
 
 
-def with_unseen(problem: FittingProblem, explanation: Explanation, name: str, parameter: str) -> NormalMixture | None:
-    """A parameter of the model with one more mechanism, each share relative to the explanation without it, e^600 at
-    most.
+def with_hidden_mechanism(
+    problem: FittingProblem, explanation: Explanation, name: str, parameter_name: str
+) -> NormalMixture | None:
+    """A parameter of the model with one more mechanism, each share relative to the explanation without it, at most
+    e^600.
 
     None where the recordings do not support the mechanism, or it moves no prediction.
     """
-    best, known = explanation.best, problem.lines.mechanisms
-    names = tuple(entry for entry in known if entry in {*explanation.names, name})
-    if not known[name].moves_predictions:
+    best, catalogue = explanation.best, problem.lines.mechanisms
+    names = tuple(mechanism for mechanism in catalogue if mechanism in {*explanation.names, name})
+    if not catalogue[name].moves_predictions:
         return None
     try:
         hypothesis = problem.hypothesis(names, best.hypothesis.has_position_scatter)
     except (Unsupported, InvalidInput):
         return None
-    places = own_places(names, hypothesis.lines)
-    new = range(places[name].start, places[name].stop)
-    if any(len(explanation.own(one)) != places[one].stop - places[one].start for one in explanation.names):
-        return None  # beside it another mechanism has other parameters
-    entries = [hypothesis.model.parameters[place] for place in new]
-    levels = _evenly(len(entries))
+    slices = parameter_slices(names, hypothesis.lines)
+    new = range(slices[name].start, slices[name].stop)
+    if any(
+        len(explanation.own(mechanism)) != slices[mechanism].stop - slices[mechanism].start
+        for mechanism in explanation.names
+    ):
+        return None  # with it another mechanism has other parameters
+    parameters = [hypothesis.model.parameters[index] for index in new]
+    levels = _evenly(len(parameters))
     fit = np.zeros((len(levels), len(hypothesis.model.parameters)))
-    fit[:, hypothesis.own_parameters :] = best.point.fit[best.hypothesis.own_parameters :]
-    for one in explanation.names:
-        fit[:, places[one]] = explanation.own(one)
-    for column, entry in zip(new, entries, strict=True):
-        fit[:, column] = [entry.quantile(level) for level in levels[:, column - new.start].tolist()]
+    fit[:, hypothesis.mechanism_parameter_count :] = best.point.fit[best.hypothesis.mechanism_parameter_count :]
+    for mechanism in explanation.names:
+        fit[:, slices[mechanism]] = explanation.own(mechanism)
+    for column, parameter in zip(new, parameters, strict=True):
+        fit[:, column] = [parameter.quantile(level) for level in levels[:, column - new.start].tolist()]
     held = Fitter([hypothesis], held=[new])
     at = _fitted(held, fit, explanation)
     if not len(at):
         return None
     values, covariances = around_mean(held, at)
-    whole = values + around_levels(held, at)
-    without = around_mean(best.fitter, best.at)[0] + around_levels(best.fitter, best.at)
-    gained = whole - without
+    log_evidence = values + around_levels(held, at)
+    reference = around_mean(best.fitter, best.at)[0] + around_levels(best.fitter, best.at)
+    gained = log_evidence - reference
     shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
-    place = [entry.name for entry in hypothesis.model.parameters].index(parameter)
-    spread = marginalise_sensor_spread(held, at, place)
+    index = [parameter.name for parameter in hypothesis.model.parameters].index(parameter_name)
+    spread = marginalise_sensor_spread(held, at, index)
     if spread is not None:
         return NormalMixture.joined(
             [normals.times(share) for normals, share in zip(spread, shares.tolist(), strict=True)]
         )
-    index = int(np.searchsorted(np.flatnonzero(held.free[0]), place))
-    deviation = np.sqrt([covariance[index, index] for covariance in covariances])
-    return NormalMixture(shares, at.points.fit[:, place], deviation)
+    row = int(np.searchsorted(np.flatnonzero(held.free[0]), index))
+    deviation = np.sqrt([covariance[row, row] for covariance in covariances])
+    return NormalMixture(shares, at.points.fit[:, index], deviation)
 
 
 def _evenly(parameters: int) -> Floats:
-    """Probabilities between 0 and 1, spread evenly over so many parameters (places, parameters)."""
-    count = _PLACES.get(parameters, _MOST_PLACES)
-    places = (np.arange(count) + 0.5) / count
+    """Probabilities between 0 and 1, spread evenly over so many parameters (nodes, parameters)."""
+    count = _NODES.get(parameters, _MOST_NODES)
+    levels = (np.arange(count) + 0.5) / count
     if parameters < 2:
-        return np.asarray(places[:, None][:, :parameters])
+        return np.asarray(levels[:, None][:, :parameters])
     others = qmc.Halton(parameters - 1, scramble=False).random(count + 1)[1:]
-    return np.column_stack([places, others])
+    return np.column_stack([levels, others])
 
 
 def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
-    """The places that count, with all that is not held fitted."""
+    """The nodes within `_NEGLIGIBLE_NATS` of the explanation, with all that is not held fitted."""
     point, cost = explanation.point, explanation.best.cost
     covariance, sensor_log_gain = (
         np.tile(values, (len(fit), 1)) for values in (point.covariance, point.sensor_log_gain)
     )
-    begun = held.evaluate(Points(np.zeros(len(fit), dtype=np.intp), fit, covariance, sensor_log_gain))
-    fitted = held.descend(begun, 1, lambda at: np.full(len(at), cost + _COUNTS))
-    return fitted[np.flatnonzero(fitted.cost < cost + _COUNTS)]
+    initial = held.evaluate(Points(np.zeros(len(fit), dtype=np.intp), fit, covariance, sensor_log_gain))
+    fitted = held.descend(initial, 1, lambda at: np.full(len(at), cost + _NEGLIGIBLE_NATS))
+    return fitted[np.flatnonzero(fitted.cost < cost + _NEGLIGIBLE_NATS)]
 
 
 def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
-    """The standard deviation of ln d33 by the skin's tolerances, beyond what its fit allows the declared values.
+    """The standard deviation of ln d33 by the skin's tolerances, beyond the priors of the fit.
 
-    A prior's centre that is off by e moves the posterior mean of ln d33 by C/s² · e: C is the covariance of ln d33 and
-    that factor, s the standard deviation of its prior. So a value that the recordings tell themselves moves nothing.
+    An error e of a prior's centre moves the posterior mean of ln d33 by C/s² · e: C is the covariance of ln d33 and
+    that factor, s the standard deviation of its prior. A value that the recordings determine therefore moves nothing.
     """
     skin = problem.lines.campaign.skin
     off = skin.tolerances or Tolerances()
     best = explanation.best
-    places = {parameter.name: place for place, parameter in enumerate(explanation.model.parameters)}
-    index = {name: best.hypothesis.mean_places.index(places[name]) for name in ("d33", "youngs_modulus", "thickness")}
+    indices = {parameter.name: index for index, parameter in enumerate(explanation.model.parameters)}
+    rows = {name: best.hypothesis.mean_indices.index(indices[name]) for name in ("d33", "youngs_modulus", "thickness")}
     variance = (_by_sensor_radius(problem) * off.sensor_radius_percent / 100) ** 2
     percents = {"youngs_modulus": off.youngs_modulus_percent, "thickness": off.thickness_percent}
     for name, percent in percents.items():
-        prior = explanation.model.parameters[places[name]].prior
+        prior = explanation.model.parameters[indices[name]].prior
         assert isinstance(prior, Normal)
-        moved = float(best.covariance[index["d33"], index[name]]) / prior.sd**2
+        moved = float(best.covariance[rows["d33"], rows[name]]) / prior.sd**2
         variance += moved**2 * max((percent / 100) ** 2 - prior.sd**2, 0.0)
     return float(np.sqrt(variance))
 
@@ -224,8 +226,8 @@ def _by_sensor_radius(problem: FittingProblem) -> float:
     campaign = problem.lines.campaign
     frfs = frf_of(campaign)
     skin = declared_skin(replace(campaign.skin, poisson_ratio=INCOMPRESSIBLE))  # as the table is
-    indenter = Indenter(to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in frfs]))
-    preload = to_si("preload_n", [entry.preload_n for entry in frfs])
+    indenter = Indenter(to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in frfs]))
+    preload = to_si("preload_n", [recording.preload_n for recording in frfs])
     slopes = log_slopes(problem.table, skin, indenter, preload)["sensor_radius"]
     inside = np.isfinite(slopes)
     return float(np.median(slopes[inside])) if inside.any() else 0.0

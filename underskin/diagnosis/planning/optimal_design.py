@@ -127,7 +127,7 @@ def _log_modulus(explanation: Explanation) -> tuple[float, float]:
     """ln of E over the declared modulus under an explanation, and its standard deviation."""
     names = [parameter.name for parameter in explanation.model.parameters]
     indices = [names.index(name) for name in _MODULUS if name in names]
-    rows = [explanation.best.hypothesis.mean_places.index(index) for index in indices]
+    rows = [explanation.best.hypothesis.mean_indices.index(index) for index in indices]
     variance = float(explanation.best.covariance[np.ix_(rows, rows)].sum())
     return float(explanation.point.fit[indices].sum()), float(np.sqrt(max(variance, 0.0)))
 
@@ -173,7 +173,7 @@ def _outlook(
         explanation = answer.explanation
         assert explanation is not None
         levels, value = explanation.best.levels, prediction.value[rows]
-        slopes = (prediction.slopes[explanation.best.hypothesis.mean_places][:, rows] / value).real
+        slopes = (prediction.slopes[explanation.best.hypothesis.mean_indices][:, rows] / value).real
         responses.append(np.log(np.abs(value)))
         unknown.append(slopes.T @ np.linalg.cholesky(explanation.best.covariance))
         variance = levels.gain**2 + (levels.level * line / np.abs(value)) ** 2

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recording_axes, way_along
+from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, path_fractions, recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
-from underskin.diagnosis.inference.residuals import whole_prediction
+from underskin.diagnosis.inference.residuals import row_prediction
 from underskin.diagnosis.localisation import axis_values
 from underskin.diagnosis.reporting.numbers import parameter_index
 from underskin.diagnosis.reporting.report import DiagnosisResult
@@ -152,7 +152,7 @@ def _shown(
         jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
     snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
     shown = _thinned(
-        way_along(sample_mm, measured, landmarks.noise), [landmarks.turn, *(at for at in jumps if at is not None)]
+        path_fractions(sample_mm, measured, landmarks.noise), [landmarks.turn, *(at for at in jumps if at is not None)]
     )
     return ShownCurve(
         name=raw.id,
@@ -251,7 +251,7 @@ def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
     """Prediction of each row [C/N], with the sensors' gains and the effect of position scatter on the mean."""
     lines, best = problem.lines, explanation.best
     gain = best.sensor_gains[lines.sensor] + 0.5 * best.levels.position**2 * problem.curvature.laplacian
-    predicted: Complexes = whole_prediction(problem, explanation) * np.exp(gain)[lines.recording]
+    predicted: Complexes = row_prediction(problem, explanation) * np.exp(gain)[lines.recording]
     return predicted
 
 
@@ -381,7 +381,7 @@ class Thinned:
         lines, best = self.lines, explanation.best
         levels = best.levels
         gains = np.exp(best.sensor_gains)[lines.sensor][lines.recording]
-        predicted = whole_prediction(self.problem, explanation) * gains
+        predicted = row_prediction(self.problem, explanation) * gains
         plain = plain_reading(self.problem, explanation, predicted.real)
         if plain is not None:
             predicted = plain[1].astype(complex)

@@ -11,7 +11,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.reporting.numbers import (
     SDS_OF_95,
     at_bounds,
@@ -159,7 +159,7 @@ def _apparent_modulus(problem: FittingProblem, explanation: Explanation) -> dict
 
 def _product(explanation: Explanation, indices: Sequence[int]) -> dict[str, float | None]:
     """The product of parameters on a logarithmic scale, with its 95 % interval."""
-    rows = [explanation.best.hypothesis.mean_places.index(index) for index in indices]
+    rows = [explanation.best.hypothesis.mean_indices.index(index) for index in indices]
     middle = float(explanation.point.fit[list(indices)].sum())
     half = SDS_OF_95 * float(np.sqrt(explanation.best.covariance[np.ix_(rows, rows)].sum()))
     return {
@@ -269,7 +269,7 @@ def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any
         parameters = [
             _of_elastomer(parameter_with_interval(explanation, parameter_index(explanation, "youngs_modulus")), curves)
         ]
-        for span in own_places(explanation.names, explanation.best.hypothesis.lines).values():
+        for span in parameter_slices(explanation.names, explanation.best.hypothesis.lines).values():
             parameters += [parameter_with_interval(explanation, index) for index in range(span.start, span.stop)]
         rows += [{"kind": kind.kind, **_row(parameter)} for parameter in parameters]
     first_modulus = _modulus_of_first_kind(joined)
@@ -296,7 +296,7 @@ def _modulus_of_first_kind(joined: KindsTogether) -> dict[str, Any] | None:
         return {**kind, **_row(parameter_with_interval(explanation, parameter_index(explanation, "youngs_modulus")))}
     if _MODULUS_ERROR not in explanation.names:
         return None
-    index = own_places(explanation.names, explanation.best.hypothesis.lines)[_MODULUS_ERROR].start
+    index = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[_MODULUS_ERROR].start
     factor = parameter_with_interval(explanation, index)
     ends = {key: rounded(declared * factor[key]) for key in ("value", "low", "high")}
     return {**kind, "parameter": "youngs_modulus", "unit": "MPa", **ends}
@@ -344,7 +344,7 @@ def mechanisms_of_curves(joined: KindsTogether, names: Sequence[str], leading: S
 
 
 def _of_mechanism(name: str, explanation: Explanation, without: Explanation) -> dict[str, Any]:
-    span = own_places(explanation.names, explanation.best.hypothesis.lines)[name]
+    span = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[name]
     misfit, misfit_without = (_misfit_square(candidate) for candidate in (explanation, without))
     return {
         "name": name,

@@ -27,8 +27,8 @@ from underskin.diagnosis.inference.evidence import (
 )
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.inference.residuals import declared_d33, residuals, whole_prediction, with_unseen
+from underskin.diagnosis.inference.hypothesis import parameter_slices
+from underskin.diagnosis.inference.residuals import declared_d33, residuals, row_prediction, with_hidden_mechanism
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, declared_laws
 from underskin.findings.codes import Reason
@@ -89,7 +89,7 @@ def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, A
         row = [other.name for other in best.hypothesis.covariance].index(parameter.name)
         variance = float(levels_covariance(best.fitter.covariance_equations(best.at)[1][0])[row, row])
     else:
-        row = best.hypothesis.mean_places.index(index)
+        row = best.hypothesis.mean_indices.index(index)
         variance = float(explanation.best.covariance[row, row])
     half_width = SDS_OF_95 * np.sqrt(max(variance, 0.0))
     low, high = parameter.bounds
@@ -127,7 +127,7 @@ def without_effect(explanation: Explanation) -> list[str]:
     A strength is a parameter with such a value (`limit`); on a logarithmic scale none reaches 0 or ∞.
     """
     idle = []
-    for name, span in own_places(explanation.names, explanation.best.hypothesis.lines).items():
+    for name, span in parameter_slices(explanation.names, explanation.best.hypothesis.lines).items():
         indices = range(span.start, span.stop)
         strengths = [index for index in indices if explanation.model.parameters[index].limit is not None]
         if strengths and all(_holds_limit(explanation, index) for index in strengths):
@@ -148,7 +148,7 @@ def _absolute(explanation: Explanation, index: int, multiples: list[float]) -> l
     best, parameter = explanation.best, explanation.model.parameters[index]
     assert parameter.relative_to is not None
     other = parameter_index(explanation, parameter.relative_to)
-    rows = [best.hypothesis.mean_places.index(i) for i in (index, other)]
+    rows = [best.hypothesis.mean_indices.index(i) for i in (index, other)]
     deviation = float(np.sqrt(max(best.covariance[np.ix_(rows, rows)].sum(), 0.0)))
     unit = float(np.exp(explanation.point.fit[other]))
     factor = np.exp(SDS_OF_95 * deviation)
@@ -187,7 +187,7 @@ class AtBound:
 
 def at_bounds(explanation: Explanation) -> Sequence[AtBound]:
     """Parameters at bounds: those of an explanation's mechanisms, d33, and an undeclared modulus."""
-    spans = own_places(explanation.names, explanation.best.hypothesis.lines)
+    spans = parameter_slices(explanation.names, explanation.best.hypothesis.lines)
     mechanisms = explanation.best.hypothesis.lines.mechanisms
     owner = {index: mechanisms[name] for name, span in spans.items() for index in range(span.start, span.stop)}
     bounds = []
@@ -229,9 +229,9 @@ def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
         for mechanism_names in (names, other_names)
     )
     fit = np.zeros(len(without.model.parameters))
-    for name, span in own_places(other_names, without.lines).items():
+    for name, span in parameter_slices(other_names, without.lines).items():
         fit[span] = explanation.own(name)
-    fit[without.own_parameters :] = explanation.point.fit[with_law.own_parameters :]
+    fit[without.mechanism_parameter_count :] = explanation.point.fit[with_law.mechanism_parameter_count :]
     here, there = (
         np.abs(hypothesis.frf_model.predict(at, slopes=False, place=False).value)
         for hypothesis, at in ((with_law, explanation.point.fit), (without, fit))
@@ -365,7 +365,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
     best = explanation.best
     spread = marginalise_sensor_spread(best.fitter, best.at, index)
     if spread is None:
-        row = best.hypothesis.mean_places.index(index)
+        row = best.hypothesis.mean_indices.index(index)
         deviation = np.sqrt(best.covariance[row, row])
         spread = [NormalMixture(np.ones(1), explanation.point.fit[index : index + 1], np.array([deviation]))]
     several = list(spread)
@@ -376,7 +376,9 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
         others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in sets_of_answers]
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
         for name in others:
-            with_mechanism = None if name in explanation.names else with_unseen(problem, explanation, name, "d33")
+            with_mechanism = (
+                None if name in explanation.names else with_hidden_mechanism(problem, explanation, name, "d33")
+            )
             if with_mechanism is not None:  # a law that declared facts imply has even odds, weighted by its fit
                 several.append(
                     with_mechanism
@@ -413,13 +415,13 @@ def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict
     leader = search.answers[0]
     if leader.explanation is None or not leader.explanation.names or leader.probability >= EXPLAINED:
         return None
-    predicted = whole_prediction(problem, leader.explanation)
+    predicted = row_prediction(problem, leader.explanation)
     size = float((np.abs(predicted) ** 2).sum())
     total, rivals, furthest = leader.probability, [], 0.0
     for answer in search.answers[1:]:
         if answer.explanation is None or answer.probability < _COUNTS or not answer.explanation.names:
             continue
-        off = np.abs(whole_prediction(problem, answer.explanation) - predicted) ** 2
+        off = np.abs(row_prediction(problem, answer.explanation) - predicted) ** 2
         percent = 100 * float(np.sqrt(off.sum() / size))
         if percent < _ALIKE * floor_percent:
             total += answer.probability
@@ -469,7 +471,7 @@ def _probability(answer: Answer, problem: FittingProblem, name: str, stated: Col
     if answer.probability < _LEAST_ASKED or with_law in stated:
         return 0.0
     measured = "youngs_modulus" if problem.lines.curves else "d33"
-    normals = with_unseen(problem, answer.explanation, name, measured)
+    normals = with_hidden_mechanism(problem, answer.explanation, name, measured)
     odds = 0.0 if normals is None else float(normals.share.sum())
     return answer.probability * odds / (1 + odds)
 

@@ -20,7 +20,7 @@ import plotly.io as pio
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.reporting.figure_data import CurvePrediction, Mark, ShownCurve, ShownFrf
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, multiple_of
 from underskin.diagnosis.reporting.page_styles import (
@@ -431,13 +431,13 @@ def _percent(value: float) -> str:
 
 
 _MARGIN = 1.0  # of an interval, on either side of it
-_ROW, _BETWEEN = 140, 0.73  # height of a parameter's row [pixels], and the share of it for labels
+_ROW, _SPACING = 140, 0.73  # height of a parameter's row [pixels], and the share of it for labels
 _TITLE = 13  # pixels
 
 
 def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
     """Each parameter's 95 % interval in its unit; that of its prior is in words, since drawn it would dwarf it."""
-    spans = own_places(shown.names, problem.lines)
+    spans = parameter_slices(shown.names, problem.lines)
     rows = [
         (mechanism["name"], parameter, prior, multiple_of(shown, prior))
         for mechanism in document["mechanisms"]
@@ -449,7 +449,7 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
         f"{name.replace('_', ' ')}<br>{_labelled(parameter)}<br><sup>{_before(prior, scale, parameter['unit'])}</sup>"
         for name, parameter, prior, scale in rows
     ]
-    figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_BETWEEN / len(rows))
+    figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_SPACING / len(rows))
     figure.update_annotations(font_size=_TITLE)
     for panel, (_, parameter, *_) in enumerate(rows, start=1):
         low, high = parameter["low"], parameter["high"]

@@ -11,7 +11,7 @@ from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.localisation import AxisResult, EffectSize, Shape, reaches_all_along
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import goodness_of_fit, numbers, statements
@@ -304,7 +304,7 @@ def _not_tried(
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
-    spans = own_places(explanation.names, explanation.best.hypothesis.lines)
+    spans = parameter_slices(explanation.names, explanation.best.hypothesis.lines)
     score = cross_validation.in_sample(problem, explanation)
     probabilities = numbers.present(search, problem)
     return [

@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter_with_interval, rounded
 from underskin.diagnosis.selection.answers import Search
@@ -125,8 +125,8 @@ class LeadingLaw:
 
     def variance(self, x: Floats) -> Floats:
         """Variance of the change, from the covariance of the law's parameters."""
-        span = own_places(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
-        mean = self.explanation.best.hypothesis.mean_places
+        span = parameter_slices(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
+        mean = self.explanation.best.hypothesis.mean_indices
         rows = [mean.index(index) for index in range(span.start, span.stop)]
         covariance = self.explanation.best.covariance[np.ix_(rows, rows)]
         here = self.change(x, self.values)
@@ -229,7 +229,7 @@ def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str
 def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
     """The fitted parameters with readable names; of a sine the amplitude, start and period."""
     law, explanation = leading.law, leading.explanation
-    first = own_places(explanation.names, explanation.best.hypothesis.lines)[law.name].start
+    first = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[law.name].start
     stated = [parameter_with_interval(explanation, first + index) for index in range(len(law.parameters_bound))]
     if isinstance(law, RecordingLaw | LagLaw | CurveLaw):
         if law.shape.form == "periodic" and len(law.amplitudes) == law.shape.count:

@@ -146,9 +146,9 @@ class GainResidual:
     def __init__(self, problem: FittingProblem, explanation: Explanation) -> None:
         self._best, parameters = explanation.best, explanation.model.parameters
         best = self._best
-        size, _, _ = best.marginal.along(best.levels.position)
+        size, _, _ = best.marginal.projections(best.levels.position)
         self._least = FAINT * np.abs(size).max()
-        slopes = best.marginal.slopes_along / self._not_faint(size)[:, None]
+        slopes = best.marginal.slope_projections / self._not_faint(size)[:, None]
         centre = np.array([entry.start for entry in parameters]) - best.point.fit
         scale = np.array([_prior_sd(entry) for entry in parameters])
         self._known = slopes @ centre
@@ -164,7 +164,7 @@ class GainResidual:
         """No scatter of position and each of these [m], with all of gain; relative to the model's mean under it."""
         best, scatters = self._best, []
         for position, share in _shares(positions).items():
-            size, ur, uu = best.marginal.along(position)
+            size, ur, uu = best.marginal.projections(position)
             size = self._not_faint(size)
             second_order = best.hypothesis.curvature.square
             has_position_scatter = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order

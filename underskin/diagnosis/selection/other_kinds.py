@@ -28,7 +28,7 @@ from underskin.diagnosis.data.dataset import Lines, curve_lines
 from underskin.diagnosis.inference.evidence import parts
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.gaussian import Gaussian, moments
-from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence, log_prior
 from underskin.mechanisms.base import Kind, Unsupported, Values
 from underskin.mechanisms.laws.layered_contact import LayeredContact
@@ -230,8 +230,8 @@ def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Qu
     modulus = [entry.name for entry in explanation.model.parameters].index("youngs_modulus")
     each = parts(explanation.best, modulus)
     known = [_quantities(explanation, part.fit, both, modulus) for part in each]
-    mean_places = explanation.best.hypothesis.mean_places
-    slopes = [rows[:, mean_places] for _, _, rows in known]
+    mean_indices = explanation.best.hypothesis.mean_indices
+    slopes = [rows[:, mean_indices] for _, _, rows in known]
     covariances = [one @ part.covariance @ one.T for one, part in zip(slopes, each, strict=True)]
     return known[0][0], *moments(np.array([part.share for part in each]), [mean for _, mean, _ in known], covariances)
 
@@ -245,7 +245,7 @@ def _quantities(
     quantities: list[Quantity] = [MODULUS]
     values = [fit[modulus] + np.log(to_si("youngs_modulus_mpa", 1.0))]
     rows = [np.eye(len(fit))[modulus]]
-    for name, place in own_places(explanation.names, lines).items():
+    for name, place in parameter_slices(explanation.names, lines).items():
         if name not in both:
             continue
         seeds = {
@@ -356,8 +356,8 @@ class CurveLikelihood:
         this set, or else under the best one that holds the mechanism."""
         begun: dict[Quantity, tuple[float, float]] = {}
         for entry in sorted(self._alone, key=lambda entry: frozenset(entry.names) != frozenset(names)):
-            variances = dict(zip(entry.best.hypothesis.mean_places, np.diag(entry.best.covariance), strict=True))
-            for mechanism, places in own_places(entry.names, lines).items():
+            variances = dict(zip(entry.best.hypothesis.mean_indices, np.diag(entry.best.covariance), strict=True))
+            for mechanism, places in parameter_slices(entry.names, lines).items():
                 for place in range(places.start, places.stop):
                     key = (mechanism, entry.model.parameters[place].name)
                     begun.setdefault(key, (float(entry.point.fit[place]), float(variances.get(place, np.inf))))
@@ -377,7 +377,7 @@ def _in_model(
     recording; a row of zeros where the model has no such quantity. `begun`: fit coordinates by the recordings alone,
     and their variances."""
     quantities = told.quantities
-    places = own_places(model.names, lines)
+    places = parameter_slices(model.names, lines)
     names = [entry.name for entry in model.parameters]
     matrix, offset = np.zeros((len(quantities), len(names))), np.zeros(len(quantities))
     priors: list[Moments] = []

@@ -29,7 +29,13 @@ import numpy as np
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
-from underskin.diagnosis.inference.residuals import beside, force_and_slopes, information, line_residuals, precision_of
+from underskin.diagnosis.inference.residuals import (
+    force_and_slopes,
+    information,
+    information_beyond,
+    line_residuals,
+    precision_of,
+)
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.gain_residual import GainResidual
 from underskin.mechanisms.models.curve_state import Samples
@@ -270,7 +276,7 @@ class CurveScreening:
         left = self._lines.value.real - force
         flat = [one.reshape(-1, len(force)) for one in changes]
         whole = information(explanation, np.concatenate([slopes, *flat, left[None]]), self._best)
-        shown = beside(whole, np.arange(len(slopes)), precision_of(explanation.best.hypothesis))
+        shown = information_beyond(whole, np.arange(len(slopes)), precision_of(explanation.best.hypothesis))
         scores, first = [], 0
         for (law, log_share), own in zip(self.laws, changes, strict=True):
             points, count = own.shape[:2]

@@ -21,8 +21,8 @@ from underskin.diagnosis.several.sensors import (
     CampaignDates,
     SensorsOfCampaign,
     Values,
-    changes,
     corrected,
+    d33_changes,
     date_of,
     in_order,
     sensors_of,
@@ -112,7 +112,7 @@ def _with_changed_sensors(
     """The results, diagnosed again where single sensors changed since the previous campaign, which is no physics of the
     skin."""
     sensors = [_sensors(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = changes(sensors, outliers, [0.0] * len(sensors), np.arange(len(sensors), dtype=float))
+    single = d33_changes(sensors, outliers, [0.0] * len(sensors), np.arange(len(sensors), dtype=float))
     again = []
     for index, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
         as_before = corrected(campaign, single, index)

@@ -1,19 +1,10 @@
-"""Fleets of skins: what their population is, and the report on it.
+"""Fleets: skins of one batch that are diagnosed together, and the report on them.
 
-Which mechanisms act in skins of one make: a set that all have in common, from which single skins may differ.
-
-Every set that any skin asks for may be the common one; given it, each skin has it, or one that differs by a mechanism
-or two, each of which shows in that skin's own recordings. A skin of which little was recorded so leans on its sisters.
-Errors of E and of the thickness are no mechanisms here: they make a skin depart (population.py).
-
-The strengths of mechanisms that several skins of one make have, as populations. The report of skins of one make that
-were diagnosed as a fleet.
-
-Skins of one make: their E, thickness, d33 and the strengths of their mechanisms as populations, and which departs.
-
-Each skin speaks by its latest campaign of FRFs that can be used, with the curves of its campaigns without FRFs. The set
-of mechanisms that all have in common is found over all skins, and what each says of its E, thickness
-and d33 (skin.py) is pooled (population.py), so that a skin of which little was recorded leans on its sisters.
+Each skin is represented by its latest usable campaign of FRFs, with the curves of its campaigns without FRFs.
+`common_set` finds the set of mechanisms common to all skins; given it, each skin has it, or one that differs by a
+mechanism or two, each of which is supported by that skin's own recordings. Errors of E and of the thickness are no
+mechanisms here: they make a skin depart (population.py). E, thickness, d33 and the strengths of mechanisms are pooled
+as populations, so that a skin with few recordings is informed by the others.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -25,7 +16,7 @@ import numpy as np
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.law_statement import of_clauses
 from underskin.diagnosis.reporting.numbers import rounded
@@ -58,57 +49,62 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_HOPELESS = 40.0  # nats
-_DIFFERS = 0.03  # probability that a skin differs from its sisters by one mechanism
+_PRUNE_NATS = 40.0  # nats behind the best set of a skin, at most
+_P_DIFFERS = 0.03  # probability that a skin differs from the others by one mechanism
 
 
 @dataclass(frozen=True)
 class CommonSet:
-    """The most probable common set and set of each skin, with the probability of each of these; `probability` is that
-    of all of them together. `from_other_specimens`: of each skin the logarithms of the sets' probabilities by the
-    recordings of the others alone. `log_evidence`: of all recordings, over all sets."""
+    """The most probable common set and set of each skin, with the probabilities of the latter; `probability` is that of
+    all of them together. `from_other_specimens`: of each skin the log probabilities of the sets by the recordings of
+    the others only. `log_evidence`: of all recordings, over all sets."""
 
     common: Names
     sets: tuple[Names, ...]
-    each: tuple[float, ...]
+    probabilities: tuple[float, ...]
     probability: float
     from_other_specimens: tuple[Mapping[frozenset[str], float], ...]
     log_evidence: float
 
 
-def sets_of(candidates: Sequence[Candidate]) -> list[frozenset[str]]:
-    """The sets that any skin asks for, beside errors of E and of the thickness."""
-    asked = (names.difference(ERRORS) for candidate in candidates for names in candidate.required_sets)
-    return list(dict.fromkeys((frozenset[str](), *asked)))
+def candidate_sets(candidates: Sequence[Candidate]) -> list[frozenset[str]]:
+    """The sets that are relevant for any skin, without errors of E and of the thickness."""
+    names_of_skins = (names.difference(ERRORS) for candidate in candidates for names in candidate.required_sets)
+    return list(dict.fromkeys((frozenset[str](), *names_of_skins)))
 
 
 def with_smaller(sets: Sequence[frozenset[str]]) -> list[frozenset[str]]:
-    """The sets, and those with one mechanism less, which say whether each of theirs shows."""
+    """The sets, and those with one mechanism less, which decide whether each mechanism is supported."""
     return list(dict.fromkeys((*sets, *(names - {name} for names in sets for name in sorted(names)))))
 
 
 def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], supported: int) -> CommonSet:
-    """Of skins that were fitted under these sets and the smaller ones; `supported` mechanisms."""
+    """Of skins fitted under these sets and the smaller ones; `supported` is the number of mechanisms."""
     evidence = np.array([[skin.log_evidence(names, len(skins)) for names in sets] for skin in skins])
-    log_evidence = np.maximum(evidence - evidence.max(axis=1, keepdims=True), -_HOPELESS)
-    changes = np.array([[log_change(len(one ^ two), supported, _DIFFERS) for two in sets] for one in sets])
-    shown = np.array([[_shows(skin, names, len(skins)) for names in sets] for skin in skins])
-    own = shown[:, None] | np.eye(len(sets), dtype=bool)  # (skins, common sets, sets)
-    change = np.where(own, changes[None], -np.inf)
+    log_evidence = np.maximum(evidence - evidence.max(axis=1, keepdims=True), -_PRUNE_NATS)
+    changes = np.array([[log_change(len(common ^ names), supported, _P_DIFFERS) for names in sets] for common in sets])
+    shown = np.array([[_is_supported(skin, names, len(skins)) for names in sets] for skin in skins])
+    allowed = shown[:, None] | np.eye(len(sets), dtype=bool)  # (skins, common sets, sets)
+    change = np.where(allowed, changes[None], -np.inf)
     weights = change + log_evidence[:, None]
     of_skins = np.logaddexp.reduce(weights, axis=2)  # (skins, common sets)
-    prior = np.array([log_prior(len(one), supported) for one in sets])
-    together = of_skins.sum(axis=0)
+    prior = np.array([log_prior(len(common), supported) for common in sets])
+    of_all = of_skins.sum(axis=0)
     least = SHOWS + np.array(
         [
-            max((together[sets.index(one - {name})] for name in one if one - {name} in sets), default=-np.inf)
-            for one in sets
+            max(
+                (of_all[sets.index(names - {mechanism})] for mechanism in names if names - {mechanism} in sets),
+                default=-np.inf,
+            )
+            for names in sets
         ]
     )
-    log_common = np.where(together > least, prior + together, -np.inf)  # what shows in no skin the smaller set says
+    log_common = np.where(
+        of_all > least, prior + of_all, -np.inf
+    )  # a mechanism supported by no skin is left to the smaller set
     share = np.exp(log_common - np.logaddexp.reduce(log_common))
     best = int(share.argmax())
-    # Of each skin the posterior of its set, all common sets averaged
+    # Posterior of each skin's set, averaged over all common sets
     posterior = np.einsum("c,ncm->nm", share, np.exp(weights - of_skins[..., None]))
     chosen = weights[:, best].argmax(axis=1)
     order = skins[0].candidate.problem.lines.mechanisms.named
@@ -116,34 +112,34 @@ def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], suppo
     def named(names: frozenset[str]) -> Names:
         return tuple(name for name in order if name in names)
 
-    each = tuple(float(posterior[number, place]) for number, place in enumerate(chosen))
+    probabilities = tuple(float(posterior[number, index]) for number, index in enumerate(chosen))
     at_best = weights[np.arange(len(chosen)), best, chosen] - of_skins[:, best]
     probability = float(share[best] * np.exp(at_best.sum()))
-    of_each = tuple(named(one.candidate.supported(sets[place])) for one, place in zip(skins, chosen, strict=True))
+    named_sets = tuple(named(skin.candidate.supported(sets[index])) for skin, index in zip(skins, chosen, strict=True))
     of_other_specimens = np.logaddexp.reduce((log_common - of_skins)[..., None] + change, axis=1)
     of_other_specimens -= np.logaddexp.reduce(of_other_specimens, axis=1, keepdims=True)
     from_other_specimens = tuple(dict(zip(sets, row.tolist(), strict=True)) for row in of_other_specimens)
     total = float(np.logaddexp.reduce(log_common) + evidence.max(axis=1).sum())
-    return CommonSet(named(sets[best]), of_each, each, probability, from_other_specimens, total)
+    return CommonSet(named(sets[best]), named_sets, probabilities, probability, from_other_specimens, total)
 
 
-def _shows(skin: FleetSkin, names: frozenset[str], skins: int) -> bool:
-    """Whether each mechanism of a set brings evidence in a skin's own recordings."""
-    whole = skin.log_evidence(names, skins)
-    return all(whole > skin.log_evidence(names - {name}, skins) + SHOWS for name in names)
+def _is_supported(skin: FleetSkin, names: frozenset[str], skins: int) -> bool:
+    """Whether each mechanism of a set is supported by a skin's own recordings."""
+    log_evidence = skin.log_evidence(names, skins)
+    return all(log_evidence > skin.log_evidence(names - {name}, skins) + SHOWS for name in names)
 
 
 _LEAST_SKINS_OF_STRENGTH = 3
-_INFORMS = 0.5  # of a prior's precision: what recordings must say at least to count
-_WIDEST = 10.0  # deviation of the logarithm of a strength of which nothing is known
+_INFORMS = 0.5  # of a prior's precision: the least of informative recordings
+_WIDEST = 10.0  # deviation of the logarithm of an unknown strength
 _SPREAD = Spread(0.1, 2.0)  # deviation of its logarithm from skin to skin
-_FAR = 1.0  # the same of a skin that departs in it
+_DEPARTURE_SD = 1.0  # the same of a skin that departs in it
 DEPARTS = "strength"
 
 
 @dataclass(frozen=True)
 class Strength:
-    """One parameter of a mechanism, with its unit, as a population of the skins that have it."""
+    """One parameter of a mechanism, with its unit, as a population of the skins that have the mechanism."""
 
     parameter: str
     unit: str
@@ -153,51 +149,54 @@ class Strength:
 
 def of_strengths(candidates: Mapping[str, Candidate], common: CommonSet) -> list[Strength]:
     """Of the positive parameters of mechanisms that at least three skins have."""
-    said: dict[tuple[str, str], dict[str, list[State]]] = {}
+    states_by_parameter: dict[tuple[str, str], dict[str, list[State]]] = {}
     for (skin, candidate), names in zip(candidates.items(), common.sets, strict=True):
         fit = candidate.explained(frozenset(names))
         if fit is None:
             continue
-        for mechanism, places in own_places(fit.names, fit.best.hypothesis.lines).items():
-            for place in range(places.start, places.stop):
-                entry = fit.model.parameters[place]
-                likelihood = _likelihood(fit, place)
-                if entry.scale == "log" and likelihood is not None:
-                    states = [State(REGULAR, likelihood, np.zeros(1)), State(DEPARTS, likelihood, np.array([_FAR**2]))]
-                    said.setdefault((f"{mechanism}.{entry.name}", entry.unit), {})[skin] = states
+        for mechanism, span in parameter_slices(fit.names, fit.best.hypothesis.lines).items():
+            for index in range(span.start, span.stop):
+                parameter = fit.model.parameters[index]
+                likelihood = _likelihood(fit, index)
+                if parameter.scale == "log" and likelihood is not None:
+                    states = [
+                        State(REGULAR, likelihood, np.zeros(1)),
+                        State(DEPARTS, likelihood, np.array([_DEPARTURE_SD**2])),
+                    ]
+                    states_by_parameter.setdefault((f"{mechanism}.{parameter.name}", parameter.unit), {})[skin] = states
     batch = Batch(0.0, np.zeros(1), np.array([_WIDEST**-2]))
     return [
-        Strength(parameter, unit, tuple(own), populations(list(own.values()), [batch], [_SPREAD]))
-        for (parameter, unit), own in said.items()
-        if len(own) >= _LEAST_SKINS_OF_STRENGTH
+        Strength(name, unit, tuple(of_skins), populations(list(of_skins.values()), [batch], [_SPREAD]))
+        for (name, unit), of_skins in states_by_parameter.items()
+        if len(of_skins) >= _LEAST_SKINS_OF_STRENGTH
     ]
 
 
-def _likelihood(fit: Explanation, place: int) -> Gaussian | None:
-    """Of one fit coordinate by the recordings alone, the prior taken out; None where they say next to nothing of it, or
-    it moves the covariance alone."""
+def _likelihood(fit: Explanation, index: int) -> Gaussian | None:
+    """The likelihood of one fit coordinate by the recordings only, without the prior; None where they hardly inform, or
+    the coordinate changes the covariance only."""
     hypothesis = fit.best.hypothesis
-    if place not in hypothesis.mean_places:
+    if index not in hypothesis.mean_indices:
         return None
-    row = hypothesis.mean_places.index(place)
+    row = hypothesis.mean_indices.index(index)
     after = 1 / float(fit.best.covariance[row, row])
-    prior, centre = quadratic_of_prior(fit.model.parameters[place], float(fit.point.fit[place]))
+    prior, centre = quadratic_of_prior(fit.model.parameters[index], float(fit.point.fit[index]))
     precision = after - prior
     if precision < _INFORMS * prior:
         return None
-    return Gaussian(np.array([[precision]]), np.array([after * fit.point.fit[place] - prior * centre]), 0.0)
+    return Gaussian(np.array([[precision]]), np.array([after * fit.point.fit[index] - prior * centre]), 0.0)
 
 
-_MOST_TOLD = 3  # skins that depart in the statement
-_WORTH_SAYING = 0.1  # probability from which on a quantity is listed in which such a skin may depart
+_MOST_LISTED = 3  # departing skins in the statement
+_LEAST_LISTED = 0.1  # least probability of a listed quantity in which such a skin may depart
 _UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
 
 
 @dataclass(frozen=True)
 class Fleet:
-    """What was found: the usable skins, the sets of their mechanisms, their E and thickness over the declared ones and
-    d33, the logarithms of the declared ones (skins, quantities), the probabilities that one of these is declared
-    wrongly for all skins, and the strengths of mechanisms."""
+    """The usable skins, the sets of their mechanisms, their E and thickness over the declared ones and d33 (`pooled`),
+    the logarithms of the declared values (skins, quantities), the probabilities that one of these is wrong for all
+    skins, and the strengths of mechanisms."""
 
     candidates: Mapping[str, Candidate]
     common: CommonSet
@@ -214,33 +213,36 @@ def fleet_report(
     fleet: Fleet,
     orders: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Of a fleet of this name, its campaigns' names, the result of each skin alone, and of skins with several campaigns
-    what is said where their order is not one of time."""
+    """Of a fleet with this name, its campaigns' names and the result of each skin alone; `orders` are clauses on skins
+    with several campaigns whose order is not known in time."""
     usable = {skin: results[skin] for skin in fleet.candidates}
     lacking = [skin for skin in results if skin not in usable]
     reports = {skin: reported(result) for skin, result in usable.items()}
-    own_d33 = {skin: own.d33 for skin, own in reports.items()}
+    d33_of_skins = {skin: skin_report.d33 for skin, skin_report in reports.items()}
     populations = [*_populations(fleet), *(_of_strength(strength) for strength in fleet.strengths)]
     mechanisms = _mechanisms(fleet)
-    departs = any(entry["departures"] for entry in populations)
-    undescribed = {skin: one.undescribed for skin, one in fleet.candidates.items()}
-    unexplained = [skin for skin, share in undescribed.items() if share > STATED]
-    described = (1 - P_NOT_IN_MODEL_SPACE) * float(np.prod([1 - share for share in undescribed.values()]))
+    departs = any(population["departures"] for population in populations)
+    unlisted = {skin: candidate.unlisted_probability for skin, candidate in fleet.candidates.items()}
+    unexplained = [skin for skin, share in unlisted.items() if share > STATED]
+    described = (1 - P_NOT_IN_MODEL_SPACE) * float(np.prod([1 - share for share in unlisted.values()]))
     wrongly = max(fleet.declared_wrongly.values(), default=0.0)
     declared = wrongly if wrongly > STATED else 1 - sum(fleet.declared_wrongly.values())
     of_sets = fleet.common.probability * declared * described
-    agreed, settled = _departures_stated(fleet)
-    probability = 1 - described if unexplained else of_sets * agreed
-    d33 = next(entry for entry in populations if entry["parameter"] == D33)
-    stated = {skin: {one["name"] for one in own.document["mechanisms"]} for skin, own in reports.items()}
-    of_d33 = together_report.of_skins(d33["mean"], d33["unit"], own_d33, _lacking(mechanisms, stated))
+    joint_probability, least_certain = _probability_of_departures(fleet)
+    probability = 1 - described if unexplained else of_sets * joint_probability
+    d33 = next(population for population in populations if population["parameter"] == D33)
+    stated_mechanisms = {
+        skin: {mechanism["name"] for mechanism in skin_report.document["mechanisms"]}
+        for skin, skin_report in reports.items()
+    }
+    of_d33 = together_report.of_skins(d33["mean"], d33["unit"], d33_of_skins, _lacking(mechanisms, stated_mechanisms))
     by_kind = of_kinds(reports.items())
-    contradictory = [f"in {entry['statement']}" for entry in by_kind.get("contradictions", ())]
+    contradictory = [f"in {contradiction['statement']}" for contradiction in by_kind.get("contradictions", ())]
     return {
         "schema": SCHEMA,
         "campaign": name,
         "campaigns": list(campaigns),
-        "verdict": _verdict(min(of_sets, settled), bool(mechanisms) or departs, unexplained),
+        "verdict": _verdict(min(of_sets, least_certain), bool(mechanisms) or departs, unexplained),
         "probability": round(probability, 3),
         "statement": _statement(
             probability,
@@ -253,14 +255,16 @@ def fleet_report(
         ),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
         "mechanisms": mechanisms,
-        "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
+        "presence": [
+            {"mechanisms": [mechanism["name"]], "probability": mechanism["probability"]} for mechanism in mechanisms
+        ],
         "unnamed": None,
         "alternatives": [],
-        "not_identifiable": together_report.not_identifiable(own_d33),
+        "not_identifiable": together_report.not_identifiable(d33_of_skins),
         "findings": [
             {**finding, "statement": f"{skin}: {finding['statement']}"}
-            for skin, own in reports.items()
-            for finding in own.document["findings"]
+            for skin, skin_report in reports.items()
+            for finding in skin_report.document["findings"]
         ],
         **by_kind,
         "fit": None,
@@ -271,8 +275,8 @@ def fleet_report(
         "provenance": {
             **next(iter(usable.values())).provenance,
             "each": [
-                {"skin": skin, **{key: own.document[key] for key in ("verdict", "probability")}}
-                for skin, own in reports.items()
+                {"skin": skin, **{key: skin_report.document[key] for key in ("verdict", "probability")}}
+                for skin, skin_report in reports.items()
             ],
         },
     }
@@ -289,26 +293,28 @@ def _populations(fleet: Fleet) -> list[dict[str, Any]]:
 
 
 def _expected(fleet: Fleet) -> dict[tuple[str, str], float]:
-    """What the others would have if they were declared as one skin is, by parameter and skin, where they differ."""
-    each = np.exp(fleet.pooled.mean + fleet.declared)
+    """The batch's mean at one skin's declared values, by parameter and skin, where the declared values differ."""
+    expected = np.exp(fleet.pooled.mean + fleet.declared)
     return {
-        (quantity, skin): float(each[number, row])
+        (quantity, skin): float(expected[number, row])
         for row, quantity in enumerate(QUANTITIES.values())
         for number, skin in enumerate(fleet.candidates)
         if np.ptp(fleet.declared[:, row]) > 0
     }
 
 
-def _departures_stated(fleet: Fleet) -> tuple[float, float]:
-    """The probability of what is stated of all skins' departures, and the least of that of one skin: were the first to
-    decide the verdict, fleets of many skins would all be ambiguous."""
-    departing = [one.population for one in fleet.strengths if any(one.population.stated)]
-    agreed, settled = 1.0, 1.0
+def _probability_of_departures(fleet: Fleet) -> tuple[float, float]:
+    """The probability of the stated departures of all skins together, and the least of that of one skin. The verdict
+    uses the latter: by the former, fleets of many skins would all be ambiguous."""
+    departing = [strength.population for strength in fleet.strengths if any(strength.population.stated)]
+    joint_probability, least_certain = 1.0, 1.0
     for pooled in (fleet.pooled, *departing):
-        agreed *= pooled.together.get(pooled.stated, 0.0)
-        each = [own[departs] for own, departs in zip(pooled.departs, pooled.stated, strict=True)]
-        settled = min(settled, *each)
-    return agreed, settled
+        joint_probability *= pooled.joint.get(pooled.stated, 0.0)
+        probabilities = [
+            of_skin[departure] for of_skin, departure in zip(pooled.departures, pooled.stated, strict=True)
+        ]
+        least_certain = min(least_certain, *probabilities)
+    return joint_probability, least_certain
 
 
 def _of_strength(strength: Strength) -> dict[str, Any]:
@@ -326,7 +332,7 @@ def _of_strength(strength: Strength) -> dict[str, Any]:
 def _population(
     parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str, declared: Floats
 ) -> dict[str, Any]:
-    """Of one quantity, pooled over one that is declared, of which these are the logarithms (skins,)."""
+    """Of one quantity, pooled relative to declared values with these logarithms (skins,)."""
     mean, spread = float(np.exp(pooled.mean[row] + declared.mean())), float(pooled.spread[row])
     value, low, high = np.exp(pooled.of_skins[:, :, row] + declared)
     return {
@@ -336,8 +342,8 @@ def _population(
         "sd": rounded(mean * float(np.hypot(spread, declared.std())), 3),
         "departures": [
             {"skin": skin, "value": rounded(float(value[number])), "probability": round(share, 3)}
-            for number, (skin, own) in enumerate(zip(skins, pooled.departs, strict=True))
-            if own[REGULAR] < 1 - STATED and (share := own.get(departure, 0.0)) > _WORTH_SAYING
+            for number, (skin, departures) in enumerate(zip(skins, pooled.departures, strict=True))
+            if departures[REGULAR] < 1 - STATED and (share := departures.get(departure, 0.0)) > _LEAST_LISTED
         ],
         "skins": [
             {
@@ -352,35 +358,42 @@ def _population(
 
 
 def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
-    """With the skins that have each; a declared E or thickness that is wrong for all, or for one that departs in it."""
+    """With the skins that have each; also a declared E or thickness that is wrong for all, or for a skin that departs
+    in it."""
     present: dict[str, dict[str, float]] = {
         error: dict.fromkeys(fleet.candidates, share)
         for error, share in fleet.declared_wrongly.items()
         if share > STATED
     }
-    for skin, names, share in zip(fleet.candidates, fleet.common.sets, fleet.common.each, strict=True):
+    for skin, names, share in zip(fleet.candidates, fleet.common.sets, fleet.common.probabilities, strict=True):
         for mechanism in names:
             present.setdefault(mechanism, {})[skin] = share
-    for skin, own, departs in zip(fleet.candidates, fleet.pooled.departs, fleet.pooled.stated, strict=True):
-        if departs in ERRORS:
-            present.setdefault(departs, {})[skin] = own[departs]
+    for skin, departures, departure in zip(fleet.candidates, fleet.pooled.departures, fleet.pooled.stated, strict=True):
+        if departure in ERRORS:
+            present.setdefault(departure, {})[skin] = departures[departure]
     return [
         {
             "name": mechanism,
-            "probability": round(float(np.mean(list(each.values()))), 3),
+            "probability": round(float(np.mean(list(shares.values()))), 3),
             "parameters": [],
             "explains_percent": None,
-            "scope": {"skins": list(each)},
+            "scope": {"skins": list(shares)},
         }
-        for mechanism, each in present.items()
+        for mechanism, shares in present.items()
     ]
 
 
-def _lacking(mechanisms: Sequence[Mapping[str, Any]], stated: Mapping[str, set[str]]) -> dict[str, list[str]]:
-    """Of each skin the mechanisms that it has by the fleet's report and not by its own."""
+def _lacking(
+    mechanisms: Sequence[Mapping[str, Any]], stated_mechanisms: Mapping[str, set[str]]
+) -> dict[str, list[str]]:
+    """Of each skin the mechanisms that it has in the fleet's report but not in its own."""
     return {
-        skin: [one["name"] for one in mechanisms if skin in one["scope"]["skins"] and one["name"] not in own]
-        for skin, own in stated.items()
+        skin: [
+            mechanism["name"]
+            for mechanism in mechanisms
+            if skin in mechanism["scope"]["skins"] and mechanism["name"] not in names
+        ]
+        for skin, names in stated_mechanisms.items()
     }
 
 
@@ -409,23 +422,31 @@ def _statement(
     expected: Mapping[tuple[str, str], float],
     names: Sequence[str],
 ) -> str:
-    each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
-    missing = "; ".join(each) or in_words((NOTHING_MISSING,))
+    listed = [
+        f"{in_words([population['name']])} in {', '.join(population['scope']['skins'])}" for population in mechanisms
+    ]
+    missing = "; ".join(listed) or in_words((NOTHING_MISSING,))
     verdict = f"By skin: {missing} ({in_percent(probability)} probability)"
     if unexplained:
         verdict = f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}"
     departures: dict[str, list[str]] = {}
-    for entry in populations:
-        for one in entry["departures"]:
-            middle = expected.get((entry["parameter"], one["skin"]))
-            others = f"{entry['mean']:g} ± {entry['sd']:g}" if middle is None else f"{middle:.4g} for the same declared"
-            departures.setdefault(one["skin"], []).append(
-                f"in {quantity_in_words(entry['parameter'])}: {one['value']:g}{_unit(entry['unit'])}, where the others "
-                f"have {others} ({in_percent(one['probability'])})"
+    for population in populations:
+        for departure in population["departures"]:
+            expected_value = expected.get((population["parameter"], departure["skin"]))
+            others = (
+                f"{population['mean']:g} ± {population['sd']:g}"
+                if expected_value is None
+                else f"{expected_value:.4g} for the same declared"
             )
-    told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
-    told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
-    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides, names=names)
+            departures.setdefault(departure["skin"], []).append(
+                f"in {quantity_in_words(population['parameter'])}: {departure['value']:g}{_unit(population['unit'])}, "
+                f"where the others have {others} ({in_percent(departure['probability'])})"
+            )
+    clauses = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_LISTED]
+    clauses += (
+        [f"{len(departures) - _MOST_LISTED} more depart, see the populations"] if len(departures) > _MOST_LISTED else []
+    )
+    return of_clauses([verdict], clauses or ["none is seen to depart from the others"], asides, names=names)
 
 
 def _unit(label: str) -> str:
@@ -433,9 +454,9 @@ def _unit(label: str) -> str:
 
 
 _LEAST_SKINS = 3
-_DECLARED = (0.02, 0.01)  # deviations of ln of the make's E and thickness about the declared ones
-# Pieces of one cure and of one poled film differ by some percent; a mould's thickness is held
-_FAR_OFF = 2.0  # deviations by which skins must be off together for an error of what is declared of all to be looked at
+_DECLARED = (0.02, 0.01)  # deviations of ln of the batch's E and thickness about the declared ones
+# Pieces of one cure and of one poled film differ by some percent; a mould sets the thickness
+_FAR_FROM_DECLARED = 2.0  # common deviation of the skins, in sd, above which an error of the declared values is tried
 SPREADS = (Spread(0.03, 2.0), Spread(0.01, 1.0), Spread(0.03, 2.0))
 
 
@@ -452,7 +473,7 @@ def diagnose_fleet(
     """
     if len(skins) < _LEAST_SKINS:
         raise InvalidInput("skins", len(skins), f"must be {_LEAST_SKINS} at least, to be a population")
-    refuse_copies([campaign for own in skins.values() for campaign in own])
+    refuse_copies([campaign for campaigns_of_skin in skins.values() for campaign in campaigns_of_skin])
     results: dict[str, DiagnosisResult] = {}
     seen: set[bytes] = set()
     orders: dict[str, str] = {}
@@ -460,13 +481,13 @@ def diagnose_fleet(
         with_frf, of_curves = by_frfs(curves_once(campaigns, seen))
         if not with_frf:
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
-        results[skin] = _latest([with_curves(one, of_curves) for one in with_frf], table, without)
+        results[skin] = _latest([with_curves(frf_campaign, of_curves) for frf_campaign in with_frf], table, without)
         if len(with_frf) > 1:
             orders[skin] = CampaignDates(
-                [one.name for one in with_frf], [date_of(one) for one in with_frf]
+                [frf_campaign.name for frf_campaign in with_frf], [date_of(frf_campaign) for frf_campaign in with_frf]
             ).order_clause()
         progress((number + 1) / (len(skins) + 1))
-    campaigns_named = [campaign.name for own in skins.values() for campaign in own]
+    campaigns_named = [campaign.name for campaigns_of_skin in skins.values() for campaign in campaigns_of_skin]
     candidates = {
         skin: Candidate(result.problem, search)
         for skin, result in results.items()
@@ -475,22 +496,23 @@ def diagnose_fleet(
     if len(candidates) < _LEAST_SKINS:
         lacking = next(skin for skin in skins if skin not in candidates)
         return {**report(results[lacking]), "campaign": name, "campaigns": campaigns_named}
-    return fleet_report(name, campaigns_named, results, _found(candidates), orders)
+    return fleet_report(name, campaigns_named, results, _fleet(candidates), orders)
 
 
 def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collection[str]) -> DiagnosisResult:
-    """The diagnosis of the latest campaign that says something alone, else of the latest that does beside others."""
-    found: list[DiagnosisResult] = []
+    """The diagnosis of the latest campaign with a result of its own, else of the latest with one together with
+    others."""
+    results: list[DiagnosisResult] = []
     for campaign in in_order(campaigns)[::-1]:
-        found.append(diagnose(campaign, table, without=without))
-        if found[-1].search is not None:
-            return found[-1]
-    return next((result for result in found if result.few is not None), found[0])
+        results.append(diagnose(campaign, table, without=without))
+        if results[-1].search is not None:
+            return results[-1]
+    return next((result for result in results if result.few is not None), results[0])
 
 
 @dataclass(frozen=True)
 class _Attempt:
-    """The skins looked at about what is declared, or with an `error` of that in all of them."""
+    """The skins fitted about the declared values, or with an `error` of these in all skins."""
 
     error: str
     skins: Sequence[FleetSkin]
@@ -498,40 +520,46 @@ class _Attempt:
     log_weight: float
 
 
-def _found(candidates: Mapping[str, Candidate]) -> Fleet:
+def _fleet(candidates: Mapping[str, Candidate]) -> Fleet:
     """Of the usable skins."""
-    each = list(candidates.values())
-    sets, on = sets_of(each), benches(each)
-    supported = min(one.search.supported for one in each)
+    usable = list(candidates.values())
+    sets, bench_priors = candidate_sets(usable), benches(usable)
+    supported = min(candidate.search.supported for candidate in usable)
     odds = log_prior(1, supported) - log_prior(0, supported)
 
     def attempt(error: str, centre: tuple[float, float], log_prior_weight: float) -> _Attempt:
-        skins = [FleetSkin(one, with_smaller(sets), bench, centre) for one, bench in zip(each, on, strict=True)]
+        skins = [
+            FleetSkin(candidate, with_smaller(sets), bench, centre)
+            for candidate, bench in zip(usable, bench_priors, strict=True)
+        ]
         common = common_set(skins, sets, supported)
         return _Attempt(error, skins, common, common.log_evidence + log_prior_weight)
 
     attempts = [attempt("", (0.0, 0.0), 0.0)]
     for row, error in enumerate(ERRORS):
         off, deviation = _off(attempts[0].skins, row, error)
-        if abs(off) > _FAR_OFF * max(deviation, _DECLARED[row]):
+        if abs(off) > _FAR_FROM_DECLARED * max(deviation, _DECLARED[row]):
             centre = (off, 0.0) if row == 0 else (0.0, off)
             occam = np.log(deviation / FAR[row]) - 0.5 * (off / FAR[row]) ** 2
             attempts.append(attempt(error, centre, odds + float(occam)))
-    weights = np.array([one.log_weight for one in attempts])
+    weights = np.array([tried.log_weight for tried in attempts])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
     best = attempts[int(np.argmax(shares))]
     pooled, batches = _pooled(best, odds)
     if best.error:
         _, batches = _pooled(attempts[0], odds)
-    wrongly = declared_wrongly(dict(zip((one.error for one in attempts), shares.tolist(), strict=True)), batches)
+    wrongly = declared_wrongly(dict(zip((tried.error for tried in attempts), shares.tolist(), strict=True)), batches)
     declared = np.array([skin.declared for skin in best.skins])
     return Fleet(candidates, best.common, pooled, declared, wrongly, of_strengths(candidates, best.common))
 
 
 def _pooled(attempt: _Attempt, odds: float) -> tuple[Populations, dict[str, float]]:
-    """The populations by one attempt, and by its skins the probability that what is declared of all is right or has an
-    error."""
-    states = [skin.states(own) for skin, own in zip(attempt.skins, attempt.common.from_other_specimens, strict=True)]
+    """The populations by one attempt, and the probability of each error (or none) of the values declared for all
+    skins."""
+    states = [
+        skin.states(log_shares)
+        for skin, log_shares in zip(attempt.skins, attempt.common.from_other_specimens, strict=True)
+    ]
     batches, errors = _batches(attempt.skins, odds)
     if attempt.error:
         batches, errors = [batches[errors.index(attempt.error)]], [attempt.error]
@@ -540,16 +568,20 @@ def _pooled(attempt: _Attempt, odds: float) -> tuple[Populations, dict[str, floa
 
 
 def declared_wrongly(attempts: Mapping[str, float], batches: Mapping[str, float]) -> dict[str, float]:
-    """The probability of each error of what is declared of all skins: `attempts` those of each attempt, by error, and
-    `batches` those of each error by the attempt that has none."""
+    """The probability of each error of the values declared for all skins: `attempts` are the probabilities of the
+    attempts, by error, `batches` those of each error in the attempt without one."""
     errors = [error for error in dict.fromkeys((*batches, *attempts)) if error]
     return {error: attempts[""] * batches.get(error, 0.0) + attempts.get(error, 0.0) for error in errors}
 
 
 def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float]:
-    """By how much ln of a quantity is off what is declared, if it is the same in all skins, and its deviation."""
-    each = [skin.departing(error) for skin in skins if error in skin.errors]
-    means, variances = (np.array([one[part] for one in each if one is not None]) for part in (0, 1))
+    """The mean deviation of ln of a quantity from the declared values, if it is the same in all skins, and its standard
+    deviation.
+    """
+    departures = [skin.departing(error) for skin in skins if error in skin.errors]
+    means, variances = (
+        np.array([departure[part] for departure in departures if departure is not None]) for part in (0, 1)
+    )
     if len(means) < len(skins):
         return 0.0, 0.0
     precision = 1 / (variances + SPREADS[row].usual ** 2)
@@ -557,7 +589,8 @@ def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float
 
 
 def _batches(skins: Sequence[FleetSkin], odds: float) -> tuple[list[Batch], list[str]]:
-    """The priors of the make's quantities, and by each the error of what is declared of all skins, with its odds."""
+    """The priors of the batch's quantities, and the error of the values declared for all skins in each, with its
+    odds."""
     usual, centre = np.array([*_DECLARED, D33_PRIOR[1]]), np.array([0.0, 0.0, D33_PRIOR[0]])
     batches, errors = [Batch(0.0, centre, usual**-2)], [""]
     for row, error in enumerate(ERRORS):

@@ -21,12 +21,12 @@ from underskin.diagnosis.reporting.statements import StatedD33, listed
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE
 from underskin.diagnosis.several.course import (
     Candidate,
-    Course,
-    Courses,
+    SetHistories,
+    SetHistory,
     Shared,
     combined,
-    courses,
     same_strength,
+    set_histories,
     values,
 )
 from underskin.diagnosis.several.sensors import (
@@ -38,11 +38,11 @@ from underskin.diagnosis.several.sensors import (
     array_over_dates,
     causes,
     changed_once,
-    changes,
+    d33_changes,
+    mark_exchanges,
     per_sensor,
     sensors_of,
     unsure_of_changes,
-    with_exchanges,
 )
 from underskin.diagnosis.several.sensors import findings as exchanges
 from underskin.findings.codes import FindingCode
@@ -309,25 +309,25 @@ def together_report(
         if result.problem is not None and result.search is not None
     ]
     names = dated.names
-    posterior = courses(candidates, min(candidate.search.supported for candidate in candidates))
-    undescribed = [candidate.undescribed for candidate in candidates]
-    described = (1 - P_NOT_IN_MODEL_SPACE) * float(np.prod([1 - share for share in undescribed]))
+    posterior = set_histories(candidates, min(candidate.search.supported for candidate in candidates))
+    unlisted_probability = [candidate.unlisted_probability for candidate in candidates]
+    described = (1 - P_NOT_IN_MODEL_SPACE) * float(np.prod([1 - share for share in unlisted_probability]))
     leader = posterior.best[0]
     strengths = _strengths(candidates, leader)
     sensors = [
         sensors_of(campaigns[number], strengths[index], table, used_recordings(results[number]))
-        if undescribed[index] <= _DESCRIBED
+        if unlisted_probability[index] <= _DESCRIBED
         else None  # no known mechanism explains its levels
         for index, number in enumerate(usable)
     ]
     unsure = unsure_of_changes(candidates, leader)
-    single = changes(sensors, [outliers[number] for number in usable], unsure, dated.times)
-    changed = [_with_causes(change, candidates, leader) for change in with_exchanges(single, sensors)]
+    single = d33_changes(sensors, [outliers[number] for number in usable], unsure, dated.times)
+    changed = [_with_causes(change, candidates, leader) for change in mark_exchanges(single, sensors)]
     over = array_over_dates(sensors, unsure, dated.times)
     if over is not None:
         over = replace(over, change=_with_causes(over.change, candidates, leader))
     mechanisms = [*_mechanisms(candidates, posterior, leader, dated), *_aged(changed, dated)]
-    verdict = _verdict(leader, described, undescribed, changed)
+    verdict = _verdict(leader, described, unlisted_probability, changed)
     faults = [faults_of(campaigns[number], results[number]) for number in usable]
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
     last_name, last = names[-1], reports[usable[-1]].d33
@@ -350,7 +350,7 @@ def together_report(
             verdict,
             probability,
             leader,
-            undescribed,
+            unlisted_probability,
             mechanisms,
             dated,
             [*exclusions_in_words(faults, sensors, dated), *contradictory],
@@ -390,7 +390,7 @@ def together_report(
     }
 
 
-def _with_causes(change: Change, candidates: Sequence[Candidate], leader: Course) -> Change:
+def _with_causes(change: Change, candidates: Sequence[Candidate], leader: SetHistory) -> Change:
     """The change with the mechanisms that could cause it, if it is of the array."""
     if change.sensor is not None:
         return change
@@ -412,7 +412,7 @@ def _of_array(over: ArrayOverDates | None, names: Sequence[str]) -> dict[str, An
     }
 
 
-def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str, dict[str, float]]]:
+def _strengths(candidates: Sequence[Candidate], leader: SetHistory) -> list[dict[str, dict[str, float]]]:
     """The parameters of each campaign's mechanisms, pooled over all campaigns with the same strength."""
     strengths: list[dict[str, dict[str, float]]] = [{} for _ in candidates]
     for mechanism in dict.fromkeys(name for names in leader.sets for name in names):
@@ -424,7 +424,7 @@ def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str
     return strengths
 
 
-def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> list[dict[int, Shared]]:
+def _runs(candidates: Sequence[Candidate], leader: SetHistory, mechanism: str) -> list[dict[int, Shared]]:
     """The campaigns in which a mechanism acts, by index, grouped by equal strength."""
     runs: list[dict[int, Shared]] = []
     for index, (candidate, names) in enumerate(zip(candidates, leader.sets, strict=True)):
@@ -439,8 +439,10 @@ def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> li
     return runs
 
 
-def _verdict(leader: Course, described: float, undescribed: Sequence[float], changed: Sequence[Change]) -> str:
-    if max(undescribed) > 0.5:
+def _verdict(
+    leader: SetHistory, described: float, unlisted_probability: Sequence[float], changed: Sequence[Change]
+) -> str:
+    if max(unlisted_probability) > 0.5:
         return "unexplained"
     if leader.probability * described < EXPLAINED:
         return "ambiguous"
@@ -448,7 +450,7 @@ def _verdict(leader: Course, described: float, undescribed: Sequence[float], cha
 
 
 def _mechanisms(
-    candidates: Sequence[Candidate], posterior: Courses, leader: Course, dated: CampaignDates
+    candidates: Sequence[Candidate], posterior: SetHistories, leader: SetHistory, dated: CampaignDates
 ) -> list[dict[str, Any]]:
     rows = []
     for mechanism in dict.fromkeys(name for names in leader.sets for name in names):
@@ -530,7 +532,7 @@ def _groups(changed: Sequence[Change]) -> list[dict[str, Any]]:
     ]
 
 
-def _presence(posterior: Courses, described: float) -> list[dict[str, Any]]:
+def _presence(posterior: SetHistories, described: float) -> list[dict[str, Any]]:
     """The posterior that each mechanism acts in at least one campaign; `described` is that of known physics."""
     once: dict[str, float] = {}
     for sequence in posterior.best:
@@ -542,7 +544,7 @@ def _presence(posterior: Courses, described: float) -> list[dict[str, Any]]:
     ]
 
 
-def _alternative(sequence: Course, described: float, names: Sequence[str]) -> dict[str, Any]:
+def _alternative(sequence: SetHistory, described: float, names: Sequence[str]) -> dict[str, Any]:
     sets = list(dict.fromkeys(name for mechanisms in sequence.sets for name in mechanisms)) or [NOTHING_MISSING]
     text = "; ".join(
         f"{name}: {in_words(mechanisms or (NOTHING_MISSING,))}"
@@ -554,8 +556,8 @@ def _alternative(sequence: Course, described: float, names: Sequence[str]) -> di
 def _statement(
     verdict: str,
     probability: float,
-    leader: Course,
-    undescribed: Sequence[float],
+    leader: SetHistory,
+    unlisted_probability: Sequence[float],
     mechanisms: Sequence[dict[str, Any]],
     dated: CampaignDates,
     decisive: Sequence[str],
@@ -572,7 +574,7 @@ def _statement(
         if mechanism["name"] in {n for in_campaign in leader.sets for n in in_campaign}
     ]
     if verdict == "unexplained":
-        which = ", ".join(name for name, share in zip(names, undescribed, strict=True) if share > 0.5)
+        which = ", ".join(name for name, share in zip(names, unlisted_probability, strict=True) if share > 0.5)
         stated = f"something is missing in {which} that no known mechanism describes ({percent})"
     elif verdict == "no_mismatch":
         agree = f"all {len(names)} campaigns and the paper's model agree within the noise"

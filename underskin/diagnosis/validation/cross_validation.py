@@ -195,7 +195,7 @@ def _predict(
     point, levels = explanation.point, explanation.best.levels
     if not isinstance(model, FrfModel):
         whole = model.predict(point.fit)
-        slopes = whole.slopes[explanation.best.hypothesis.mean_places][:, rows]
+        slopes = whole.slopes[explanation.best.hypothesis.mean_indices][:, rows]
         unsure = float(np.einsum("ir,ij,jr->", slopes, explanation.best.covariance, slopes))
         return replace(_predict_curves(problem.lines, levels, whole.value.real, rows, smaller), unsure=unsure)
     whole = model.predict(point.fit, slopes=False, place=False)

@@ -77,7 +77,7 @@ class Signatures:
         """Predict them around the base model as declared."""
         self._problem = problem
         self._fitter = Fitter([problem.hypothesis((), has_position_scatter=False)])
-        point = self._fitter.begin([np.zeros((1, 0))]).points.fit[0]
+        point = self._fitter.initial([np.zeros((1, 0))]).points.fit[0]
         self._base = self._fitter.hypotheses[0].model.predict(point)
         self.owners: list[str] = []
         self.percent: list[float] = []
@@ -157,7 +157,7 @@ class Signatures:
         """On the nuisances and then on every signature."""
         hypothesis = self._problem.hypothesis((), has_position_scatter=levels.position > 0)
         fitter = Fitter([hypothesis])
-        base = fitter.begin([np.zeros((1, 0))])
+        base = fitter.initial([np.zeros((1, 0))])
         gain, level, position, spread, smooth = (
             np.full((1, 1, 1), value)
             for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
