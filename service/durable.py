@@ -4,20 +4,20 @@ import os
 from pathlib import Path
 
 
-def replace(written: Path, place: Path) -> None:
+def replace(written: Path, path: Path) -> None:
     """Put a file that was written, and flushed to the disk, in the place of another; durable once this returns."""
-    written.replace(place)
-    keep_entries(place.parent)
+    written.replace(path)
+    keep_entries(path.parent)
 
 
-def write_text(place: Path, text: str) -> None:
+def write_text(path: Path, text: str) -> None:
     """Write a small file, whole or not at all; durable once this returns."""
-    written = place.with_name(f"{place.name}.part")
+    written = path.with_name(f"{path.name}.part")
     with written.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
-    replace(written, place)
+    replace(written, path)
 
 
 def keep_entries(folder: Path) -> None:

@@ -59,9 +59,9 @@ class LastingFailure:
         """Warn, unless an error of this kind kept from the same since the last success."""
         kind = (what, type(error))
         with self._lock:
-            known = kind in self._logged
+            is_logged = kind in self._logged
             self._logged.add(kind)
-        if not known:
+        if not is_logged:
             self._logger.warning("%s: %s", what, error)
 
     def is_over(self) -> None:

@@ -15,7 +15,7 @@ from underskin.errors import ErrorCode, InvalidInput
 from underskin.several_errors import SeveralInvalid
 
 _MOST_LOGGED = 3
-_MOST_TOLD = 100  # errors of one body
+_MOST_LISTED_ERRORS = 100  # errors of one body
 _MOST_FIELDS = 200  # of one body: no request has a quarter of them, and each unknown one is an error
 RETRY_LATER = {"Retry-After": "5"}  # seconds
 MEDIA_TYPE = "application/problem+json"
@@ -115,7 +115,7 @@ def _is_umbridge(path: str) -> bool:
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used, of which the first hundred are told: 422."""
     remaining = iter(errors)
-    shortened = [_shortened(error) for error in islice(remaining, _MOST_TOLD)]
+    shortened = [_shortened(error) for error in islice(remaining, _MOST_LISTED_ERRORS)]
     more = sum(1 for _ in remaining)
     entries = [
         {
@@ -137,10 +137,10 @@ def _shortened(error: InvalidInput) -> InvalidInput:
     )
 
 
-def given_twice(field: str, place: str) -> Refusal:
-    """The problem of a key that comes again in its JSON object, at `place`: 422."""
+def given_twice(field: str, part: str) -> Refusal:
+    """The problem of a key that comes again in its JSON object, at `part`: 422."""
     name = _brief(field)
-    allowed = f"is given twice: must be given once in its object; it comes again at {place}"
+    allowed = f"is given twice: must be given once in its object; it comes again at {part}"
     error = {"code": str(ErrorCode.NOT_UNIQUE), "field": name, "index": None, "value": None, "allowed": allowed}
     return Refusal(422, f"{name} {allowed}", title="Invalid input", errors=[error])
 
@@ -169,17 +169,17 @@ def _listed(errors: ValidationError | Sequence[Any]) -> Iterator[InvalidInput]:
     return map(_as_invalid_input, details)
 
 
-def _guessed(error: InvalidInput, known: Collection[str]) -> InvalidInput:
+def _guessed(error: InvalidInput, names: Collection[str]) -> InvalidInput:
     """The error; of an unknown field with the one that was probably meant."""
-    unknown = error.code == ErrorCode.UNKNOWN_FIELD and error.field not in known
-    close = _nearest(error.field, known) if unknown else None
+    unknown = error.code == ErrorCode.UNKNOWN_FIELD and error.field not in names
+    close = _nearest(error.field, names) if unknown else None
     if close is None:
         return error
     return InvalidInput(error.field, error.value, f"{error.allowed}; did you mean {close}?", code=error.code)
 
 
-def _nearest(name: str, known: Collection[str]) -> str | None:
-    return next(iter(get_close_matches(name.lower(), known, n=1)), None)
+def _nearest(name: str, names: Collection[str]) -> str | None:
+    return next(iter(get_close_matches(name.lower(), names, n=1)), None)
 
 
 def validated(kind: type[_Model], document: Any) -> _Model:
@@ -188,7 +188,7 @@ def validated(kind: type[_Model], document: Any) -> _Model:
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        raise invalid_input(_guessed(one, kind.model_fields) for one in _listed(error)) from None
+        raise invalid_input(_guessed(error_of_field, kind.model_fields) for error_of_field in _listed(error)) from None
 
 
 def parsed(kind: type[_Model], document: Any) -> _Model:
@@ -196,11 +196,11 @@ def parsed(kind: type[_Model], document: Any) -> _Model:
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        raise SeveralInvalid([_shortened(one) for one in _listed(error)]) from None
+        raise SeveralInvalid([_shortened(error_of_field) for error_of_field in _listed(error)]) from None
 
 
 # Of pydantic's errors the code and, where a lab's words are clearer than pydantic's, those.
-_KNOWN = {
+_CODES = {
     "greater_than": (ErrorCode.OUT_OF_RANGE, ""),
     "greater_than_equal": (ErrorCode.OUT_OF_RANGE, "must be at least {ge:g}"),
     "less_than": (ErrorCode.OUT_OF_RANGE, ""),
@@ -220,11 +220,11 @@ _NOT_FIELDS = {"body", "query", "scalar", "column"}
 
 
 def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
-    place = [part for part in detail["loc"] if part not in _NOT_FIELDS]
-    names = [part for part in place if isinstance(part, str)]
-    indices = [part for part in place if isinstance(part, int)]
+    path = [part for part in detail["loc"] if part not in _NOT_FIELDS]
+    names = [part for part in path if isinstance(part, str)]
+    indices = [part for part in path if isinstance(part, int)]
     message = str(detail["msg"])
-    code, words = _KNOWN.get(detail["type"], (ErrorCode.INVALID_VALUE, ""))
+    code, words = _CODES.get(detail["type"], (ErrorCode.INVALID_VALUE, ""))
     if detail["type"] == "too_short" and detail["ctx"]["min_length"] > 1:
         words = f"must have at least {detail['ctx']['min_length']} entries"
     return InvalidInput(
@@ -255,12 +255,12 @@ def _in_json(value: Any) -> Any:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def unknown_name(name: str, value: str, known: Collection[str], noun: str) -> InvalidInput:
-    """The error of a name that is none of those `known`; `noun`: what such a name is, such as a query parameter."""
-    if not known:
+def unknown_name(name: str, value: str, names: Collection[str], noun: str) -> InvalidInput:
+    """The error of a name that is none of those `names`; `noun`: what such a name is, such as a query parameter."""
+    if not names:
         words = ", which has none"
     else:
-        close = _nearest(name, known)
+        close = _nearest(name, names)
         guess = f"; did you mean {close}?" if close else "."
-        words = f"{guess} Known: {', '.join(known)}"
+        words = f"{guess} Known: {', '.join(names)}"
     return InvalidInput(name, value, f"is not a {noun} of this request{words}", code=ErrorCode.UNKNOWN_FIELD)

@@ -146,23 +146,23 @@ def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
 def _login_first(method: str, path: str, query: bytes, headers: Mapping[bytes, bytes]) -> Refusal:
     """To the login, and back from it to what was asked for or, where a form was sent, to the page of the form."""
     if method in SAFE:
-        asked = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
-        return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={quote(asked)}"})
+        target = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
+        return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={quote(target)}"})
     form = "/" + headers.get(b"referer", b"").decode("latin-1").partition("//")[2].partition("/")[2]
     lost = {"Location": f"/login?next={quote(form)}&unsent=1"}
     return Refusal(303, "The session has ended: log in and send the form again.", headers=lost)
 
 
 def _key_first(authorization: bytes, missing: bool) -> Refusal:
-    known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
+    reason = "This key is not known; it may have been revoked." if authorization else "A key is needed."
     if missing:
-        known = (
+        reason = (
             "A key is needed, and the service knows none: keys.json is missing from its data folder. "
             "Put it back, or make a key."
         )
     return Refusal(
         401,
-        f"{known} Send Authorization: Bearer KEY (`underskin key create NAME` makes one).",
+        f"{reason} Send Authorization: Bearer KEY (`underskin key create NAME` makes one).",
         headers={"WWW-Authenticate": "Bearer"},
     )
 

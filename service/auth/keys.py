@@ -154,7 +154,7 @@ def keys_missing(keys: KeyStore) -> str:
 
 
 def _read(path: Path) -> tuple[Key, ...]:
-    keys = tuple(Key(**entry) for entry in json.loads(path.read_text())["keys"])
+    keys = tuple(Key(**fields) for fields in json.loads(path.read_text())["keys"])
     for key in keys:
         if not (isinstance(key.name, str) and len(bytes.fromhex(key.sha256)) == sha256().digest_size):
             raise ValueError(f"key {key.name!r} has no digest")

@@ -70,7 +70,7 @@ class ArrivingFiles:
         """An empty folder."""
         self._folder = folder
         self._threads = threads
-        self._begun = 0
+        self._count = 0
         self._unwritten: list[ArrivingFile] = []  # the last of them is the one that comes
         self._held_bytes = 0
 
@@ -94,8 +94,8 @@ class ArrivingFiles:
 
     def begin(self) -> ArrivingFile:
         """The next file comes."""
-        file = ArrivingFile(self._folder / str(self._begun))
-        self._begun += 1
+        file = ArrivingFile(self._folder / str(self._count))
+        self._count += 1
         self._unwritten.append(file)
         return file
 

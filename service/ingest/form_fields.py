@@ -26,16 +26,16 @@ def split(
     errors += [not_unique(name, f"{count[name]} parts") for name in once if count[name] > 1]
     if errors:
         raise invalid_input(errors)
-    values = {str(one.field): one.path.read_bytes().decode() for one in form if one.field in texts}
-    return values, [one for one in uploads if one.field not in texts]
+    values = {str(upload.field): upload.path.read_bytes().decode() for upload in form if upload.field in texts}
+    return values, [upload for upload in uploads if upload.field not in texts]
 
 
 def _errors(upload: Upload, texts: Collection[str], single_files: Collection[str]) -> Iterator[InvalidInput]:
     """What is wrong with one part of a form."""
     name = upload.field or ""
-    known = (*texts, FILE, *single_files)
-    if upload.label is None and name not in known:
-        yield unknown_name(name, _start(upload), known, "form field")
+    names = (*texts, FILE, *single_files)
+    if upload.label is None and name not in names:
+        yield unknown_name(name, _start(upload), names, "form field")
     elif name in texts and upload.label is not None:
         yield wrong_type(name, upload.label, "must be a text, not a file")
     elif name in texts and not _is_short_text(upload):

@@ -41,8 +41,8 @@ def of_skin(rig: RigDescription) -> str:
         for name, value in rig.document.get("recording", {}).items()
         if name != "recorded_at" or isinstance(value, Mapping)
     }
-    said = {"recording": recording} if "recording" in rig.document else {}
-    return orjson.dumps({**rig.document, **said}).decode()
+    recording_part = {"recording": recording} if "recording" in rig.document else {}
+    return orjson.dumps({**rig.document, **recording_part}).decode()
 
 
 def with_skin(template: str, skin: Mapping[str, Any]) -> dict[str, Any]:

@@ -32,7 +32,7 @@ class Repeat:
         return f"{which} in campaign {self.campaign_id}: identical recordings count once"
 
 
-def already_kept(
+def earlier_campaign(
     connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None
 ) -> tuple[str, str] | None:
     """In which campaign a campaign's recordings are already, as a sentence, and its id; `corrects` is not looked at.
@@ -58,7 +58,7 @@ def changes_nothing(connection: Connection, campaign: Campaign, skin_id: str | N
     if corrects is None:
         return False
     row = campaigns.find(connection, corrects)
-    if row.excluded or (skin_id is not None and not skins.are_one(connection, skin_id, row.skin_id)):
+    if row.excluded or (skin_id is not None and not skins.are_joined(connection, skin_id, row.skin_id)):
         return False
     before = campaigns.load(connection, row)
     if codec.about(before) != codec.about(campaign) or len(before.recordings) != len(campaign.recordings):
@@ -72,7 +72,7 @@ def otherwise_named(connection: Connection, campaign: Campaign, corrects: str | 
     if corrects is None or campaign.skin.id is None:
         return None
     skin_id = str(campaigns.find(connection, corrects).skin_id)
-    return None if skins.are_one(connection, campaign.skin.id, skin_id) else skin_id
+    return None if skins.are_joined(connection, campaign.skin.id, skin_id) else skin_id
 
 
 def left_out(connection: Connection, root: str, points: Collection[HistoryPoint]) -> dict[HistoryPoint, Repeat]:

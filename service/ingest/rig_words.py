@@ -10,7 +10,7 @@ _SIGNS = {-1: "turned round", AUTOMATIC: "turned round where it falls as it is p
 _CURVES = {"file": "a curve is the whole file", "groups": "a curve is each group of rows"}
 
 
-def said_of(rig: RigDescription) -> list[str]:
+def rig_sentences(rig: RigDescription) -> list[str]:
     """A sentence for each channel, one for all that is said of the recordings, and one for what a curve is, if that is
     said. Of formulas, tare and trim the reading's own notes tell."""
     channels = [f"{CHANNELS[field]}: {_channel(rig, mapping)}" for field, mapping in rig.channels.items()]
@@ -20,7 +20,7 @@ def said_of(rig: RigDescription) -> list[str]:
     return [*_instrument(rig.document), *channels, *recordings, *_curve(rig), *checked]
 
 
-def said_of_file(fields: Mapping[str, Any]) -> str:
+def template_sentence(fields: Mapping[str, Any]) -> str:
     """`said of this file alone: sensor that was pressed s0; preload F 1 N`."""
     return f"said of this file alone: {'; '.join(_values(fields))}"
 

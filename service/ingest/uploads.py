@@ -56,7 +56,7 @@ class Upload:
 
 def texts(fields: Iterable[Upload], most: int) -> dict[str, str]:
     """What fields of a form say, by name, each up to so many bytes."""
-    return {one.field or "": one.text(most) for one in fields}
+    return {upload.field or "": upload.text(most) for upload in fields}
 
 
 class UploadFolder:
@@ -67,9 +67,9 @@ class UploadFolder:
         parent.mkdir(parents=True, exist_ok=True)
         with (parent / ".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            for left in parent.iterdir():
-                if left.is_dir() and _nobody_uses(left):
-                    shutil.rmtree(left)
+            for leftover in parent.iterdir():
+                if leftover.is_dir() and _is_unused(leftover):
+                    shutil.rmtree(leftover)
             self.path = Path(tempfile.mkdtemp(dir=parent))
             self._in_use = (self.path / ".lock").open("w")  # held as long as the process lives
             fcntl.flock(self._in_use, fcntl.LOCK_EX)
@@ -81,7 +81,7 @@ class UploadFolder:
         self._in_use.close()
 
 
-def _nobody_uses(folder: Path) -> bool:
+def _is_unused(folder: Path) -> bool:
     try:
         with (folder / ".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -97,7 +97,7 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
     Raises Refusal where a form cannot be read (400), is of the other kind (415) or the body has more than `most_bytes`,
     besides the limit of all uploads (413), StorageFailed where the disk is full or takes nothing.
     """
-    with disk_errors_said(parent):
+    with disk_errors_refused(parent):
         async with ArrivingFiles.below(parent.path, parent.threads) as files:
             content_type, options = parse_options_header(request.headers.get("content-type", ""))
             if content_type == b"application/x-www-form-urlencoded":
@@ -106,11 +106,11 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
             if content_type == b"multipart/form-data":
                 yield await _take_parts(_body(request, most_bytes), files, options.get(b"boundary", b""))
             else:
-                yield [await _take_whole(_body(request, most_bytes), files)]
+                yield [await _receive_body(_body(request, most_bytes), files)]
 
 
 @contextmanager
-def disk_errors_said(folder: UploadFolder) -> Iterator[None]:
+def disk_errors_refused(folder: UploadFolder) -> Iterator[None]:
     """Turns the system's error for a full disk into StorageFull, for one that takes nothing into StorageFailed, and for
     uploads' folder gone into StoreMoved."""
     try:
@@ -136,7 +136,7 @@ async def _body(request: Request, most_bytes: float) -> AsyncIterator[bytes]:
         yield chunk
 
 
-async def _take_whole(body: AsyncIterator[bytes], files: ArrivingFiles) -> Upload:
+async def _receive_body(body: AsyncIterator[bytes], files: ArrivingFiles) -> Upload:
     file = files.begin()
     async for chunk in body:
         files.take(chunk)

@@ -65,7 +65,7 @@ def _serve(connection: socket.socket, work: Callable[[], None]) -> None:
             for key, _ in waiting.select():
                 if key.fileobj is not connection:
                     pid, status = key.data
-                    _tell_the_end(pid, status)
+                    _report_exit(pid, status)
                     waiting.unregister(key.fd)
                     os.close(key.fd)
                     continue
@@ -98,7 +98,7 @@ def _become(descriptors: list[int], work: Callable[[], None]) -> NoReturn:
         os._exit(code)
 
 
-def _tell_the_end(pid: int, status: int) -> None:
+def _report_exit(pid: int, status: int) -> None:
     """Write how a worker ended to the descriptor `status`: its exit code, or −signal."""
     code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     with suppress(OSError):  # nobody wants to know any more

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal
 
-from service.jobs.process import Given, WorkerProcesses
+from service.jobs.process import CampaignInput, WorkerProcesses
 from service.jobs.runner import logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
@@ -47,7 +47,7 @@ class Planner:
         self._store = store
         self._processes = processes
         self._workers = workers
-        self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
+        self._plans: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
         self._waiting: SimpleQueue[tuple[AnyRow, RigLimits, Planned] | None] = SimpleQueue()
         self._ending = threading.Event()
@@ -58,17 +58,19 @@ class Planner:
         Refusal 503 where too many wait, or where this server runs no diagnoses."""
         key = (str(row.id), repr(limits))
         with self._lock:
-            known = self._known.get(key)
-            if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _RETRY_S):
-                self._known.move_to_end(key)
-                return known
+            remembered = self._plans.get(key)
+            if remembered is not None and (
+                remembered.state != "failed" or time.monotonic() < remembered.failed_at + _RETRY_S
+            ):
+                self._plans.move_to_end(key)
+                return remembered
             if not self._workers:
                 raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
-            if sum(one.state in ("queued", "running") for one in self._known.values()) >= _MOST_WAITING:
+            if sum(job.state in ("queued", "running") for job in self._plans.values()) >= _MOST_WAITING:
                 raise Refusal(503, "Many plans are being worked out: try again in a minute.")
-            planned = self._known[key] = Planned()
-            while len(self._known) > _REMEMBERED:
-                self._known.popitem(last=False)
+            planned = self._plans[key] = Planned()
+            while len(self._plans) > _REMEMBERED:
+                self._plans.popitem(last=False)
             self._waiting.put((row, limits, planned))
             if self._thread.ident is None:
                 self._thread.start()
@@ -94,12 +96,12 @@ class Planner:
         planned.state = "running"
         campaign, _ = self._store.read(diagnoses.campaign_of, row)
         without = diagnoses.without(row)
-        given = [Given.of(campaign, row.skin_id)]
+        given = [CampaignInput.of(campaign, row.skin_id)]
         with self._processes.at_work(given, limits=asdict(limits), without=without) as worker:
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)
-                planned.progress = worker.said["progress"]
-            if "plan" in worker.said:
-                planned.plan, planned.state = worker.said["plan"], "done"
+                planned.progress = worker.messages["progress"]
+            if "plan" in worker.messages:
+                planned.plan, planned.state = worker.messages["plan"], "done"
             else:
                 planned.fail(worker.failure if worker.ended else "the server ended")

@@ -22,7 +22,7 @@ from underskin.recordings.campaign import Campaign
 from underskin.recordings.readers import json_file
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", "UNDERSKIN_MECHANISMS", "UNDERSKIN_TIME_ZONE")
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LAST_WORDS = 2000
 _WAIT_TIMES = 5  # as long by the clock as on a processor: a busy machine is no reason to end a diagnosis
 _LOADING_S = (
@@ -35,7 +35,7 @@ class ForkServer:
 
     def __init__(self, table: Path) -> None:
         """Start it; raises OSError where the system has no room for a process."""
-        environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _ONE_THREAD
+        environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _SINGLE_THREAD
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
         command = [sys.executable, "-P", "-m", "service.jobs.fork_server", str(table)]
         with ExitStack() as shared:
@@ -59,10 +59,10 @@ class ForkServer:
 
             def pipe(*, to_worker: bool) -> BinaryIO:
                 reads, writes = os.pipe()
-                own, other = (writes, reads) if to_worker else (reads, writes)
-                descriptors.append(other)
-                theirs.callback(os.close, other)
-                return ours.enter_context(os.fdopen(own, "wb" if to_worker else "rb"))
+                of_server, of_worker = (writes, reads) if to_worker else (reads, writes)
+                descriptors.append(of_worker)
+                theirs.callback(os.close, of_worker)
+                return ours.enter_context(os.fdopen(of_server, "wb" if to_worker else "rb"))
 
             descriptors: list[int] = []
             stdin, stdout = pipe(to_worker=True), pipe(to_worker=False)
@@ -122,7 +122,7 @@ class WorkerProcess:
 
 
 @dataclass(frozen=True)
-class Given:
+class CampaignInput:
     """A campaign for a worker: its document, its skin, and the recordings left out of it, each with the reason."""
 
     document: bytes
@@ -166,16 +166,16 @@ class WorkerProcesses:
 
     def at_work(
         self,
-        campaigns: Sequence[Given],
+        campaigns: Sequence[CampaignInput],
         limits: dict[str, Any] | None = None,
         without: Sequence[str] = (),
         kind: DiagnosisKind = "campaign",
         name: str | None = None,
     ) -> "Worker":
         """A worker at its job, on campaigns; see `Job`."""
-        parts = [Part(one.skin_id, len(one.document), one.excluded) for one in campaigns]
+        parts = [Part(campaign.skin_id, len(campaign.document), campaign.excluded) for campaign in campaigns]
         job = Job(parts, self.table_sha256, self._memory_bytes, self._cpu_seconds, limits, without, kind, name)
-        content = [one.document for one in campaigns]
+        content = [campaign.document for campaign in campaigns]
         with self._lock:
             try:
                 process = self._running().fork()
@@ -217,7 +217,7 @@ class Worker:
         self, job: Job, documents: Sequence[bytes], process: WorkerProcess, is_done: Callable[[], None]
     ) -> None:
         """`is_done` is called once the process has ended and nothing is shared with it any more."""
-        self.said: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
+        self.messages: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
         self.news = threading.Event()
         self.ended = False
         self.too_long = f"it takes more than {job.cpu_seconds:g} s on a processor (UNDERSKIN_DIAGNOSIS_SECONDS)"
@@ -239,8 +239,8 @@ class Worker:
     @property
     def failure(self) -> str:
         """Why there is no report, once it has ended."""
-        if "error" in self.said:
-            return str(self.said["error"])
+        if "error" in self.messages:
+            return str(self.messages["error"])
         if self._code is None:
             return "its process ended with the one that had started it"
         if self._code == -signal.SIGXCPU:
@@ -265,7 +265,7 @@ class Worker:
     def _listen(self) -> None:
         for line in self._process.stdout:
             try:
-                self.said |= orjson.loads(line)
+                self.messages |= orjson.loads(line)
             except orjson.JSONDecodeError:  # killed in the midst of a line
                 break
         self._code = self._process.wait()

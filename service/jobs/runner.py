@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.jobs.process import Given, Worker, WorkerProcesses
+from service.jobs.process import CampaignInput, Worker, WorkerProcesses
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFailed, StoreMoved, diagnoses
 from underskin import __version__
@@ -44,12 +44,12 @@ class _Job:
     thread: threading.Thread
     aside: bool
     worker: Worker | None = None
-    begun: float = field(default_factory=time.monotonic)
+    started: float = field(default_factory=time.monotonic)
 
     @property
     def lasted_s(self) -> float:
         """How long it runs."""
-        return time.monotonic() - self.begun
+        return time.monotonic() - self.started
 
 
 class Runner:
@@ -157,14 +157,14 @@ class Runner:
     def _run(self, row: AnyRow) -> None:
         """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
         without = diagnoses.without(row)
-        with self._processes.at_work(self._given(row), None, without, row.kind, row.name) as worker:
+        with self._processes.at_work(self._campaign_inputs(row), None, without, row.kind, row.name) as worker:
             with self._lock:
                 job = self._jobs[row.number]
-                job.worker, job.begun = worker, time.monotonic()
+                job.worker, job.started = worker, time.monotonic()
             while not worker.ended and not self._ending.is_set():
                 worker.news.wait(_BEAT_S)
                 worker.news.clear()
-                if not self._is_ours(row, worker.said["progress"]):
+                if not self._is_ours(row, worker.messages["progress"]):
                     return
                 if job.aside and job.lasted_s > _SHORT_S and not worker.ended:
                     self._long.add(row.number)
@@ -174,24 +174,24 @@ class Runner:
                     return
             if not worker.ended:
                 self._release(row)
-            elif "report" in worker.said:
-                self._end(row, diagnoses.finish, worker.said["report"], worker.said.get("figures"))
+            elif "report" in worker.messages:
+                self._end(row, diagnoses.finish, worker.messages["report"], worker.messages.get("figures"))
             else:
                 logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
                 self._end(row, diagnoses.fail, worker.failure)
 
-    def _given(self, row: AnyRow) -> list[Given]:
+    def _campaign_inputs(self, row: AnyRow) -> list[CampaignInput]:
         """The campaigns of a diagnosis, read one after another; those of one name are told apart by their ids."""
         members = self._store.read(diagnoses.members, row)
         names = [member.name for member in members]
-        given = []
+        campaigns = []
         for member in members:
-            campaign, excluded = self._store.read(diagnoses.as_asked, member)
+            campaign, excluded = self._store.read(diagnoses.as_diagnosed, member)
             if names.count(member.name) > 1:
                 campaign = replace(campaign, name=f"{member.name[: LONGEST_NAME // 2]} ({member.campaign_id})")
-            left_out = [(left.recording, left.reason) for left in excluded]
-            given.append(Given.of(campaign, member.skin_id, left_out))
-        return given
+            excluded_names = [(exclusion.recording, exclusion.reason) for exclusion in excluded]
+            campaigns.append(CampaignInput.of(campaign, member.skin_id, excluded_names))
+        return campaigns
 
     def _is_ours(self, row: AnyRow, progress: float) -> bool:
         """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from underskin.recordings.reading import Reading
     from underskin.surrogate.sigma_table import SigmaTable
 
-Say = Callable[[dict[str, Any]], None]
+SendMessage = Callable[[dict[str, Any]], None]
 
 _FEW_NUMBERS: dict[str, Any] = {
     "schema": "campaign/1",
@@ -99,7 +99,7 @@ def work(table: "SigmaTable | None", problem: str) -> None:
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what a library prints is no answer
 
-    def say(message: dict[str, Any]) -> None:
+    def send_message(message: dict[str, Any]) -> None:
         answers.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
 
     stdin = os.fdopen(0, "rb", closefd=False)
@@ -110,14 +110,16 @@ def work(table: "SigmaTable | None", problem: str) -> None:
     documents = [stdin.read(part.size) for part in job.parts]
     threading.Thread(target=_end_with_the_runner, args=(stdin,), daemon=True).start()
     if table is None:
-        say({"error": problem})
+        send_message({"error": problem})
         return
     try:
-        _work(job, documents, table, say)
+        _work(job, documents, table, send_message)
     except UnderskinError as error:
-        say({"error": str(error)})
+        send_message({"error": str(error)})
     except MemoryError:
-        say({"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"})
+        send_message(
+            {"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"}
+        )
 
 
 def warm_up(table: "SigmaTable") -> None:
@@ -132,7 +134,7 @@ def warm_up(table: "SigmaTable") -> None:
         figure.to_json()
 
 
-def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", say: Say) -> None:
+def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", send_message: SendMessage) -> None:
     """The report, with what was left out of it among the findings, within the limit on memory."""
     from underskin.errors import TableError
     from underskin.mechanisms.registry import CATALOGUE
@@ -146,12 +148,12 @@ def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", say: Say) -
     limit_process(job.memory_bytes, cpu_seconds=math.ceil(job.cpu_seconds))
     readings = [Reading(*from_dict(_read(document)), []) for document in documents]  # an older server read otherwise
     if job.kind == "campaign":
-        _diagnose(job, readings[0], table, say)
+        _diagnose(job, readings[0], table, send_message)
     else:
-        say({"report": _with_left_out(job, _together(job, readings, table, say), readings)})
+        send_message({"report": _with_exclusions(job, _together(job, readings, table, send_message), readings)})
 
 
-def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", say: Say) -> None:
+def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", send_message: SendMessage) -> None:
     """One campaign; its figures come after the report, which is kept without them too."""
     from underskin.diagnosis.pipeline import diagnose, with_refused
     from underskin.diagnosis.planning.rig_limits import RigLimits
@@ -159,23 +161,25 @@ def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", say: Say) -> No
     from underskin.diagnosis.reporting.report import report
 
     limits = RigLimits(**job.limits or {})
-    diagnosis = diagnose(reading.campaign, table, lambda share: say({"progress": share}), limits, job.without)
+    diagnosis = diagnose(reading.campaign, table, lambda share: send_message({"progress": share}), limits, job.without)
     if job.limits is not None:
-        say({"plan": diagnosis.next_experiment})
+        send_message({"plan": diagnosis.next_experiment})
         return
     diagnosis = with_refused(diagnosis, reading.problems)
     document = report(diagnosis)
-    say({"report": _with_left_out(job, document, [reading])})
-    say({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
+    send_message({"report": _with_exclusions(job, document, [reading])})
+    send_message({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
 
 
-def _together(job: Job, readings: "Sequence[Reading]", table: "SigmaTable", say: Say) -> dict[str, Any]:
+def _together(
+    job: Job, readings: "Sequence[Reading]", table: "SigmaTable", send_message: SendMessage
+) -> dict[str, Any]:
     """The report of several campaigns of a skin, or of those of a fleet."""
     name = job.name or ""
     campaigns = [reading.campaign for reading in readings]
 
     def progress(share: float) -> None:
-        say({"progress": share})
+        send_message({"progress": share})
 
     if job.kind == "skin":
         from underskin.diagnosis.several.campaigns import diagnose_together
@@ -189,25 +193,29 @@ def _together(job: Job, readings: "Sequence[Reading]", table: "SigmaTable", say:
     return diagnose_fleet(skins, table, name, job.without, progress)
 
 
-def _with_left_out(job: Job, document: dict[str, Any], readings: "Sequence[Reading]") -> dict[str, Any]:
+def _with_exclusions(job: Job, document: dict[str, Any], readings: "Sequence[Reading]") -> dict[str, Any]:
     """A report whose findings begin with the recordings that had been excluded; of several campaigns with its name, and
     with those that are refused."""
     from underskin.diagnosis.pipeline import refused
     from underskin.findings.codes import Reason
     from underskin.findings.finding import Finding
 
-    left_out = [
+    exclusions = [
         (reading.campaign.name, Finding(Reason.EXCLUDED, recording, "", {"excluded_for": reason}).in_report())
         for part, reading in zip(job.parts, readings, strict=True)
         for recording, reason in part.excluded
     ]
     if job.kind != "campaign":
-        left_out += [(one.campaign.name, entry.in_report()) for one in readings for entry in refused(one.problems)]
-    said = [
+        exclusions += [
+            (reading.campaign.name, refusal.in_report())
+            for reading in readings
+            for refusal in refused(reading.problems)
+        ]
+    sentences = [
         finding if job.kind == "campaign" else {**finding, "statement": f"{name}: {finding['statement']}"}
-        for name, finding in left_out
+        for name, finding in exclusions
     ]
-    return {**document, "findings": said + list(document["findings"])}
+    return {**document, "findings": sentences + list(document["findings"])}
 
 
 def _read(document: bytes) -> Any:

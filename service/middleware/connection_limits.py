@@ -70,12 +70,14 @@ class ConnectionLimits:
         many: those without a request, or that are answered, before those whose body or answer has stopped; `urgently`
         for however short a time."""
         waiting = [
-            (one.is_served(), -wait, one) for one in connections if (wait := one.waits_for_client_s()) is not None
+            (connection.is_served(), -wait, connection)
+            for connection in connections
+            if (wait := connection.waits_for_client_s()) is not None
         ]
-        waiting.sort(key=lambda entry: entry[:2])
-        idle = [one for served, wait, one in waiting if urgently or not served or -wait > _SERVED_WAIT_S]
-        for one in idle[:places]:
-            one.give_way()
+        waiting.sort(key=lambda candidate: candidate[:2])
+        idle = [connection for served, wait, connection in waiting if urgently or not served or -wait > _SERVED_WAIT_S]
+        for connection in idle[:places]:
+            connection.give_way()
         return len(idle) >= places
 
     def reached(self, limit: Limit, what: str) -> None:

@@ -113,5 +113,5 @@ def _of_the_store(request: Request, error: Exception) -> Refusal:
 
 def _unreadable(error: RequestValidationError) -> Refusal | None:
     """A body that is not JSON is no question of fields."""
-    reasons = [entry["ctx"]["error"] for entry in error.errors() if entry["type"] == "json_invalid"]
+    reasons = [detail["ctx"]["error"] for detail in error.errors() if detail["type"] == "json_invalid"]
     return Refusal(400, f"The body is not JSON: {reasons[0]}.") if reasons else None

@@ -21,17 +21,17 @@ class HeldBodies:
         """One of them while its request is under way: to be told how many bytes it has by now. That raises Refusal 503
         where there is no room for them.
         """
-        own = 0
+        counted = 0
 
         def hold(size: int) -> None:
-            nonlocal own
-            self._bytes -= own
-            own = max(0, size - _SHORT_BYTES)
-            self._bytes += own
-            if own and self._bytes > self._most_bytes:
+            nonlocal counted
+            self._bytes -= counted
+            counted = max(0, size - _SHORT_BYTES)
+            self._bytes += counted
+            if counted and self._bytes > self._most_bytes:
                 raise Refusal(503, "Other large bodies are under way; try again in a while.", headers=RETRY_LATER)
 
         try:
             yield hold
         finally:
-            self._bytes -= own
+            self._bytes -= counted

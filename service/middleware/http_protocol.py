@@ -146,30 +146,30 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         """Whether the last request is."""
         return self.cycle is not None and bool(self.cycle.response_complete)
 
-    def _others(self) -> list["LimitedHttpProtocol"]:
+    def _other_connections(self) -> list["LimitedHttpProtocol"]:
         """The other connections that are open."""
-        ours = [one for one in self.connections if isinstance(one, LimitedHttpProtocol)]
-        return [one for one in ours if one is not self and not one.transport.is_closing()]
+        ours = [protocol for protocol in self.connections if isinstance(protocol, LimitedHttpProtocol)]
+        return [protocol for protocol in ours if protocol is not self and not protocol.transport.is_closing()]
 
     def _find_room(self) -> None:
         """For this connection, which is one too many unless others are closing."""
-        others, most = self._others(), self.limits.connections
-        if len(others) < most:
+        open_protocols, most = self._other_connections(), self.limits.connections
+        if len(open_protocols) < most:
             return
-        said = f"{most} connections are open (UNDERSKIN_MAX_CONNECTIONS): new ones take the place of idle ones"
-        self.limits.reached("connections", said)
-        if self.limits.make_room(others, len(others) - most + 1, urgently=False):
+        message = f"{most} connections are open (UNDERSKIN_MAX_CONNECTIONS): new ones take the place of idle ones"
+        self.limits.reached("connections", message)
+        if self.limits.make_room(open_protocols, len(open_protocols) - most + 1, urgently=False):
             return
-        left = self._others()
-        if len(left) < most + SPARE or self.limits.make_room(left, 1, urgently=True):
+        still_open = self._other_connections()
+        if len(still_open) < most + SPARE or self.limits.make_room(still_open, 1, urgently=True):
             self.app = _overloaded(self.app)
         else:
             self.transport.abort()
 
     def _check_all(self) -> None:
-        for one in list(self.connections):
-            if isinstance(one, LimitedHttpProtocol):
-                one.check_progress()
+        for protocol in list(self.connections):
+            if isinstance(protocol, LimitedHttpProtocol):
+                protocol.check_progress()
         self.loop.call_later(min(_SELDOMEST_CHECK_S, self.limits.idle_s / _CHECKS), self._check_all)
 
     def check_progress(self) -> None:

@@ -40,29 +40,29 @@ def read(stream: BinaryIO, most_numbers: int = sys.maxsize) -> Any:
     limits = ParsingLimits(memory_bytes, ParsingLimits.from_environment().seconds)
     try:
         most = str(_MOST_PLAIN_BYTES), str(most_numbers)
-        found = call_apart(_READ, stream, "body", *most, what="JSON", limits=limits)
+        value = call_apart(_READ, stream, "body", *most, what="JSON", limits=limits)
     except FileError as error:
         raise _too_large(f"cannot be read: {error.reason}") from None
-    if "plain" in found:
+    if "plain" in value:
         raise _too_large(
-            f"has {found['plain'] / 1e6:.1f} MB beside its long lists of numbers; {_MOST_PLAIN_BYTES / 1e6:g} MB may be"
+            f"has {value['plain'] / 1e6:.1f} MB beside its long lists of numbers; {_MOST_PLAIN_BYTES / 1e6:g} MB may be"
         )
-    if "numbers" in found:
-        raise _too_large(f"has a list of {found['numbers']:,} numbers; {most_numbers:,} may be in one")
-    if "invalid" in found:
-        line, column, wrong = found["invalid"]
+    if "numbers" in value:
+        raise _too_large(f"has a list of {value['numbers']:,} numbers; {most_numbers:,} may be in one")
+    if "invalid" in value:
+        line, column, wrong = value["invalid"]
         raise NotJson(f"line {line}, column {column}: {wrong}")
-    if "repeated" in found:
-        raise given_twice(*found["repeated"])
-    return found["document"]
+    if "repeated" in value:
+        raise given_twice(*value["repeated"])
+    return value["document"]
 
 
 def as_lists(value: Any) -> Any:
     """The same with lists in place of arrays."""
     if isinstance(value, dict):
-        return {name: as_lists(entry) for name, entry in value.items()}
+        return {name: as_lists(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [as_lists(entry) for entry in value]
+        return [as_lists(item) for item in value]
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 

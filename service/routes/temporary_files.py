@@ -9,7 +9,7 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.types import Receive, Scope, Send
 
-from service.ingest.uploads import UploadFolder, disk_errors_said
+from service.ingest.uploads import UploadFolder, disk_errors_refused
 from service.middleware.asgi_middleware import WITHOUT_CONTENT
 
 
@@ -21,10 +21,10 @@ class MadeFile(FileResponse):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """The answer."""
-        whole = [(name, value) for name, value in scope["headers"] if name != b"range"]
+        headers = [(name, value) for name, value in scope["headers"] if name != b"range"]
         self.headers["Accept-Ranges"] = "none"
         try:
-            await super().__call__({**scope, "headers": whole}, receive, send)
+            await super().__call__({**scope, "headers": headers}, receive, send)
         finally:
             with anyio.CancelScope(shield=True):
                 await anyio.to_thread.run_sync(Path(self.path).unlink)
@@ -41,7 +41,7 @@ def made_file(request: Request, name: str, media_type: str, write: Callable[[Pat
         del answer.headers["Content-Length"]  # as long as nothing is written, nobody knows it
         return answer
     folder: UploadFolder = request.app.state.uploads
-    with disk_errors_said(folder):
+    with disk_errors_refused(folder):
         with tempfile.NamedTemporaryFile(dir=folder.path, delete=False) as file:
             path = Path(file.name)
         try:

@@ -78,9 +78,9 @@ def _builds_on(connection: Connection, row: AnyRow) -> str | None:
         return "was discarded already"
     if row.corrects is not None or row.corrected_by is not None:
         return "is part of a correction: withdraw it"
-    alone = select(diagnoses.c.number).where(diagnoses.c.campaign == row.number)
+    of_single = select(diagnoses.c.number).where(diagnoses.c.campaign == row.number)
     together = select(diagnosed_campaigns.c.diagnosis).where(diagnosed_campaigns.c.campaign == row.number)
-    diagnosed = any(connection.execute(query.limit(1)).first() is not None for query in (alone, together))
+    diagnosed = any(connection.execute(query.limit(1)).first() is not None for query in (of_single, together))
     return "was diagnosed: withdraw it" if diagnosed else None
 
 

@@ -48,7 +48,7 @@ def make(database: Database, file: Path, progress: Progress = untold) -> None:
     try:
         if database.is_sqlite:
             _copy_sqlite(_sqlite_file(database), part, _BACKING_UP, progress)
-            _make_one_file(part)
+            _as_single_file(part)
         else:
             pg_dumps.dump(database, part, partial(progress, _BACKING_UP))
         progress(_READING_BACK, 0, None)
@@ -97,10 +97,10 @@ def replace_with(database: Database, file: Path, progress: Progress = untold) ->
     if database.is_sqlite:
         target = _sqlite_file(database)
         with closing(sqlite3.connect(target, timeout=60)) as store:
-            own = identity.number_in(store)
+            number_before = identity.number_in(store)
             _copy_sqlite(file, target, _RESTORING, progress)
-            if own and not identity.number_in(store):  # a backup of before stores had one
-                identity.put(store, own)
+            if number_before and not identity.number_in(store):  # a backup of before stores had one
+                identity.put(store, number_before)
     else:
         pg_dumps.replace(database, file, partial(progress, _RESTORING))
 
@@ -110,19 +110,19 @@ def _copy_sqlite(source: Path, target: Path, what: str, progress: Progress) -> N
         with closing(_open_sqlite(source)) as origin, closing(sqlite3.connect(target, timeout=60)) as copy:
             page_bytes = origin.execute("PRAGMA page_size").fetchone()[0]
 
-            def told(_status: int, remaining: int, pages: int) -> None:
+            def on_step(_status: int, remaining: int, pages: int) -> None:
                 progress(what, (pages - remaining) * page_bytes, pages * page_bytes)
 
             # A transaction of the source holds one state of it: its writers do not disturb a copy in steps, which
             # would begin anew with each of their commits. The target is replaced in one transaction of its own.
             origin.execute("BEGIN")
             origin.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            origin.backup(copy, pages=STEP_PAGES, progress=told)
+            origin.backup(copy, pages=STEP_PAGES, progress=on_step)
     except sqlite3.Error as error:
         raise StoreError(f"{source} cannot be copied to {target}: {error}") from error
 
 
-def _make_one_file(copy: Path) -> None:
+def _as_single_file(copy: Path) -> None:
     """Without a write-ahead log, so that it can be read where nothing can be written beside it."""
     with closing(sqlite3.connect(copy)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")

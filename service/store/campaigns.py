@@ -191,8 +191,8 @@ def _counting_as(skin_id: str) -> ColumnElement[bool]:
 
 
 def _has(kind: str) -> ColumnElement[bool]:
-    own = (recordings.c.campaign == campaigns.c.number) & (recordings.c.kind == kind)
-    return exists(select(recordings.c.kind).where(own).correlate(campaigns))
+    recordings_of_kind = (recordings.c.campaign == campaigns.c.number) & (recordings.c.kind == kind)
+    return exists(select(recordings.c.kind).where(recordings_of_kind).correlate(campaigns))
 
 
 def state(row: AnyRow) -> State:

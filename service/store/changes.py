@@ -61,8 +61,8 @@ def of_campaign(connection: Connection, campaign_id: str) -> Sequence[AnyRow]:
 
 def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
     """Those of a skin itself and of those joined to it, not of its campaigns, the latest first."""
-    own = select(skins.c.id).where(skins.c.root_id == root)
-    query = select(changes).where(changes.c.skin_id.in_(own), changes.c.campaign_id.is_(None))
+    skin_ids = select(skins.c.id).where(skins.c.root_id == root)
+    query = select(changes).where(changes.c.skin_id.in_(skin_ids), changes.c.campaign_id.is_(None))
     return connection.execute(query.order_by(changes.c.number.desc())).all()
 
 

@@ -41,7 +41,7 @@ class Together:
     @property
     def sha256(self) -> str:
         """The same for the same campaigns in the same state, asked for in the same way."""
-        members = [[one.skin_id, one.campaign_id, one.excluded] for one in self.members]
+        members = [[diagnosed.skin_id, diagnosed.campaign_id, diagnosed.excluded] for diagnosed in self.members]
         content = orjson.dumps([self.kind, self.name, members, sorted(self.all_of)])
         return hashlib.sha256(content).hexdigest()
 
@@ -60,7 +60,7 @@ def count_usable(connection: Connection, skin_id: str) -> int:
 
 def have_frfs(connection: Connection, members: Sequence[Member]) -> bool:
     """Whether one of these campaigns has FRFs that are not excluded."""
-    of_these = recordings.c.campaign.in_([one.number for one in members])
+    of_these = recordings.c.campaign.in_([diagnosed.number for diagnosed in members])
     frfs = select(recordings.c.kind).where(of_these, recordings.c.kind == "frf", recordings.c.excluded_at.is_(None))
     return connection.execute(frfs.limit(1)).first() is not None
 
@@ -78,9 +78,9 @@ def member(row: AnyRow, skin_id: str) -> Member:
 def keep(connection: Connection, diagnosis: int, together: Together) -> None:
     """Keep what the diagnosis of this number is of."""
     rows = [
-        {"diagnosis": diagnosis, "position": position, "campaign": one.number, "skin_id": one.skin_id,
-         "excluded": one.excluded}
-        for position, one in enumerate(together.members)
+        {"diagnosis": diagnosis, "position": position, "campaign": diagnosed.number, "skin_id": diagnosed.skin_id,
+         "excluded": diagnosed.excluded}
+        for position, diagnosed in enumerate(together.members)
     ]  # fmt: skip
     connection.execute(insert(diagnosed_campaigns), rows)
     if together.all_of:
@@ -92,13 +92,13 @@ def keep(connection: Connection, diagnosis: int, together: Together) -> None:
 def members_of(connection: Connection, numbers: Sequence[int]) -> dict[int, list[Member]]:
     """The campaigns of those of these diagnoses that are of several, by the diagnosis' number."""
     columns = (campaigns.c.number, campaigns.c.id, campaigns.c.name)
-    asked = (diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.skin_id, diagnosed_campaigns.c.excluded)
-    query = select(*columns, *asked).join(campaigns, campaigns.c.number == diagnosed_campaigns.c.campaign)
+    of_diagnosis = (diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.skin_id, diagnosed_campaigns.c.excluded)
+    query = select(*columns, *of_diagnosis).join(campaigns, campaigns.c.number == diagnosed_campaigns.c.campaign)
     query = query.where(diagnosed_campaigns.c.diagnosis.in_(numbers))
-    found: dict[int, list[Member]] = {}
+    members: dict[int, list[Member]] = {}
     for row in connection.execute(query.order_by(diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.position)):
-        found.setdefault(row.diagnosis, []).append(member(row, row.skin_id))
-    return found
+        members.setdefault(row.diagnosis, []).append(member(row, row.skin_id))
+    return members
 
 
 def all_of(connection: Connection, number: int) -> list[str]:
@@ -121,9 +121,9 @@ def has_other_than(numbers: Select[Any]) -> ColumnElement[bool]:
 
 def changed() -> ScalarSelect[str]:
     """What became of the first campaign that is no longer as a diagnosis of several has it; null where all are."""
-    own = diagnosed_campaigns.alias("own")
+    of_diagnosis = diagnosed_campaigns.alias("own")
     its = campaigns.alias("its")
-    differs = its.c.excluded != own.c.excluded
+    differs = its.c.excluded != of_diagnosis.c.excluded
     how = case(
         (its.c.withdrawn_at.is_not(None), "withdrawn: " + its.c.withdraw_reason),
         (its.c.corrected_by.is_not(None), "corrected by " + its.c.corrected_by),
@@ -131,10 +131,10 @@ def changed() -> ScalarSelect[str]:
     )
     return (
         select("campaign " + its.c.id + " was " + how)
-        .join(own, own.c.campaign == its.c.number)
-        .where(own.c.diagnosis == diagnoses.c.number)
+        .join(of_diagnosis, of_diagnosis.c.campaign == its.c.number)
+        .where(of_diagnosis.c.diagnosis == diagnoses.c.number)
         .where(its.c.withdrawn_at.is_not(None) | its.c.corrected_by.is_not(None) | differs)
-        .order_by(own.c.position)
+        .order_by(of_diagnosis.c.position)
         .limit(1)
         .correlate(diagnoses)
         .scalar_subquery()
@@ -143,15 +143,15 @@ def changed() -> ScalarSelect[str]:
 
 def added() -> ScalarSelect[str]:
     """The first campaign in use that a diagnosis of all of them lacks: it came later; null where there is none."""
-    asked, its, new = skin_rows.alias("asked"), skin_rows.alias("counting"), campaigns.alias("new")
+    skin_diagnosed, its, new = skin_rows.alias("asked"), skin_rows.alias("counting"), campaigns.alias("new")
     has = diagnosed_campaigns.alias("has")
     there = exists().where(has.c.diagnosis == diagnoses.c.number, has.c.campaign == new.c.number)
     there = there.correlate(diagnoses, new)  # or a campaign would count as there that another diagnosis has
     return (
         select(func.min(new.c.id))
         .select_from(diagnosed_skins)
-        .join(asked, asked.c.id == diagnosed_skins.c.skin_id)
-        .join(its, its.c.root_id == asked.c.root_id)
+        .join(skin_diagnosed, skin_diagnosed.c.id == diagnosed_skins.c.skin_id)
+        .join(its, its.c.root_id == skin_diagnosed.c.root_id)
         .join(new, new.c.skin_id == its.c.id)
         .where(diagnosed_skins.c.diagnosis == diagnoses.c.number)
         .where(new.c.withdrawn_at.is_(None), new.c.corrected_by.is_(None), new.c.recordings > new.c.excluded, ~there)

@@ -115,8 +115,8 @@ def _same(connection: Connection, wanted: Mapping[str, Any]) -> AnyRow | None:
 def _queued(connection: Connection, skin_ids: Collection[str], wanted: Mapping[str, Any]) -> AnyRow:
     """A new one, of campaigns of these skins."""
     diagnosis_id = f"d-{secrets.token_hex(8)}"
-    asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": moments.next_of(connection, skin_ids)}
-    connection.execute(insert(diagnoses), {**wanted, **asked})
+    values = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": moments.next_of(connection, skin_ids)}
+    connection.execute(insert(diagnoses), {**wanted, **values})
     return find(connection, diagnosis_id)
 
 
@@ -213,8 +213,8 @@ def claim(
     row = connection.execute(query.with_for_update(skip_locked=True)).first()
     if row is None:
         return None
-    taken = {"state": "running", "claimed_by": server, "alive_at": moment, "progress": 0.0, "started_at": now()}
-    connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**taken, **asdict(basis)))
+    values = {"state": "running", "claimed_by": server, "alive_at": moment, "progress": 0.0, "started_at": now()}
+    connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**values, **asdict(basis)))
     return find(connection, row.id)
 
 
@@ -259,20 +259,24 @@ def members(connection: Connection, row: AnyRow) -> list[Member]:
 
 
 def campaign_of(connection: Connection, row: AnyRow) -> tuple[Campaign, list[Excluded]]:
-    """The campaign of a diagnosis of one, as `as_asked` has it."""
+    """The campaign of a diagnosis of one, as `as_diagnosed` has it."""
     (only,) = members(connection, row)
-    return as_asked(connection, only)
+    return as_diagnosed(connection, only)
 
 
-def as_asked(connection: Connection, member: Member) -> tuple[Campaign, list[Excluded]]:
+def as_diagnosed(connection: Connection, member: Member) -> tuple[Campaign, list[Excluded]]:
     """A campaign as it was when its diagnosis was asked for, and what had been excluded from it by then."""
-    whole = kept_campaigns.load(connection, kept_campaigns.find(connection, member.campaign_id))
+    campaign = kept_campaigns.load(connection, kept_campaigns.find(connection, member.campaign_id))
     excluded = kept_campaigns.excluded_of(connection, member.number)
     order = changes.order_of_exclusions(connection, member.campaign_id)
     # one without a change was made by an earlier underskin, before all others
-    excluded = sorted(excluded, key=lambda left: (order.get(left.recording, 0), left.at))[: member.excluded]
-    names = {left.recording for left in excluded}
-    return replace(whole, recordings=tuple(entry for entry in whole.recordings if entry.id not in names)), excluded
+    excluded = sorted(excluded, key=lambda exclusion: (order.get(exclusion.recording, 0), exclusion.at))[
+        : member.excluded
+    ]
+    names = {exclusion.recording for exclusion in excluded}
+    return replace(
+        campaign, recordings=tuple(recording for recording in campaign.recordings if recording.id not in names)
+    ), excluded
 
 
 def _end(connection: Connection, number: int, server: str, **values: Any) -> bool:

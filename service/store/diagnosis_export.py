@@ -153,17 +153,19 @@ def checked(
     rows = [DiagnosisRow.model_validate(row) for row in diagnosed]
     model_rows = [ModelRow.model_validate(row) for row in adopted]
     for row in rows:
-        of_campaigns = [row.campaign_id, *(one.campaign_id for one in row.members)]
+        of_campaigns = [row.campaign_id, *(member.campaign_id for member in row.members)]
         if not set(of_campaigns) <= set(campaign_ids):
             raise KeyError(f"diagnosis {row.id}: campaign {row.campaign_id}")
-        _require_whole(row, skin_ids)
+        _require_complete(row, skin_ids)
         if (row.state == "done") != (row.report is not None):
             raise KeyError(f"diagnosis {row.id}: report")
         kind = _Report if row.kind == "campaign" else _AnyReport
         if row.report is not None and kind.model_validate(row.report).verdict != row.verdict:
             raise KeyError(f"diagnosis {row.id}: verdict")
-    alone = [row for row in rows if row.kind == "campaign"]
-    explained = {row.id for row in alone if row.report and not_adopted(row.report) is None and row.report["d33"]}
+    single_campaigns = [row for row in rows if row.kind == "campaign"]
+    explained = {
+        row.id for row in single_campaigns if row.report and not_adopted(row.report) is None and row.report["d33"]
+    }
     for model in model_rows:
         if model.diagnosis_id not in explained or model.skin_id not in set(skin_ids):
             raise KeyError(f"model {model.id}")
@@ -172,21 +174,21 @@ def checked(
     return Checked(rows, model_rows)
 
 
-def _require_whole(row: DiagnosisRow, skin_ids: Sequence[str]) -> None:
+def _require_complete(row: DiagnosisRow, skin_ids: Sequence[str]) -> None:
     """What a diagnosis says of several campaigns holds together; raises KeyError."""
     several = row.kind != "campaign"
     if several != (len(row.members) > 1) or several != (row.name is not None) or (row.all_of and not several):
         raise KeyError(f"diagnosis {row.id}: members")
-    if not {*row.all_of, *(one.skin_id for one in row.members)} <= set(skin_ids):
+    if not {*row.all_of, *(member.skin_id for member in row.members)} <= set(skin_ids):
         raise KeyError(f"diagnosis {row.id}: skins of its members")
-    if several and row.campaign_id not in {one.campaign_id for one in row.members}:
+    if several and row.campaign_id not in {member.campaign_id for member in row.members}:
         raise KeyError(f"diagnosis {row.id}: campaign {row.campaign_id}")
 
 
-def known(connection: Connection, file: Checked) -> set[str]:
+def stored_ids(connection: Connection, file: Checked) -> set[str]:
     """Ids of those diagnoses and models that are in the store, the same or not."""
-    found = {row.id for row in file.diagnoses if holds(connection, diagnoses, id=row.id)}
-    return found | {row.id for row in file.models if holds(connection, models, id=row.id)}
+    ids = {row.id for row in file.diagnoses if holds(connection, diagnoses, id=row.id)}
+    return ids | {row.id for row in file.models if holds(connection, models, id=row.id)}
 
 
 def clashes(connection: Connection, file: Checked) -> list[str]:
@@ -224,8 +226,10 @@ def _add(connection: Connection, row: DiagnosisRow) -> None:
         connection.execute(insert(diagnoses), values)
         return
     members = [
-        Member(_number(connection, campaigns, one.campaign_id), one.campaign_id, "", one.skin_id, one.excluded)
-        for one in row.members
+        Member(
+            _number(connection, campaigns, member.campaign_id), member.campaign_id, "", member.skin_id, member.excluded
+        )
+        for member in row.members
     ]
     together = Together(row.kind, row.name, members, row.all_of)
     connection.execute(insert(diagnoses), {**values, "together_sha256": together.sha256})
@@ -240,7 +244,7 @@ def _diagnosis(connection: Connection, row: AnyRow) -> dict[str, Any]:
     """The row of an export from that of the store."""
     members = diagnosed_together.members_of(connection, [row.number]).get(row.number, [])
     several = {
-        "members": [{name: getattr(one, name) for name in MemberRow.model_fields} for one in members],
+        "members": [{name: getattr(member, name) for name in MemberRow.model_fields} for member in members],
         "all_of": diagnosed_together.all_of(connection, row.number),
         "report": None if row.report is None else decompressed(row.report),
     }

@@ -202,15 +202,15 @@ def storage_failure(error: OSError | DBAPIError) -> StorageFailed | None:
     """What an error, or what caused it, says of the disk: that it is full, or takes nothing; None where neither."""
     if isinstance(error, OSError):
         full, failed = error.errno in (errno.ENOSPC, errno.EDQUOT), error.errno in _TAKES_NOTHING
-        said = error.strerror
+        message = error.strerror
     else:
         code = getattr(error.orig, "sqlite_errorcode", 0)
         full = code & 0xFF == sqlite3.SQLITE_FULL or _sqlstate(error.orig) == _PG_DISK_FULL
         failed = code & 0xFF == sqlite3.SQLITE_READONLY or code in _NOT_WRITTEN
-        said = str(error.orig)
+        message = str(error.orig)
     if full:
         return StorageFull(str(error))
-    return StorageFailed(said) if failed else None
+    return StorageFailed(message) if failed else None
 
 
 def _sqlstate(error: BaseException | None) -> str | None:

@@ -52,8 +52,8 @@ def exported(connection: Connection, row: AnyRow) -> ExportedCampaign:
     rows = connection.execute(query).all()
     return ExportedCampaign(
         about=_without(row, "number", "revision"),
-        recordings=[_without(kept, "campaign", "position", "arrays") for kept in rows],
-        arrays=[unpack(kept.arrays) for kept in rows],
+        recordings=[_without(recording_row, "campaign", "position", "arrays") for recording_row in rows],
+        arrays=[unpack(recording_row.arrays) for recording_row in rows],
     )
 
 
@@ -74,7 +74,7 @@ def otherwise_joined(connection: Connection, skins: Sequence[SkinRow]) -> list[s
     return clashes
 
 
-def known(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
+def stored_rows(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
     """Rows, by id, of those of the file's campaigns that the store has."""
     rows: dict[str, AnyRow] = {}
     for start in range(0, len(names), _AT_A_TIME):
@@ -114,7 +114,7 @@ def add_skins(store: Database, checked: CheckedOverview) -> None:
 
 def add(store: Database, checked: ImportedCampaign) -> None:
     """Keep a campaign that is not there; one that figures use has its skin be in lists."""
-    exclusions = [entry.model_dump() for entry in checked.exclusions]
+    exclusions = [exclusion.model_dump() for exclusion in checked.exclusions]
     with store.writing() as connection:
         if checked.row["withdrawn_at"] is None and checked.row["corrected_by"] is None:
             skins.bring_back(connection, skins.require_root(connection, checked.row["skin_id"]))

@@ -25,9 +25,9 @@ def find(connection: Connection) -> str | None:
 
 def ensure(connection: Connection) -> str:
     """The store's identity, from now on."""
-    found = find(connection)
-    if found is not None:
-        return found
+    identity_row = find(connection)
+    if identity_row is not None:
+        return identity_row
     connection.execute(text(f"PRAGMA user_version = {1 + secrets.randbelow(_MOST)}"))
     return ensure(connection)
 

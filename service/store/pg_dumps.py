@@ -58,24 +58,26 @@ def replace(database: Database, file: Path, copied: Copied) -> None:
     for program in ("psql", "pg_restore"):
         _require(program)
     address, password = _address(database)
-    own = str(database.read(lambda connection: connection.execute(text("SELECT current_schema()")).scalar_one()))
+    schema = str(database.read(lambda connection: connection.execute(text("SELECT current_schema()")).scalar_one()))
     tables = _TABLE_IN_LIST.findall(_run("pg_restore", "--list", str(file)))
-    gone = ", ".join(f'"{own}".{name}' for name in sorted({*tables, *metadata.tables, "alembic_version"}))
-    moved = "".join(f'ALTER TABLE {_APART}.{name} SET SCHEMA "{own}";\n' for name in tables)
+    gone = ", ".join(f'"{schema}".{name}' for name in sorted({*tables, *metadata.tables, "alembic_version"}))
+    moved = "".join(f'ALTER TABLE {_APART}.{name} SET SCHEMA "{schema}";\n' for name in tables)
     command = ["psql", "--dbname", address, "--quiet", "--no-psqlrc", "--set=ON_ERROR_STOP=1", "--output=/dev/null"]
     with (
         tempfile.TemporaryFile() as complaints,
         subprocess.Popen(command, env=os.environ | password, stdin=subprocess.PIPE, stderr=complaints) as psql,
     ):
         assert psql.stdin is not None
-        whole = False
+        complete = False
         with suppress(BrokenPipeError), psql.stdin as script:  # where it has ended, it says why
             script.write(f"BEGIN; CREATE SCHEMA {_APART};\n".encode())
-            whole = _write_script(file, tables, script, complaints, copied)
-            end = f"DROP TABLE IF EXISTS {gone};\n{moved}DROP SCHEMA {_APART};\nCOMMIT;\n" if whole else "ROLLBACK;\n"
+            complete = _write_script(file, tables, script, complaints, copied)
+            end = (
+                f"DROP TABLE IF EXISTS {gone};\n{moved}DROP SCHEMA {_APART};\nCOMMIT;\n" if complete else "ROLLBACK;\n"
+            )
             script.write(end.encode())
         psql.wait()
-        if psql.returncode != 0 or not whole:
+        if psql.returncode != 0 or not complete:
             raise StoreError(f"the restore failed: {_end_of(complaints)}")
 
 

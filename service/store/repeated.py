@@ -32,7 +32,7 @@ def most_alike(connection: Connection, campaign: Campaign, skin_id: str | None, 
     id of a campaign that is passed over, as this one takes its place.
     """
     digests = [digest(recording) for recording in campaign.recordings]
-    coming = sorted({known for known in digests if known is not None})
+    coming = sorted({checksum for checksum in digests if checksum is not None})
     alike: Counter[int] = Counter()
     skin_of: dict[int, str] = {}
     for start in range(0, len(coming), _AT_A_TIME):

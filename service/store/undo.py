@@ -91,8 +91,12 @@ def _of_figures(change: AnyRow) -> bool:
 
 def _joined_still(connection: Connection, change: AnyRow) -> bool:
     """Whether the skin counts as itself, and the one that was joined to it as this skin."""
-    own, other = change.skin_id, skins.find(connection, change.before["skin_id"])
-    return skins.require_root(connection, own) == own and other is not None and other.joined_to == other.root_id == own
+    skin_id, other = change.skin_id, skins.find(connection, change.before["skin_id"])
+    return (
+        skins.require_root(connection, skin_id) == skin_id
+        and other is not None
+        and other.joined_to == other.root_id == skin_id
+    )
 
 
 def _corrected_since(connection: Connection, change: AnyRow) -> str | None:
@@ -122,10 +126,10 @@ def _built_on(connection: Connection, change: AnyRow, root: str) -> str | None:
     numbers = numbers_of(root)
     of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     if change.campaign_id is not None:
-        own = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id)
-        of_skin = diagnoses.c.campaign.in_(own) | has_one_of(numbers)
-    asked = select(diagnoses.c.id).where(of_skin, diagnoses.c.asked_at > change.at).limit(1)
-    if connection.execute(asked).first() is not None:
+        campaign_number = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id)
+        of_skin = diagnoses.c.campaign.in_(campaign_number) | has_one_of(numbers)
+    later_diagnosis = select(diagnoses.c.id).where(of_skin, diagnoses.c.asked_at > change.at).limit(1)
+    if connection.execute(later_diagnosis).first() is not None:
         return "it was diagnosed since"
     adopted = select(models.c.id).where(models.c.skin_id.in_(skins.members(root)), models.c.adopted_at > change.at)
     if connection.execute(adopted.limit(1)).first() is not None:
@@ -140,8 +144,8 @@ def _use_again(connection: Connection, change: AnyRow) -> None:
 
 
 def _include(connection: Connection, change: AnyRow) -> None:
-    own = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id).scalar_subquery()
-    this = (recordings.c.campaign == own) & (recordings.c.id == change.recording)
+    campaign_number = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id).scalar_subquery()
+    this = (recordings.c.campaign == campaign_number) & (recordings.c.id == change.recording)
     values = {"excluded_at": None, "excluded_from": None, "exclude_reason": None}
     connection.execute(update(recordings).where(this).values(**values))
     _campaign(connection, change, excluded=campaigns.c.excluded - 1, revision=campaigns.c.revision + 1)
@@ -164,8 +168,8 @@ def _part(connection: Connection, change: AnyRow) -> None:
     other, members = change.before["skin_id"], change.before["members"]
     counted = skin_rows.c.id.in_(members) & (skin_rows.c.root_id == change.skin_id)
     connection.execute(update(skin_rows).where(counted).values(root_id=other))
-    alone = {"joined_to": None, "joined_at": None, "joined_from": None, "join_reason": None}
-    connection.execute(update(skin_rows).where(skin_rows.c.id == other).values(**alone))
+    not_joined = {"joined_to": None, "joined_at": None, "joined_from": None, "join_reason": None}
+    connection.execute(update(skin_rows).where(skin_rows.c.id == other).values(**not_joined))
 
 
 def _as_before(connection: Connection, change: AnyRow) -> None:

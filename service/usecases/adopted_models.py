@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from underskin.prediction.adopted_model import AdoptedModel
 
 _LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
-_MOST_KNOWN = 100
-_known: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
+_MOST_CACHED = 100
+_cache: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
 _ANY_LINE = np.array([1.0])
 _OUTSIDE = "outside the tables, or the range of the law, by the adopted model"
 _Responses = tuple[Complexes, NDArray[np.bool_]]
@@ -62,16 +62,16 @@ def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
     """The model of a diagnosis that is done; raises InvalidInput where it cannot serve."""
     from underskin.prediction.adopted_model import adopted
 
-    model = _known.get(row.id)
+    model = _cache.get(row.id)
     if model is None:
         report = diagnoses.report_of(connection, row.number)
         assert report is not None
         campaign, _ = diagnoses.campaign_of(connection, row)
         catalogue()  # another server may have added a mechanism that it has
         model = adopted(report, campaign)
-        if len(_known) >= _MOST_KNOWN:
-            _known.clear()  # by any thread at any time
-        _known[row.id] = model
+        if len(_cache) >= _MOST_CACHED:
+            _cache.clear()  # by any thread at any time
+        _cache[row.id] = model
     return model
 
 
@@ -89,8 +89,8 @@ def adopt(connection: Connection, skin_id: str, diagnosis_id: str, sender: str |
 
 def version(row: AnyRow) -> ModelVersion:
     """A model without its evidence."""
-    own = [name for name in ModelVersion.model_fields if name not in ("diagnosis_id", "campaign_id")]
-    values = {name: getattr(row, f"model_{name}") for name in own}
+    names = [name for name in ModelVersion.model_fields if name not in ("diagnosis_id", "campaign_id")]
+    values = {name: getattr(row, f"model_{name}") for name in names}
     return ModelVersion(**values, diagnosis_id=row.id, campaign_id=row.campaign_id)
 
 
@@ -108,7 +108,7 @@ def entry(connection: Connection, row: AnyRow) -> ModelEntry:
     )
 
 
-def model_asked_for(store: Database, request: PressedSkinColumns) -> ModelInForce:
+def requested_model(store: Database, request: PressedSkinColumns) -> ModelInForce:
     """The model that a request asks for."""
     if request.skin_id is None:
         raise required("skin_id", "is required with model adopted")
@@ -157,8 +157,8 @@ def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinC
     rows = _distinct_columns(request, given)
     stacked = np.column_stack([np.broadcast_to(column, (count,)) for column in rows.values()])
     distinct, which = np.unique(stacked, axis=0, return_inverse=True)
-    each = dict(zip(rows, distinct.T, strict=True))
-    respond = partial(_response, model_in_force.model, request, table, each)
+    by_row = dict(zip(rows, distinct.T, strict=True))
+    respond = partial(_response, model_in_force.model, request, table, by_row)
     level, inside = respond(None)
     which = which.reshape(-1)
     on_plateau = level[:, 0].real[which]

@@ -10,7 +10,7 @@ from service.store import AnyRow, changes, models, undo
 _MOST = 20  # the latest, of which it is said whether they can be undone
 _NAMES = ("name", "title")
 _DONE = {"withdraw": "withdrawn", "discard": "discarded", "correct": "put in the place of another campaign"}
-_KEPT = set(Change.model_fields) - {"statement", "undone", "may_be_undone"}
+_STORED_FIELDS = set(Change.model_fields) - {"statement", "undone", "may_be_undone"}
 
 
 def of_campaign(connection: Connection, campaign_id: str) -> list[Change]:
@@ -37,7 +37,7 @@ def _shown(connection: Connection, rows: Sequence[AnyRow], most: int = _MOST) ->
     undone = {row.undoes for row in rows}
     return [
         Change(
-            **{name: getattr(row, name) for name in _KEPT},
+            **{name: getattr(row, name) for name in _STORED_FIELDS},
             statement=f"undone: {_words(by_id[row.undoes])}" if row.undoes in by_id else _words(row),
             undone=row.id in undone,
             may_be_undone=undo.standing(connection, row, rows) is None,

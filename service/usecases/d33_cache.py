@@ -86,12 +86,12 @@ def adopted_answer(
     cached = store.read(inversions.find_adopted, row, model_id, table.sha256) if band_hz is None else None
     if cached is not None:
         return dict(cached)
-    campaign, left_out = store.read(_used, row)
+    campaign, excluded = store.read(_used, row)
     translated, beyond = model.as_base_model(campaign, table)
-    left_out += [(name, "beyond the table under the adopted model") for name in beyond]
+    excluded += [(name, "beyond the table under the adopted model") for name in beyond]
     origin = {"model": "adopted", "model_id": model_id, "model_percent": 100 * model.unsure}
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **origin}
-    document, _, failed = _computed(document, translated, table, band_hz, left_out)
+    document, _, failed = _computed(document, translated, table, band_hz, excluded)
     if band_hz is None and not failed:
         _keep(store, row, soon, inversions.keep_adopted, model_id, table.sha256, document)
     return document
@@ -117,24 +117,24 @@ def derive(
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
     """The findings of a campaign that is not kept yet, after what will give no d33 of its FRFs, and why."""
     document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **_PAPER}
-    told = _computed(document, campaign, table, None, [])[0]
-    findings: list[str] = told["findings"]
-    return [*_without_d33(campaign, told, table), *findings]
+    fields = _computed(document, campaign, table, None, [])[0]
+    findings: list[str] = fields["findings"]
+    return [*_without_d33(campaign, fields, table), *findings]
 
 
-def _without_d33(campaign: Campaign, told: dict[str, Any], table: SigmaTable) -> list[str]:
+def _without_d33(campaign: Campaign, fields: dict[str, Any], table: SigmaTable) -> list[str]:
     """In a sentence, that a campaign with FRFs will give no d33, or which of it will not; and what L is."""
-    frfs = sum(isinstance(one, FrfRecording) for one in campaign.recordings)
-    left = [entry["reason"] for entry in told["left_out"] if entry["recording"] is None]
-    if not frfs or (told["status"] == "ok" and not left):
+    frfs = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings)
+    reasons = [exclusion["reason"] for exclusion in fields["left_out"] if exclusion["recording"] is None]
+    if not frfs or (fields["status"] == "ok" and not reasons):
         return []
-    if told["status"] == "ok":
-        more = f"; and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
-        said = f"these will give no d33: {'; '.join(left[:_MOST_NAMED])}{more}."
+    if fields["status"] == "ok":
+        more = f"; and {len(reasons) - _MOST_NAMED} more" if len(reasons) > _MOST_NAMED else ""
+        sentence = f"these will give no d33: {'; '.join(reasons[:_MOST_NAMED])}{more}."
     else:
-        said = f"no d33 will come of this: {told['reason']}."
-    if "L = " not in said:
-        return [said]
+        sentence = f"no d33 will come of this: {fields['reason']}."
+    if "L = " not in sentence:
+        return [sentence]
     most = float(table.domain["load_parameter"][1])
     depth = 100 * (9 / 16 * most) ** (2 / 3)  # % of the radius, by Hertz on an incompressible half space
     meaning = (
@@ -142,7 +142,7 @@ def _without_d33(campaign: Campaign, told: dict[str, Any], table: SigmaTable) ->
         f"L = {most:g}, about {depth:.0f} % of R deep in a thick layer; a larger sphere or a smaller preload stays "
         "within it."
     )
-    return [said, meaning]
+    return [sentence, meaning]
 
 
 def complete(store: Database, table: SigmaTable, root: str) -> dict[str, dict[str, Any]]:
@@ -162,9 +162,9 @@ def _derived(
     soon: bool,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
-    campaign, left_out = store.read(_used, row)
+    campaign, excluded = store.read(_used, row)
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
-    document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
+    document, inversion, failed = _computed(document, campaign, table, band_hz, excluded)
     if inversion is not None:
         document["array_solved"] = _array_solved(campaign, table, band_hz, inversion)
     numbers = figure_data.numbers(campaign, inversion, spreads)
@@ -176,15 +176,16 @@ def _derived(
 def of_sensors(document: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """d33 with its standard uncertainty [pC/N] of those sensors of an answer that have both, by their ids."""
     values = {
-        entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"]) for entry in document["sensors"]
+        of_sensor["sensor"]: (of_sensor["d33_pc_per_n"], of_sensor["d33_uncertainty_pc_per_n"])
+        for of_sensor in document["sensors"]
     }
     return {sensor: both for sensor, both in values.items() if None not in both}
 
 
 def _used(connection: Connection, row: AnyRow) -> tuple[Campaign, list[tuple[str, str]]]:
     """The campaign without what is excluded; and that, with the reasons."""
-    left_out = [(left.recording, left.reason) for left in campaigns.excluded_of(connection, row.number)]
-    return campaigns.load(connection, row, with_excluded=False), left_out
+    excluded = [(exclusion.recording, exclusion.reason) for exclusion in campaigns.excluded_of(connection, row.number)]
+    return campaigns.load(connection, row, with_excluded=False), excluded
 
 
 def _computed(
@@ -192,25 +193,25 @@ def _computed(
     campaign: Campaign,
     table: SigmaTable,
     band_hz: BandHz | None,
-    left_out: Sequence[tuple[str, str]],
+    excluded: Sequence[tuple[str, str]],
 ) -> "tuple[dict[str, Any], Inversion | None, bool]":
     """The document with the campaign's figures, the inversion that they are of, where there is one, and whether they
-    failed to be computed; `left_out`: recordings, reasons.
+    failed to be computed; `excluded`: recordings, reasons.
 
     Raises InvalidInput where the band is refused.
     """
-    entries = [{"recording": recording, "reason": reason} for recording, reason in left_out]
+    entries = [{"recording": recording, "reason": reason} for recording, reason in excluded]
     try:
         fields, inversion = _inverted(campaign, table, band_hz)
-        whole = {**document, **fields, "left_out": entries + fields["left_out"]}
-        D33.model_validate(orjson.loads(orjson.dumps(whole)))  # what is kept can be answered
+        full_document = {**document, **fields, "left_out": entries + fields["left_out"]}
+        D33.model_validate(orjson.loads(orjson.dumps(full_document)))  # what is kept can be answered
     except InvalidInput:  # of the band
         raise
     except Exception as error:
         logger.exception("no d33 from a campaign", extra={"fields": {"campaign": document["campaign_id"]}})
         reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
         return {**document, **_NONE, "reason": reason, "moduli": [], "left_out": entries}, None, True
-    return whole, inversion, False
+    return full_document, inversion, False
 
 
 def _inverted(
@@ -228,10 +229,10 @@ def _inverted(
         if band_hz is not None and error.field == "band_hz":
             raise
         findings = [finding.sentence for finding in plausibility.at_reading(campaign)]
-        told = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
-        return {**_NONE, **told}, None
-    left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]
-    return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + without_modulus}, inversion
+        fields = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
+        return {**_NONE, **fields}, None
+    excluded = [{"recording": None, "reason": exclusion.sentence} for exclusion in inversion.left_out]
+    return {**of_inversion(inversion), "moduli": moduli, "left_out": excluded + without_modulus}, inversion
 
 
 def _array_solved(

@@ -14,7 +14,7 @@ import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.tables import contact_asked_for
+from service.usecases.tables import requested_contact
 from service.usecases.two_point import largest_pitch
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
@@ -72,7 +72,7 @@ def search(table: SigmaTable, demand: DesignDemand) -> Searched:
     region = _region(table, demand.model_copy(update=anything))
     resolves = np.isfinite(region.largest_pitch_mm)
     limits = _limits(region, demand)
-    feasible = resolves & np.all([limit.kept for limit in limits], axis=0)
+    feasible = resolves & np.all([limit.satisfied for limit in limits], axis=0)
     offers = _offers(table, demand, region, feasible)
     return Searched(region, feasible, offers, [] if offers else _binding(table, demand, region, resolves, limits))
 
@@ -84,7 +84,7 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     force = float(checked("preload_n", demand.preload_n))
     d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
     any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
-    contact_model = contact_asked_for(table, _CONTACT)
+    contact_model = requested_contact(table, _CONTACT)
     thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * _thinnest_mm(contact_model, any_skin, indenter, force)))
     thickness = _steps(thinnest, max(demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
     radii = _steps(RADIUS_MM[0], max(0.28 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
@@ -95,11 +95,11 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     numbers = reached.small_strain_a_over_h, reached.rt_over_h, reached.load_parameter
     apart = (2 * contact <= demand.resolution_mm) & (4 * radii[:, None] <= demand.resolution_mm)
     pitch = np.full(h.shape, np.nan)
-    for place in zip(*np.nonzero(reached.inside & apart), strict=True):
-        offset, response = sigma_beside(contact_model, *(float(part[place]) for part in numbers))
+    for index in zip(*np.nonzero(reached.inside & apart), strict=True):
+        offset, response = sigma_beside(contact_model, *(float(part[index]) for part in numbers))
         if np.isfinite(response).all():
-            finest, touching = 2 * float(radii[place[0]]), float(contact[place[1]])
-            pitch[place] = _largest_pitch_mm(offset * float(h[place]), response, finest, touching, demand)
+            finest, touching = 2 * float(radii[index[0]]), float(contact[index[1]])
+            pitch[index] = _largest_pitch_mm(offset * float(h[index]), response, finest, touching, demand)
     return Region(contact, thickness, radii, pitch, np.asarray(to_lab("frf_pc_per_n", reached.frf(d33))))
 
 
@@ -149,7 +149,7 @@ def _rounded_up(value: float) -> float:
 class _Limit:
     """Which pairs keep it, in words what would do without it, and the number of each pair of which that is the most."""
 
-    kept: Mask
+    satisfied: Mask
     words: str
     number: Floats
 
@@ -194,12 +194,12 @@ def _binding(
         reached = "tells no two contacts apart" if apart is None else f"tells them apart from {apart:.3g} mm on"
         skin = f"h {finest[0]:g} mm, rT {finest[1]:g} mm, pitch {finest[2]:g} mm"
         return [f"The spread of the stress: even the finest skin of the search ({skin}) {reached}"]
-    told = []
+    messages = []
     for limit in limits:
-        others = resolves & np.all([other.kept for other in limits if other is not limit], axis=0)
-        if others.any() and not (others & limit.kept).any():
-            told.append(limit.words.format(float(limit.number[others].max())))
-    return told or ["The limits together: no one of them alone keeps every design out"]
+        other_limits = resolves & np.all([another.satisfied for another in limits if another is not limit], axis=0)
+        if other_limits.any() and not (other_limits & limit.satisfied).any():
+            messages.append(limit.words.format(float(limit.number[other_limits].max())))
+    return messages or ["The limits together: no one of them alone keeps every design out"]
 
 
 def _offers(table: SigmaTable, demand: DesignDemand, region: Region, feasible: Mask) -> list[Offer]:
@@ -217,17 +217,17 @@ def _offers(table: SigmaTable, demand: DesignDemand, region: Region, feasible: M
     offers: list[Offer] = []
     for merit, value in merits.items():
         made = _offer(table, demand, region, int(np.argmax(value)), merit)
-        same = [place for place, one in enumerate(offers) if one.request == made.request]
+        same = [index for index, offer in enumerate(offers) if offer.request == made.request]
         if not same:
             offers.append(made)
-        for place in same:
-            offers[place] = replace(offers[place], merit=f"{offers[place].merit}, {merit}")
+        for index in same:
+            offers[index] = replace(offers[index], merit=f"{offers[index].merit}, {merit}")
     return offers
 
 
-def _offer(table: SigmaTable, demand: DesignDemand, region: Region, place: int, merit: str) -> Offer:
+def _offer(table: SigmaTable, demand: DesignDemand, region: Region, index: int, merit: str) -> Offer:
     """One pair at its largest pitch, as `POST /v1/design` has it."""
-    row, column = np.unravel_index(place, region.largest_pitch_mm.shape)
+    row, column = np.unravel_index(index, region.largest_pitch_mm.shape)
     thickness, radius = float(region.thickness_mm[column]), float(region.sensor_radius_mm[row])
     return Offer(merit, *_forward(table, demand, thickness, radius, float(region.largest_pitch_mm[row, column])))
 
@@ -236,6 +236,6 @@ def _forward(
     table: SigmaTable, demand: DesignDemand, thickness: float, radius: float, pitch: float
 ) -> tuple[DesignRequest, DesignAnswer]:
     """What `POST /v1/design` says of one design [mm]."""
-    asked = demand.model_dump(exclude={"resolution_mm", "thinnest_mm", "least_pitch_mm", "least_frf_pc_per_n"})
-    request = DesignRequest(thickness_mm=thickness, sensor_radius_mm=radius, pitch_mm=pitch, **asked)
+    fields = demand.model_dump(exclude={"resolution_mm", "thinnest_mm", "least_pitch_mm", "least_frf_pc_per_n"})
+    request = DesignRequest(thickness_mm=thickness, sensor_radius_mm=radius, pitch_mm=pitch, **fields)
     return request, design_answer(table, request, design_of(table, request))

@@ -22,16 +22,16 @@ _RANGES = ("magnitude_pc_per_n", "phase_deg", "coherence")
 
 
 def numbers(
-    campaign: Campaign, inversion: "Inversion | None", known: list[dict[str, Any]] | None = None
+    campaign: Campaign, inversion: "Inversion | None", sensor_values: list[dict[str, Any]] | None = None
 ) -> dict[str, Any]:
     """`recordings`: columns of FRF against preload; `spreads`: FRFs of recordings alike, over all lines, whatever the
-    band, and so perhaps `known`; None where they are few."""
+    band, and so perhaps `sensor_values`; None where they are few."""
     few = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings) <= MOST_SINGLE
-    lines = [] if known or few else measured(campaign)
+    lines = [] if sensor_values or few else measured(campaign)
     alike = [_plain(spread) for spread in spreads_of(lines)] if len(lines) > MOST_SINGLE else None
     return {
         "recordings": {} if inversion is None else _preload_columns(campaign, inversion),
-        "spreads": known or alike,
+        "spreads": sensor_values or alike,
     }
 
 
@@ -71,12 +71,12 @@ def spreads(cached: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
     return [
         FrfSpread(
             **{
-                **entry,
-                "frequency_hz": np.array(entry["frequency_hz"], dtype=float),
-                **{name: tuple(np.array(values, dtype=float) for values in entry[name]) for name in _RANGES},
+                **cached_answer,
+                "frequency_hz": np.array(cached_answer["frequency_hz"], dtype=float),
+                **{name: tuple(np.array(values, dtype=float) for values in cached_answer[name]) for name in _RANGES},
             }
         )
-        for entry in cached
+        for cached_answer in cached
     ]
 
 

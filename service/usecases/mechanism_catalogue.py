@@ -58,12 +58,12 @@ class Catalogue:
 
 def catalogue(store: Database, table: SigmaTable) -> Catalogue:
     """As it is now."""
-    known, listed = mechanisms.catalogue(), {entry.name: entry for entry in mechanisms.entries()}
+    laws, listed = mechanisms.catalogue(), {listed_entry.name: listed_entry for listed_entry in mechanisms.entries()}
     alike, seen = _twins(table, digest()), findings(store)
     return Catalogue(
         [
             _entry(mechanism, listed[name], alike.get(name, ()), seen.by_mechanism.get(name, ()))
-            for name, mechanism in known.items()
+            for name, mechanism in laws.items()
         ],
         seen.diagnoses,
     )
@@ -82,21 +82,23 @@ def effect(name: str, table: SigmaTable) -> LawEffect:
 
 
 @lru_cache(maxsize=256)
-def _effect(name: str, table: SigmaTable, _own: str) -> LawEffect:
+def _effect(name: str, table: SigmaTable, _digest: str) -> LawEffect:
     return law_effect(name, table)
 
 
 @lru_cache(maxsize=4)
-def _twins(table: SigmaTable, _own: str) -> Mapping[str, tuple[Twin, ...]]:
+def _twins(table: SigmaTable, _digest: str) -> Mapping[str, tuple[Twin, ...]]:
     return law_twins(table)
 
 
 def _entry(
-    mechanism: Mechanism, entry: MechanismEntry, alike: Sequence[Twin], found: Sequence[FoundIn]
+    mechanism: Mechanism, entry: MechanismEntry, alike: Sequence[Twin], occurrences: Sequence[FoundIn]
 ) -> CatalogueEntry:
-    own = isinstance(mechanism, DeclaredMechanism)
+    is_of_lab = isinstance(mechanism, DeclaredMechanism)
     by_name = {
-        one.name: one for kind in mechanism.kinds for one in mechanism.parameters(reference_campaign(kind), kind)
+        parameter.name: parameter
+        for kind in mechanism.kinds
+        for parameter in mechanism.parameters(reference_campaign(kind), kind)
     }
     return CatalogueEntry(
         entry,
@@ -105,10 +107,10 @@ def _entry(
         list(by_name.values()),
         [replace(twin, axes=tuple(map(_axis, twin.axes))) for twin in alike if twin.alike >= ALIKE][:_MOST_TWINS],
         alike[0] if alike else None,
-        [one for one in found if one.probability >= EXPLAINED],
-        sum(one.probability < EXPLAINED for one in found),
-        lacking(mechanism) if own else None,
-        _file(entry) if own else None,
+        [occurrence for occurrence in occurrences if occurrence.probability >= EXPLAINED],
+        sum(occurrence.probability < EXPLAINED for occurrence in occurrences),
+        lacking(mechanism) if is_of_lab else None,
+        _file(entry) if is_of_lab else None,
     )
 
 

@@ -67,10 +67,10 @@ def remember(connection: Connection) -> None:
 
 def put_back(connection: Connection) -> PutBack:
     """The files that the store keeps into the folder: one that differs, or bears the same mechanism, is set aside."""
-    kept, folder = own_mechanisms.found(connection), folder_of_lab()
+    stored, folder = own_mechanisms.found(connection), folder_of_lab()
     written: list[str] = []
     replaced: list[str] = []
-    for name, content in kept.items():
+    for name, content in stored.items():
         if Path(name).name != name or not name.endswith(".yaml"):  # in no backup that this service made
             continue
         present = _present()

@@ -47,21 +47,21 @@ def findings(store: Database) -> Findings:
     campaigns are all in a later one is not counted again."""
     latest = store.read(_latest)
     stated = _stated(store, {row.number: row.id for row in latest})
-    found: dict[str, list[FoundIn]] = {}
+    by_law: dict[str, list[FoundIn]] = {}
     for row in latest:
-        of_one = row.kind == "campaign"
+        of_campaign = row.kind == "campaign"
         for name, probability in stated[row.id]:
-            entry = FoundIn(
+            occurrence = FoundIn(
                 row.id,
-                row.campaign_id if of_one else None,
+                row.campaign_id if of_campaign else None,
                 row.skin_id,
-                row.campaign_name if of_one else row.name,
+                row.campaign_name if of_campaign else row.name,
                 row.ended_at,
                 row.verdict,
                 probability,
             )
-            found.setdefault(name, []).append(entry)
-    return Findings(found, len(latest))
+            by_law.setdefault(name, []).append(occurrence)
+    return Findings(by_law, len(latest))
 
 
 def _latest(connection: Connection) -> list[AnyRow]:
@@ -70,16 +70,16 @@ def _latest(connection: Connection) -> list[AnyRow]:
     ordered = connection.execute(query.order_by(rows_of_diagnoses.c.number.desc()))
     rows = [row for row in ordered if diagnoses.outdated(row) is None]
     members = diagnosed_together.members_of(connection, [row.number for row in rows if row.kind != "campaign"])
-    alone, together = set(), list[tuple[str, frozenset[int]]]()
+    skins_seen, together = set(), list[tuple[str, frozenset[int]]]()
     latest: list[AnyRow] = []
     for row in rows:
-        own = frozenset(one.number for one in members.get(row.number, ()))
+        skin_numbers = frozenset(member.number for member in members.get(row.number, ()))
         if row.kind == "campaign":
-            covered = row.campaign in alone
-            alone.add(row.campaign)
+            covered = row.campaign in skins_seen
+            skins_seen.add(row.campaign)
         else:
-            covered = any(kind == row.kind and own <= later for kind, later in together)
-            together.append((row.kind, own))
+            covered = any(kind == row.kind and skin_numbers <= later for kind, later in together)
+            together.append((row.kind, skin_numbers))
         if not covered:
             latest.append(row)
     return latest
@@ -89,9 +89,11 @@ def _stated(store: Database, ids: Mapping[int, str]) -> Mapping[str, tuple[tuple
     """Mechanisms with their probabilities by the diagnosis' id; `ids` by number. Those not yet read are read a few at
     a time."""
     with _lock:
-        known = _read.setdefault(store, {})
-        missing = [number for number, name in ids.items() if name not in known]
+        cached = _read.setdefault(store, {})
+        missing = [number for number, name in ids.items() if name not in cached]
         for start in range(0, len(missing), _AT_ONCE):
             for number, report in store.read(diagnoses.reports_of, missing[start : start + _AT_ONCE]).items():
-                known[ids[number]] = tuple((one["name"], one["probability"]) for one in report["mechanisms"])
-        return dict(known)
+                cached[ids[number]] = tuple(
+                    (mechanism["name"], mechanism["probability"]) for mechanism in report["mechanisms"]
+                )
+        return dict(cached)

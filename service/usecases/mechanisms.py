@@ -28,22 +28,22 @@ def catalogue() -> Mapping[str, Mechanism]:
     Files of the lab's folder that cannot be used are left out (`unusable`).
     """
     with _lock:
-        found = digest()
-        if found != _loaded["digest"]:
+        files_digest = digest()
+        if files_digest != _loaded["digest"]:
             CATALOGUE.reload()
-            _loaded["digest"] = found
+            _loaded["digest"] = files_digest
     return CATALOGUE.load().mechanisms
 
 
-def whole_catalogue() -> Mapping[str, Mechanism]:
+def full_catalogue() -> Mapping[str, Mechanism]:
     """The same; raises Refusal 409 where a file of the lab's folder cannot be used: a diagnosis without it would be
     another one."""
-    known = catalogue()
+    laws = catalogue()
     try:
         CATALOGUE.require_whole()
     except FileError as error:
         raise Refusal(409, f"A mechanism of the lab's own cannot be used: {error}. Mend or remove it.") from None
-    return known
+    return laws
 
 
 def entries() -> list[MechanismEntry]:
@@ -68,14 +68,14 @@ def keep(content: bytes) -> MechanismEntry:
     folder = mechanism_files.folder_of_lab()
     mechanism = checked(content, "", apart=True)
     file = folder / f"{mechanism.name}.yaml"
-    entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
+    kept_entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
     if mechanism.name in catalogue():
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.")
     try:
         mechanism_files.write(file, content)
     except FileExistsError:
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.") from None
-    return entry
+    return kept_entry
 
 
 def keep_found(connection: Connection, diagnosis_id: str, name: str, description: str | None) -> MechanismEntry:
@@ -105,7 +105,7 @@ def discard(connection: Connection, name: str) -> MechanismEntry:
         raise Refusal(409, f"{name!r} is not one of the lab's own mechanisms: it cannot be discarded.")
     for row in models.all_in_force(connection):
         report = diagnoses.report_of(connection, row.number)
-        if report is not None and name in {entry["name"] for entry in report["mechanisms"]}:
+        if report is not None and name in {reported["name"] for reported in report["mechanisms"]}:
             raise Refusal(409, f"The model in force of skin {row.model_skin_id!r} needs {name!r}: withdraw it first.")
     discarded = _entry(mechanism, CATALOGUE.packages.get(name))
     for file in mechanism_files.of_mechanism(name):
@@ -126,7 +126,7 @@ def _entry(mechanism: Mechanism, package: str | None) -> MechanismEntry:
         package=package,
         own=stated is not None,
         parameters=[
-            MechanismParameter(name=entry.name, unit=entry.unit, low=entry.low, high=entry.high)
-            for entry in stated or ()
+            MechanismParameter(name=parameter.name, unit=parameter.unit, low=parameter.low, high=parameter.high)
+            for parameter in stated or ()
         ],
     )

@@ -52,7 +52,7 @@ _failed = Counter("underskin_backup_failures", "Scheduled backups that failed.")
 
 
 @dataclass(frozen=True)
-class Kept:
+class StoredBackup:
     """A scheduled backup in the folder."""
 
     path: Path
@@ -64,20 +64,20 @@ class Kept:
         return (datetime.now(UTC) - self.made_at).total_seconds()
 
 
-def kept(folder: Path) -> list[Kept]:
+def stored_backups(folder: Path) -> list[StoredBackup]:
     """The scheduled backups in a folder, the newest first; what bears another name is left alone."""
     entries = []
     for path in folder.glob(f"{_PREFIX}*"):
         match = _NAME.fullmatch(path.name)
         with suppress(ValueError):  # no such day
             if match is not None:
-                entries.append(Kept(path, datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC)))
-    return sorted(entries, key=lambda entry: entry.made_at, reverse=True)
+                entries.append(StoredBackup(path, datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC)))
+    return sorted(entries, key=lambda copy: copy.made_at, reverse=True)
 
 
-def newest(folder: Path) -> Kept | None:
+def newest(folder: Path) -> StoredBackup | None:
     """The newest one that is not of the future: what a wrong clock dated ahead makes none superfluous."""
-    return next((entry for entry in kept(folder) if entry.age_s > -SKEW_S), None)
+    return next((copy for copy in stored_backups(folder) if copy.age_s > -SKEW_S), None)
 
 
 def foreign(store: Database, folder: Path) -> str:
@@ -90,10 +90,10 @@ def foreign(store: Database, folder: Path) -> str:
         return f"whose backups {folder} holds cannot be read ({OWNER}: {error.strerror})"
     if not owner:
         return ""
-    own = store.read(identity.find)
-    if owner == own:
+    identity_of_store = store.read(identity.find)
+    if owner == identity_of_store:
         return ""
-    return f"{folder} holds the backups of another store ({owner}; this one is {own or 'new'})"
+    return f"{folder} holds the backups of another store ({owner}; this one is {identity_of_store or 'new'})"
 
 
 class ScheduledBackups:
@@ -108,11 +108,11 @@ class ScheduledBackups:
         self._owned = False  # whether the folder has been seen to be this store's
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="backups", daemon=True)
-        self._seen: Kept | None = None
+        self._seen: StoredBackup | None = None
         self._seen_bytes = 0
 
     @property
-    def last(self) -> Kept | None:
+    def last(self) -> StoredBackup | None:
         """The newest of this store, as of the last look: this waits for no disk."""
         return self._seen
 
@@ -164,11 +164,11 @@ class ScheduledBackups:
             last = newest(self._folder)
             if not ours:
                 return
-            self._own()
+            self._claim_folder()
             if last is not None and last.age_s < self._every_s:
                 return
-            for left in self._folder.glob(f"{_PREFIX}*.part*"):  # of a server that ended half way
-                left.unlink()
+            for leftover in self._folder.glob(f"{_PREFIX}*.part*"):  # of a server that ended half way
+                leftover.unlink()
             started = time.monotonic()
             suffix = ".sqlite3" if self._store.is_sqlite else ".pgdump"
             file = self._folder / f"{_PREFIX}{datetime.now(UTC):{_STAMP}}{suffix}"
@@ -183,7 +183,7 @@ class ScheduledBackups:
         fields = {"file": str(file), "bytes": file.stat().st_size, "seconds": round(time.monotonic() - started, 1)}
         logger.info("backup made and read back", extra={"fields": fields})
 
-    def _own(self) -> None:
+    def _claim_folder(self) -> None:
         """Note whose folder this is; raises StoreError where it is another store's."""
         if words := foreign(self._store, self._folder):
             raise StoreError(f"{words}; give each store a folder of its own (UNDERSKIN_BACKUP_TO)")
@@ -201,14 +201,14 @@ class ScheduledBackups:
             return self._note.read_text() == self._address
         return False
 
-    def _newest(self) -> Kept | None:
+    def _newest(self) -> StoredBackup | None:
         """The newest one of this store."""
         return None if foreign(self._store, self._folder) else newest(self._folder)
 
     def _rotate(self, size: int) -> None:
         """Delete the oldest, but none while the one just made, of so many bytes, is far smaller than the largest."""
-        entries = [entry for entry in kept(self._folder) if entry.age_s > -SKEW_S]
-        largest = max(entry.path.stat().st_size for entry in entries)
+        entries = [copy for copy in stored_backups(self._folder) if copy.age_s > -SKEW_S]
+        largest = max(copy.path.stat().st_size for copy in entries)
         if size < _SMALLER * largest:
             logger.warning(
                 "the backup just made has %d bytes, an earlier one %d: no old ones are deleted until this is looked at",

@@ -32,7 +32,7 @@ def _contact_table(folder: Path) -> ContactTable:
     return _read(load_contact, folder / CONTACT_TABLE)
 
 
-def contact_asked_for(table: SigmaTable, name: ContactName) -> ContactModel:
+def requested_contact(table: SigmaTable, name: ContactName) -> ContactModel:
     """The contact of this name; raises Refusal 503 with the reason when its table cannot be read."""
     try:
         return contact_model(table, name)

@@ -29,19 +29,19 @@ def largest_pitch(offset: Floats, response: Floats, distance: float, finest: flo
     dip
         Over the response above a sensor [-].
     """
-    if finest > distance / 2 or not _told_apart(offset, response, finest, distance, dip):
+    if finest > distance / 2 or not _are_resolved(offset, response, finest, distance, dip):
         return float("nan")
     low, high = finest, distance / 2
     for _ in range(_STEPS):
         middle = (low + high) / 2
-        if _told_apart(offset, response, middle, distance, dip):
+        if _are_resolved(offset, response, middle, distance, dip):
             low = middle
         else:
             high = middle
     return low
 
 
-def _told_apart(offset: Floats, response: Floats, pitch: float, distance: float, dip: float) -> bool:
+def _are_resolved(offset: Floats, response: Floats, pitch: float, distance: float, dip: float) -> bool:
     """Whether two contacts show as two at this and at every larger distance, for every placement of the row."""
     width = 2 * float(offset[int(np.argmax(response < response[0] / 2))])
     farthest = distance + 2 * pitch + 2 * width  # beyond it each contact is seen on its own, again and again

@@ -11,7 +11,7 @@ from fastapi import Request
 from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.forms import UNLIKELY, in_form_words, label_of, number
 from service.pages.shared.skin_values import FIELDS, UNITS, shown
-from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, told_together, wrong_fields
+from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, errors_together, quantities, wrong_fields
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
@@ -24,7 +24,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
 # The L up to which it is known what finite strain adds, and how much in percent there (docs/http-api.md).
-_KNOWN_TO, _ADDED_PERCENT = 0.1, 3
+_KNOWN_UP_TO_L, _ADDED_PERCENT = 0.1, 3
 GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
 _DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
 GLUE = "glue_stiffness"
@@ -55,7 +55,7 @@ class Described:
 
     def document(self) -> dict[str, Any]:
         """The request without its loads; raises SeveralInvalid."""
-        with told_together() as wrong:
+        with errors_together() as wrong:
             document: dict[str, Any] = {}
             with noting(wrong):
                 document |= quantities(self.values, [name for name, *_ in FIELDS], units_checked=self.units_checked)
@@ -81,18 +81,18 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
 def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tuple[str, str]]:
     """What looks wrong, each with what it is about in the words of these forms; `lines`: of the loads in their
     text."""
-    found = [] if answer is None else answer.findings
-    return [(label_of(one.field, _LABELS, lines), one.statement) for one in found]
+    stated = [] if answer is None else answer.findings
+    return [(label_of(finding.field, _LABELS, lines), finding.statement) for finding in stated]
 
 
 def finite_strain(answer: ArrayStress | None) -> str | None:
     """That finite strain, which is in neither charge nor error, adds more than is known; None where no load is so
     large."""
-    for one in [] if answer is None else answer.findings:
-        load = one.arguments.get("load_parameter", 0.0)
-        if one.reason is Reason.LOAD_NOT_LINEAR and load > _KNOWN_TO:
+    for finding in [] if answer is None else answer.findings:
+        load = finding.arguments.get("load_parameter", 0.0)
+        if finding.reason is Reason.LOAD_NOT_LINEAR and load > _KNOWN_UP_TO_L:
             return (
-                f"The ± does not include finite strain. At L = {_KNOWN_TO:g} that adds {_ADDED_PERCENT} % to the "
+                f"The ± does not include finite strain. At L = {_KNOWN_UP_TO_L:g} that adds {_ADDED_PERCENT} % to the "
                 f"stress on a sensor beneath the sphere; here L reaches {load:.2g}, beyond where it is known what it "
                 "adds."
             )

@@ -19,9 +19,9 @@ from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.array import description
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.forms import TOKEN, require_own
+from service.pages.shared.forms import TOKEN, require_form_token
 from service.pages.shared.html import page
-from service.pages.shared.wrong_fields import told_together
+from service.pages.shared.wrong_fields import errors_together
 from service.store import Database
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
@@ -51,11 +51,11 @@ async def send(request: Request, store: Store) -> Response:
     """With the map that was sent as a file, or else as text."""
     folder: UploadFolder = request.app.state.uploads
     async with received(request, folder, _LARGEST_BODY_BYTES) as sent:
-        fields = [one for one in sent if one.field not in (_MAP, _FILE)]
+        fields = [part for part in sent if part.field not in (_MAP, _FILE)]
         given = await folder.threads.run(partial(texts, fields, _LONGEST_FIELD))
-        require_own(request, given.get(TOKEN, ""))
-        file = next((one for one in sent if one.field == _FILE and one.label), None)
-        typed = next((one for one in sent if one.field == _MAP), None)
+        require_form_token(request, given.get(TOKEN, ""))
+        file = next((part for part in sent if part.field == _FILE and part.label), None)
+        typed = next((part for part in sent if part.field == _MAP), None)
         chosen = file or typed
         content = b"" if chosen is None else await folder.threads.run(partial(chosen.start, _LARGEST_BYTES + 1))
     name = "the map" if file is None or not file.label else file.label
@@ -68,7 +68,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
 
     def document_of_map() -> dict[str, Any]:
         document: dict[str, Any] = {}
-        with told_together() as wrong:
+        with errors_together() as wrong:
             with noting(wrong):
                 document = described.document()
             if len(content) > _LARGEST_BYTES:

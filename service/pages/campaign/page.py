@@ -79,8 +79,8 @@ def shown(
         band = None
         answer, numbers = d33_cache.with_numbers(store, table, row, band)
         refused = refused or RefusedForm("band", in_form_words(error, _LABELS), {}, 200)
-    sensors = sorted({entry.sensor for entry in recordings if entry.sensor is not None})
-    show = show if show in {"", *sensors, *(entry.id for entry in recordings)} else ""
+    sensors = sorted({recording.sensor for recording in recordings if recording.sensor is not None})
+    show = show if show in {"", *sensors, *(recording.id for recording in recordings)} else ""
     path = f"/v1/campaigns/{quote(row.id, safe='')}/d33" + (f"?{band_query(band)}" if band else "")
     return page(
         request,
@@ -95,14 +95,16 @@ def shown(
         answer=answer,
         described=row.about["skin"],
         recordings=recordings,
-        conditions=condition_columns(entry.scalars.get("conditions") for entry in recordings),
+        conditions=condition_columns(recording.scalars.get("conditions") for recording in recordings),
         first=first if first < len(recordings) else 0,
         most_listed=_MOST_LISTED,
         most_offered=_MOST_OFFERED,
         listed="first" in request.query_params,
         sensors=sensors,
         diagnoses=list(verdict_of.values()),
-        figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in recordings)),
+        figures=figures(
+            store, row, answer, numbers, show, curves=any(recording.kind != "frf" for recording in recordings)
+        ),
         show=show,
         band=band,
         same=same_request.get(request, path, f"client.campaigns.d33({row.id!r}" + (f", {band})" if band else ")")),

@@ -58,7 +58,7 @@ def results(answer: DesignAnswer, other_sigma: float | None = None) -> list[Desi
     ]  # fmt: skip
     if answer.status == "ok":
         return entries
-    return [replace(entry, note="outside the table") if entry.value is None else entry for entry in entries]
+    return [replace(result, note="outside the table") if result.value is None else result for result in entries]
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,11 @@ def compared(
         _compared(name, words, [(f"{values[name]:g} {unit}", values[name]) for values in numbers])
         for name, words, unit, *_ in SLIDERS
     ]
-    told = [
-        _compared(f"told-{one.name}", one.words, [(one.text, one.value), (other.text, other.value)])
-        for one, other in zip(*(results(answer) for _, answer in (pinned, stands)), strict=True)
+    comparisons = [
+        _compared(f"told-{result.name}", result.words, [(result.text, result.value), (reference.text, reference.value)])
+        for result, reference in zip(*(results(answer) for _, answer in (pinned, stands)), strict=True)
     ]
-    return chosen + told
+    return chosen + comparisons
 
 
 def _compared(name: str, words: str, both: Sequence[tuple[str, float | None]]) -> Compared:

@@ -38,8 +38,8 @@ def shown_array(
     if "frf" not in texts:
         return None
     figure = orjson.loads(texts["frf"])
-    told = figure["layout"]["meta"]
-    sensors = sorted(set(told["sensors"]))
+    meta = figure["layout"]["meta"]
+    sensors = sorted(set(meta["sensors"]))
     sensor = sensor if sensor in sensors else None
     campaign = store.read(campaigns.find, row.campaign_id)
     of_sensors = sensors_of(campaign, d33_cache.answer(store, table, campaign, None))
@@ -48,13 +48,13 @@ def shown_array(
     figures = [_map(campaign, of_sensors, sensor)]
     if sensor is None:
         return ShownArray(sensors, None, figures, [])
-    own = [number for number, name in enumerate(told["sensors"]) if name == sensor]
+    indices = [number for number, name in enumerate(meta["sensors"]) if name == sensor]
     root = store.read(skins.require_root, campaign.skin_id)
     computed = d33_cache.complete(store, table, root)
     history = drawn_history(root, history_by_model(store, table, root, "paper", computed), sensor, "paper")
     about = _ABOUT.format(sensor=sensor)
-    frf = drawn_before("frf", _only(figure, own), about, f"/diagnoses/{row.id}/frf.csv")
-    return ShownArray(sensors, sensor, [*figures, replace(frf, name="frf-of-sensor"), history], _rows(told, own))
+    frf = drawn_before("frf", _only(figure, indices), about, f"/diagnoses/{row.id}/frf.csv")
+    return ShownArray(sensors, sensor, [*figures, replace(frf, name="frf-of-sensor"), history], _rows(meta, indices))
 
 
 def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None) -> Drawn:
@@ -81,10 +81,10 @@ def _only(figure: Mapping[str, Any], numbers: list[int]) -> str:
     return orjson.dumps(figure).decode()
 
 
-def _rows(told: Mapping[str, Any], numbers: list[int]) -> list[dict[str, Any]]:
+def _rows(meta: Mapping[str, Any], numbers: list[int]) -> list[dict[str, Any]]:
     """Recordings with sphere, preload and what either model leaves; figures of older versions tell the names alone."""
     columns = ("indenters_mm", "preloads_n", "left_percent")
     return [
-        {"recording": told["recordings"][number], **{name: told[name][number] for name in columns if name in told}}
+        {"recording": meta["recordings"][number], **{name: meta[name][number] for name in columns if name in meta}}
         for number in numbers
     ]

@@ -50,8 +50,8 @@ def left_open(report: Mapping[str, Any]) -> bool:
     """Whether a report leaves more than one explanation that recordings could tell apart."""
     if report["verdict"] == "unexplained":
         return False
-    others = sum(entry["probability"] > _SURVIVES for entry in report["alternatives"])
-    return bool(report["next_experiment"]) or (report["fit"] is not None and others > 0)
+    surviving = sum(alternative["probability"] > _SURVIVES for alternative in report["alternatives"])
+    return bool(report["next_experiment"]) or (report["fit"] is not None and surviving > 0)
 
 
 @router.get("")
@@ -94,10 +94,10 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
 def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
     """The planned recordings, a row each, and how many of each have arrived."""
     rows = _rows_of_address(request, diagnosis_id, planner, store)
-    names = list(dict.fromkeys(name for one in rows for name in one.values))
-    told = [{name: in_a_cell(value) for name, value in one.values.items()} for one in rows]
-    counts = [{"repeats": one.repeats, "arrived": one.arrived} for one in rows]
-    joined = [own | count for own, count in zip(told, counts, strict=True)]
+    names = list(dict.fromkeys(name for planned in rows for name in planned.values))
+    cells = [{name: in_a_cell(value) for name, value in planned.values.items()} for planned in rows]
+    counts = [{"repeats": planned.repeats, "arrived": planned.arrived} for planned in rows]
+    joined = [values | count for values, count in zip(cells, counts, strict=True)]
     row, name = _diagnosed(store, diagnosis_id)
     return csv_of_rows(file_name(row.skin_id, name, "plan"), [*names, "repeats", "arrived"], joined)
 
@@ -179,6 +179,6 @@ def _same(request: Request, campaign_id: str, limits: Mapping[str, Any]) -> same
             options += [flag, *map(repr, value)]
         else:
             values = value if name in _SEVERAL else [value]
-            options += [text for one in values for text in (flag, repr(one))]
+            options += [text for item in values for text in (flag, repr(item))]
     call = ", ".join(f"{name}={value!r}" for name, value in limits.items())
     return same_request.planned(request, campaign_id, options, call)

@@ -38,15 +38,17 @@ def planned_rows(store: Database, row: AnyRow, plan: Mapping[str, Any] | None) -
     counts = store.read(planned_recordings.arrived, row, entries)
     return [
         PlannedRow(
-            {name: value for name, value in entry.items() if name != "repeats" and value != []}, entry["repeats"], count
+            {name: value for name, value in planned.items() if name != "repeats" and value != []},
+            planned["repeats"],
+            count,
         )
-        for entry, count in zip(entries, counts, strict=True)
+        for planned, count in zip(entries, counts, strict=True)
     ]
 
 
 def heads(rows: Sequence[PlannedRow]) -> dict[str, str]:
     """Of a table of them, the heading of each condition."""
-    return {name: _HEADS.get(name) or axis(name) for one in rows for name in one.values}
+    return {name: _HEADS.get(name) or axis(name) for row in rows for name in row.values}
 
 
 def rig_answer(store: Database, row: AnyRow, rows: Sequence[PlannedRow], number: int) -> Response:

@@ -69,7 +69,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
         units_checked=UNITS in request.query_params,
         wrong=tried.wrong,
         outside=tried.outside,
-        told=_told(tried.field, 0) if ok and tried.field is not None else [],
+        told=_sentences(tried.field, 0) if ok and tried.field is not None else [],
         error_percent=_error_percent(tried.field) if ok and tried.field is not None else 0.0,
         linear=tried.given.get("poisson_ratio") != INCOMPRESSIBLE,
         figures=_figures(tried.field, query) if ok and tried.field is not None else [],
@@ -90,7 +90,7 @@ def at_once(request: Request, table: Table) -> Response:
     field = _computed(table, given, FRAMES, UNITS in request.query_params)
     rows = range(FRAMES) if field.contact.inside.all() else ()
     content = orjson.dumps(
-        [{"told": _told(field, row), "figures": frames(field, row)} for row in rows],
+        [{"told": _sentences(field, row), "figures": frames(field, row)} for row in rows],
         option=orjson.OPT_SERIALIZE_NUMPY,
     )
     answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
@@ -143,7 +143,7 @@ def _computed(table: SigmaTable, given: Mapping[str, float], count: int, units_c
         return stress_field(table, skin, indenter, force * np.arange(1, count + 1) / count, _RADII, _DEPTHS)
 
 
-def _told(field: StressField, row: int) -> list[str]:
+def _sentences(field: StressField, row: int) -> list[str]:
     """What the load makes, in the order in which the page says it."""
     contact, force = field.contact, float(field.preload[row])
     a = float(contact.contact_radius[row])

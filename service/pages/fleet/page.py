@@ -41,7 +41,7 @@ def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: 
     """Puts the diagnosis of the chosen skins into the queue; one that there is already is shown. What is wrong stands
     in the form, with all that was chosen."""
     try:
-        row = store.write(usecase.ask_of_fleet, table, sender(request), _asked(sent))
+        row = store.write(usecase.ask_of_fleet, table, sender(request), _requested(sent))
     except (UnderskinError, Conflict) as error:
         find, after = sent.get("find", ""), sent.get("after") or None
         return _choice(request, store, find, after, _chosen(sent), sent.get("name", ""), error)
@@ -53,7 +53,7 @@ def _chosen(sent: Mapping[str, str]) -> list[str]:
     return [value for name, value in sent.items() if name.startswith(_BOX)]
 
 
-def _asked(sent: Mapping[str, str]) -> AskForFleet:
+def _requested(sent: Mapping[str, str]) -> AskForFleet:
     """The request that the form stands for; raises InvalidInput."""
     chosen = _chosen(sent)
     if len(chosen) < FEWEST_SKINS:

@@ -64,8 +64,8 @@ def by_model(
         return ByModel(unavailable=str(outdated))
     fields = [(name, *_NEEDED[name], given.get(name, "").strip()) for name in model.needs]
     try:
-        asked = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
-        return ByModel(fields, asked, d33(table, store, D33Columns.model_validate(asked)))
+        document_of_model = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
+        return ByModel(fields, document_of_model, d33(table, store, D33Columns.model_validate(document_of_model)))
     except UnderskinError as refused:
         return ByModel(fields, unavailable=in_form_words(refused, _LABELS))
 

@@ -12,7 +12,7 @@ from service.dependencies import WRITE, Store, Table
 from service.pages.mechanisms.picture import STYLE, picture
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
-from service.pages.shared.forms import OWN_FORM, Form, see
+from service.pages.shared.forms import FORM_OF_SESSION, Form, see
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.usecases import mechanisms as usecase
@@ -32,14 +32,14 @@ _SHOWN = 8  # diagnoses of each mechanism; the file of numbers has all
 @router.get("")
 def mechanisms(request: Request, store: Store, table: Table) -> Response:
     """The lab's own first."""
-    known = catalogue(store, table)
+    listed = catalogue(store, table)
     return page(
         request,
         "mechanisms.html",
-        own=[one for one in known.entries if one.entry.own],
-        others=[one for one in known.entries if not one.entry.own],
+        own=[row for row in listed.entries if row.entry.own],
+        others=[row for row in listed.entries if not row.entry.own],
         unusable=usecase.unusable(),
-        diagnoses=known.diagnoses,
+        diagnoses=listed.diagnoses,
         shown=_SHOWN,
         sure=EXPLAINED,
         rig=RIG,
@@ -78,16 +78,16 @@ def numbers(name: str, table: Table) -> Response:
 @router.get("/{name}/found.csv")
 def found_csv(name: str, store: Store) -> Response:
     """Every diagnosis that states it."""
-    _require_known(name)
+    _require_listed(name)
     rows = findings(store).by_mechanism.get(name, ())
     columns: Mapping[str, list[object]] = {
-        "diagnosis": [one.diagnosis_id for one in rows],
-        "campaign": [one.campaign_id or "" for one in rows],
-        "skin": [one.skin_id for one in rows],
-        "name": [one.name for one in rows],
-        "ended_at": [one.at for one in rows],
-        "verdict": [one.verdict for one in rows],
-        "probability": [one.probability for one in rows],
+        "diagnosis": [row.diagnosis_id for row in rows],
+        "campaign": [row.campaign_id or "" for row in rows],
+        "skin": [row.skin_id for row in rows],
+        "name": [row.name for row in rows],
+        "ended_at": [row.at for row in rows],
+        "verdict": [row.verdict for row in rows],
+        "probability": [row.probability for row in rows],
     }
     return csv_answer(f"{name}-found", columns)
 
@@ -100,7 +100,7 @@ def keep_found(sent: Form, store: Store) -> Response:
     return see("/mechanisms")
 
 
-@router.post("/{name}/discard", dependencies=[*WRITE, OWN_FORM])
+@router.post("/{name}/discard", dependencies=[*WRITE, FORM_OF_SESSION])
 def discard(name: str, store: Store) -> Response:
     """Take it out of the catalogue."""
     store.read(usecase.discard, name)
@@ -109,14 +109,14 @@ def discard(name: str, store: Store) -> Response:
 
 def _effect(name: str, table: SigmaTable) -> LawEffect:
     """Raises Refusal 404, also where the reference rig has not what the mechanism follows."""
-    _require_known(name)
+    _require_listed(name)
     try:
         return effect(name, table)
     except Unsupported as lacking:
         raise Refusal(404, f"There is no picture of {name!r}: {lacking.reason}.") from None
 
 
-def _require_known(name: str) -> None:
+def _require_listed(name: str) -> None:
     """Raises Refusal 404."""
     if name not in usecase.catalogue():
         raise Refusal(404, f"There is no mechanism {name!r}.")

@@ -31,4 +31,4 @@ def condition_columns(recordings: Iterable[Noted | None]) -> ConditionColumns:
         for name, value in (noted or {}).items():
             numeric[name] = numeric.get(name, True) and not isinstance(value, str)
     columns = [ConditionColumn(name, all_numbers) for name, all_numbers in numeric.items()]
-    return ConditionColumns(columns[:_MOST], [one.name for one in columns[_MOST:]])
+    return ConditionColumns(columns[:_MOST], [column.name for column in columns[_MOST:]])

@@ -70,14 +70,16 @@ def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", num
     none. `noun`: what they are called."""
     from underskin.figures.curves import ForceCurve, force_curves
 
-    chosen = [one for one in recordings if not isinstance(one, FrfRecording)]
+    chosen = [recording for recording in recordings if not isinstance(recording, FrfRecording)]
     if not chosen:
         return []
     parts = _there_and_back(chosen[0]) if len(chosen) == 1 else []
     if parts:
         figure = force_curves([ForceCurve(*part) for part in parts])
         return [drawn("curves", figure, "Force against displacement, loading and way back.", numbers)]
-    figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:most]])
+    figure = force_curves(
+        [ForceCurve(recording.id, recording.displacement_mm, recording.force_n) for recording in chosen[:most]]
+    )
     about = f"Force against displacement of {min(len(chosen), most)} of {len(chosen)}{noun}."
     return [drawn("curves", figure, about, numbers)]
 
@@ -118,8 +120,8 @@ def file_name(*parts: str) -> str:
 def _saved(file: str) -> dict[str, str]:
     """Headers of a file to be saved; a name beyond ASCII also as RFC 6266 has it."""
     plain = unicodedata.normalize("NFKD", file).encode("ascii", "ignore").decode()
-    told = f'attachment; filename="{plain}"' + ("" if plain == file else f"; filename*=UTF-8''{quote(file)}")
-    return {"Content-Disposition": told, "X-Content-Type-Options": "nosniff"}
+    disposition = f'attachment; filename="{plain}"' + ("" if plain == file else f"; filename*=UTF-8''{quote(file)}")
+    return {"Content-Disposition": disposition, "X-Content-Type-Options": "nosniff"}
 
 
 def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> CsvAnswer:
@@ -136,6 +138,10 @@ def sensors_of(row: AnyRow, answer: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Each sensor of the d33 of a campaign, with its place and in words why it stands out (`reasons`)."""
     places = {sensor["id"]: sensor for sensor in row.about["skin"]["sensors"]}
     return [
-        {**entry, **places[entry["sensor"]], "reasons": "; ".join(flag["reason"] for flag in entry["flags"])}
-        for entry in answer["sensors"]
+        {
+            **of_sensor,
+            **places[of_sensor["sensor"]],
+            "reasons": "; ".join(flag["reason"] for flag in of_sensor["flags"]),
+        }
+        for of_sensor in answer["sensors"]
     ]

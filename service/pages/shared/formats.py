@@ -27,7 +27,7 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
     """A number with its 95 % interval, all to the digits that the width tells: 13.25 (95 %: 13.11 to 13.39)."""
     if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
         return number(value, unit)
-    shown = [_to_places(one, _places(low, high)) for one in (value, low, high)]
+    shown = [_to_places(bound, _places(low, high)) for bound in (value, low, high)]
     text = Markup('<b><span class="number" title="{}">{}</span></b>').format(f"{value!r} {unit}".strip(), shown[0])
     if unit:
         text += Markup('&nbsp;<span class="unit">{}</span>').format(unit)

@@ -63,18 +63,18 @@ async def _fields(request: Request) -> dict[str, str]:
     except ValueError:
         raise Refusal(400, "The form has too many fields.") from None
     fields = {name: entries[0] for name, entries in values.items()}
-    require_own(request, fields.get(TOKEN, ""))
+    require_form_token(request, fields.get(TOKEN, ""))
     return fields
 
 
-def require_own(request: Request, token: str) -> None:
+def require_form_token(request: Request, token: str) -> None:
     """Refuses what was not sent from a page of this session."""
     if not session.is_form_token(session.cookie_in(dict(request.scope["headers"])), token):
         raise Refusal(403, "This form was not made for your session, or the session has ended: go back and reload it.")
 
 
 Form = Annotated[dict[str, str], Depends(_fields)]
-OWN_FORM = Depends(_fields)  # of a route that needs no field, only that the form is of this session
+FORM_OF_SESSION = Depends(_fields)  # of a route that needs no field, only that the form is of this session
 
 
 def reason(sent: dict[str, str]) -> str:
@@ -166,9 +166,9 @@ def numbers(name: str, line: str, parts: Sequence[str] = ()) -> list[float]:
     names = [*(f"{name}, {part}" for part in parts), *[name] * len(typed)]
     wrong: list[InvalidInput] = []
     read: list[float] = []
-    for known_as, cell, value in zip(names, typed, values, strict=False):
+    for field_name, cell, value in zip(names, typed, values, strict=False):
         with noting(wrong):
-            read.append(number(known_as, cell) if value is None else value)
+            read.append(number(field_name, cell) if value is None else value)
     if wrong:
         raise SeveralInvalid(wrong)
     return read
@@ -188,8 +188,8 @@ def in_form_words(
 
 def unsigned(field: str, allowed: str) -> str:
     """What is allowed, without the words on its magnitude where a field has no sign, or is one of a single file."""
-    known = LAB.get(field.rpartition(".")[2])
-    return allowed if known is not None and known.signed else allowed.replace(" in magnitude", "")
+    quantity = LAB.get(field.rpartition(".")[2])
+    return allowed if quantity is not None and quantity.signed else allowed.replace(" in magnitude", "")
 
 
 def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
@@ -212,8 +212,8 @@ def label_of(field: str, labels: Mapping[str, str], lines: Sequence[int] = ()) -
 def _load(path: re.Match[str], lines: Sequence[int]) -> str:
     """`contacts[0].normal_force_n` as `load in line 1, F`."""
     number, field, part = int(path[1]), path[2], path[3]
-    place = f"load in line {lines[number] if number < len(lines) else number + 1}"
+    load = f"load in line {lines[number] if number < len(lines) else number + 1}"
     if field is None:
-        return place
+        return load
     name = _TANGENTIAL[int(part)] if field == "tangential_force_n" and part is not None else _OF_LOAD.get(field, field)
-    return f"{place}, {name}"
+    return f"{load}, {name}"

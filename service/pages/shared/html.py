@@ -90,9 +90,9 @@ def page(
 
 def problem_page(refusal: Refusal, request_id: str) -> Response:
     """What happened and what to do; where the gate sends elsewhere, the way there."""
-    place = refusal.headers.get("Location")
-    if place is not None and not urlsplit(place).netloc:
-        return RedirectResponse(place, refusal.status)
+    location = refusal.headers.get("Location")
+    if location is not None and not urlsplit(location).netloc:
+        return RedirectResponse(location, refusal.status)
     text = render("problem.html", refusal=refusal, request_id=request_id, viewer=None)
     return HTMLResponse(text, refusal.status, {**headers(), **refusal.headers})
 

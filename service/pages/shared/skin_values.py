@@ -53,18 +53,18 @@ def start(
         measured = overview.medians(connection, [latest.number], table.sha256).get(latest.number)
         sensors = overview.measured_sensors(connection, [latest.number], table.sha256).get(latest.number, (0, 0))
     described = latest.about["skin"]
-    known = {name: float(described[name]) for name in PROTOTYPE if described.get(name) is not None}
-    known |= _pressed([entry.scalars for entry in recordings if "preload_n" in entry.scalars])
-    known |= _pitch(described["sensors"])
+    values = {name: float(described[name]) for name in PROTOTYPE if described.get(name) is not None}
+    values |= _pressed([recording.scalars for recording in recordings if "preload_n" in recording.scalars])
+    values |= _pitch(described["sensors"])
     taken = []
-    if "d33_pc_per_n" not in known and measured is not None and measured > 0:
-        known["d33_pc_per_n"], sentence = _measured_d33(store, table, root, latest, measured, sensors)
+    if "d33_pc_per_n" not in values and measured is not None and measured > 0:
+        values["d33_pc_per_n"], sentence = _measured_d33(store, table, root, latest, measured, sensors)
         taken += [f"{sentence}; the skin declares none"] if "d33_pc_per_n" in words else []
-    lacking = [name for name in words if name in PROTOTYPE and name not in known]
+    lacking = [name for name in words if name in PROTOTYPE and name not in values]
     sentence = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)
     if lacking:
         taken.append(f"Not declared, so taken from the paper's prototype: {sentence}")
-    return {**PROTOTYPE, **known}, taken
+    return {**PROTOTYPE, **values}, taken
 
 
 def _measured_d33(
@@ -107,16 +107,19 @@ def shown(
     """What a form with these fields shows: as it was sent, also empty, or else where the view starts, with
     `start`'s sentences."""
     missing = {name: (words, unit) for name, words, unit in fields if name not in given}
-    known, taken = start(store, table, skin_id, missing)
-    return {name: given.get(name, f"{known[name]:g}") for name, *_ in fields}, taken
+    start_values, taken = start(store, table, skin_id, missing)
+    return {name: given.get(name, f"{start_values[name]:g}") for name, *_ in fields}, taken
 
 
 def _pressed(scalars: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     """The smallest sphere and the median preload."""
     if not scalars:
         return {}
-    smallest = float(np.min([one["indenter_radius_mm"] for one in scalars]))
-    return {"indenter_radius_mm": smallest, "preload_n": float(np.median([one["preload_n"] for one in scalars]))}
+    smallest = float(np.min([conditions["indenter_radius_mm"] for conditions in scalars]))
+    return {
+        "indenter_radius_mm": smallest,
+        "preload_n": float(np.median([conditions["preload_n"] for conditions in scalars])),
+    }
 
 
 def _pitch(sensors: Sequence[Mapping[str, Any]]) -> dict[str, float]:

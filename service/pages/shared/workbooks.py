@@ -28,8 +28,8 @@ def add_to(router: APIRouter) -> None:
     for route in list(router.routes):
         if isinstance(route, APIRoute) and route.path.endswith(CSV):
             endpoint = _as_workbook(inspect.unwrap(route.endpoint))
-            own = route.path.removeprefix(router.prefix).removesuffix(CSV)
-            router.add_api_route(own + XLSX, endpoint)
+            name = route.path.removeprefix(router.prefix).removesuffix(CSV)
+            router.add_api_route(name + XLSX, endpoint)
 
 
 def _as_workbook(endpoint: Callable[..., Any]) -> Callable[..., Awaitable[Response]]:

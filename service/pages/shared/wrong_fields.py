@@ -11,7 +11,7 @@ from underskin.recordings.validation import declared, poisson_ratio
 from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
 from underskin.units import LAB
 
-_MOST_TOLD = 20
+_MOST_LISTED_ERRORS = 20
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class WrongFields:
 
     def ids(self, name: str) -> str:
         """Ids on the page of the sentences about a field, with blanks between them."""
-        return " ".join(f"wrong-{place}" for place, (field, _) in enumerate(self.told, 1) if field == name)
+        return " ".join(f"wrong-{index}" for index, (field, _) in enumerate(self.told, 1) if field == name)
 
 
 NOTHING_WRONG = WrongFields()
@@ -41,13 +41,13 @@ def wrong_fields(
     if not isinstance(error, InvalidInput):
         return WrongFields([("", in_words(error))])
     errors = errors_of(error)
-    told = [(field_of(one), in_words(one)) for one in errors[:_MOST_TOLD]]
-    more = len(errors) - len(told)
-    return WrongFields([*told, *([("", f"and {more} more")] if more else [])])
+    entries = [(field_of(invalid), in_words(invalid)) for invalid in errors[:_MOST_LISTED_ERRORS]]
+    more = len(errors) - len(entries)
+    return WrongFields([*entries, *([("", f"and {more} more")] if more else [])])
 
 
 @contextmanager
-def told_together(order: Sequence[str] = ()) -> Iterator[list[InvalidInput]]:
+def errors_together(order: Sequence[str] = ()) -> Iterator[list[InvalidInput]]:
     """Takes what is wrong, by `noting`; after the block raises SeveralInvalid with the first error of each place, as
     what cannot be read is missing to later checks too. `order`: of the fields in the form, where checks have another.
     """
@@ -55,11 +55,11 @@ def told_together(order: Sequence[str] = ()) -> Iterator[list[InvalidInput]]:
     with noting(wrong):
         yield wrong
     first: dict[str, InvalidInput] = {}
-    for one in wrong:
-        first.setdefault(one.place, one)
+    for invalid in wrong:
+        first.setdefault(invalid.place, invalid)
     if first:
-        places = {name: place for place, name in enumerate(order)}
-        raise SeveralInvalid(sorted(first.values(), key=lambda one: places.get(one.field, len(places))))
+        places = {name: index for index, name in enumerate(order)}
+        raise SeveralInvalid(sorted(first.values(), key=lambda invalid: places.get(invalid.field, len(places))))
 
 
 def quantity(name: str, typed: str, *, units_checked: bool = False) -> float:

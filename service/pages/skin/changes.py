@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, RunnerInUse, SkinId, Store, Table, sender
-from service.pages.shared.forms import OWN_FORM, Form, annotated, attempted, reason, see, signed
+from service.pages.shared.forms import FORM_OF_SESSION, Form, annotated, attempted, reason, see, signed
 from service.pages.skin.page import shown
 from service.problems import parsed
 from service.schemas.diagnoses import AskForSkin
@@ -23,7 +23,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 router = APIRouter(prefix="/skins/{skin_id}", dependencies=WRITE)
 
 
-@router.post("/diagnosis", dependencies=[OWN_FORM])
+@router.post("/diagnosis", dependencies=[FORM_OF_SESSION])
 def diagnose_together(request: Request, skin_id: SkinId, runner: RunnerInUse, store: Store, table: Table) -> Response:
     """Puts one diagnosis of all campaigns in use into the queue; one that there is already is shown."""
     row = store.write(diagnosis_usecase.ask_of_skin, skin_id, table, sender(request), AskForSkin())
@@ -46,8 +46,8 @@ def join(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Tab
     """Count the other as this one from now on."""
 
     def do() -> None:
-        asked = parsed(Join, {"skin_id": sent.get("other", "").strip(), "reason": reason(sent)})
-        usecase.join(store, skin_id, asked.skin_id, asked.reason, signed(request, sent))
+        demand = parsed(Join, {"skin_id": sent.get("other", "").strip(), "reason": reason(sent)})
+        usecase.join(store, skin_id, demand.skin_id, demand.reason, signed(request, sent))
 
     return _done(request, skin_id, store, table, "join", sent, do)
 

@@ -35,17 +35,17 @@ def map_rows(
 ) -> list[dict[str, Any]]:
     """Each sensor of the skin, which has `places`, with its trend, where it has one: as a campaign's answer tells it,
     else with its last value in `history` and in words since when that stands (`absent`), else without a value."""
-    answered = {} if answer is None else {entry["sensor"]: entry for entry in sensors_of(row, answer)}
-    known = {entry.sensor: entry for entry in history.sensors}
+    answered = {} if answer is None else {sensor["sensor"]: sensor for sensor in sensors_of(row, answer)}
+    histories = {sensor_history.sensor: sensor_history for sensor_history in history.sensors}
     rows = []
-    for place in places:
-        name = place["id"]
-        of_sensor = known.get(name)
+    for position in places:
+        name = position["id"]
+        of_sensor = histories.get(name)
         its = answered.get(name) or _last(of_sensor)
         trend: dict[str, Any] = {"no_trend": "never measured with FRFs" if of_sensor is None else of_sensor.no_trend}
         if of_sensor is not None and of_sensor.trend is not None:
             trend = _trend(of_sensor.trend, len(of_sensor.points))
-        rows.append({"sensor": name, "x_mm": place["x_mm"], "y_mm": place["y_mm"], "absent": "", **its, **trend})
+        rows.append({"sensor": name, "x_mm": position["x_mm"], "y_mm": position["y_mm"], "absent": "", **its, **trend})
     return rows
 
 
@@ -88,15 +88,15 @@ def drawn_map(
     # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
     significant = tuple(row.get("significant", False) for row in rows) if show == "trend" else None
     ends = _ENDS.get(show)
-    own = None if ends is None else tuple((row.get(ends[0]), row.get(ends[1])) for row in rows)
-    quantity = Quantity(name, unit, against, differing=significant, intervals=own)
+    intervals = None if ends is None else tuple((row.get(ends[0]), row.get(ends[1])) for row in rows)
+    quantity = Quantity(name, unit, against, differing=significant, intervals=intervals)
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     radius = row.about["skin"].get("sensor_radius_mm")
     values, uncertainties = columns_of(rows, value, uncertainty)
     # A trend is of all campaigns, whichever measured a sensor last.
     absent = ["" if show == "trend" else row["absent"] for row in rows]
     figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor, radius, absent)
-    compared = [math.nan if away else one for away, one in zip(absent, values, strict=True)]
+    compared = [math.nan if away else shown_value for away, shown_value in zip(absent, values, strict=True)]
     about = (
         f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {RESTS[by]}. "
     )
@@ -104,7 +104,7 @@ def drawn_map(
     about += f"It tells of {measured} of the {len(rows)} sensors. " if measured < len(rows) else ""
     about += "The hollow ones stand at their last value, with its date under the pointer. " if any(absent) else ""
     about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(compared, uncertainties, quantity)} "
-    about += _alone(rows) + _without_trend(rows) if show == "trend" else ""
+    about += _trends_of_single_sensors(rows) + _without_trend(rows) if show == "trend" else ""
     return drawn("map", figure, about + CLICK, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
 
 
@@ -118,7 +118,7 @@ def _without_trend(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"{of} {have} no trend, {'' if count == of else f'{count} of them since '}{most}. "
 
 
-def _alone(rows: Sequence[Mapping[str, Any]]) -> str:
+def _trends_of_single_sensors(rows: Sequence[Mapping[str, Any]]) -> str:
     """Which sensors have a trend by their own interval that is not told over the whole array: few campaigns of many
     sensors tell hardly any."""
     low, high = _ENDS["trend"]

@@ -112,7 +112,7 @@ def shown(
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, last)
     by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
     history = usecase.history_by_model(store, table, root, by, computed)
-    sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
+    sensor = sensor if sensor in {sensor_history.sensor for sensor_history in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
     if last is not None and (history.sensors or (mapped is not None and mapped["sensors"])):
@@ -177,9 +177,14 @@ def _measured_last(
     store: Database, last: AnyRow, answer: Mapping[str, Any] | None, history: History, sensor: str
 ) -> AnyRow:
     """The campaign that describes the skin, where it tells of the sensor, else the last one that does."""
-    told = [] if answer is None else [entry["sensor"] for entry in answer["sensors"]]
-    points = [point for entry in history.sensors if entry.sensor == sensor for point in entry.points]
-    return last if sensor in told or not points else store.read(campaigns.find, points[-1].campaign_id)
+    measured_sensors = [] if answer is None else [measured["sensor"] for measured in answer["sensors"]]
+    points = [
+        point
+        for sensor_history in history.sensors
+        if sensor_history.sensor == sensor
+        for point in sensor_history.points
+    ]
+    return last if sensor in measured_sensors or not points else store.read(campaigns.find, points[-1].campaign_id)
 
 
 def _frfs(store: Database, table: SigmaTable, row: AnyRow, sensor: str) -> list[Drawn]:
@@ -187,15 +192,15 @@ def _frfs(store: Database, table: SigmaTable, row: AnyRow, sensor: str) -> list[
     loaded = partial(store.read, campaigns.load, row, with_excluded=False)
     answer = d33_cache.answer(store, table, row, None)
     return [
-        replace(one, title=f"FRF of {sensor} in {row.name[:80]}")
-        for one in drawn_frf(row, loaded, answer, None, sensor)
+        replace(figure, title=f"FRF of {sensor} in {row.name[:80]}")
+        for figure in drawn_frf(row, loaded, answer, None, sensor)
     ]
 
 
 def _of_sensor(history: History, sensor: str | None) -> dict[str, float]:
     """d33 [pC/N] of a sensor in each campaign, by the campaign's id."""
-    chosen = [entry for entry in history.sensors if entry.sensor == sensor]
-    return {point.campaign_id: point.d33_pc_per_n for entry in chosen for point in entry.points}
+    chosen = [sensor_history for sensor_history in history.sensors if sensor_history.sensor == sensor]
+    return {point.campaign_id: point.d33_pc_per_n for sensor_history in chosen for point in sensor_history.points}
 
 
 def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[AnyRow]:
@@ -228,9 +233,9 @@ def history_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "pape
     """d33 of every sensor in every current campaign, and the model that each value rests on."""
     root, _, computed = _completed(store, table, skin_id)
     points = [
-        {"sensor": entry.sensor, **point.model_dump(), "model_id": point.model_id or ""}
-        for entry in usecase.history_by_model(store, table, root, by, computed).sensors
-        for point in entry.points
+        {"sensor": sensor_history.sensor, **point.model_dump(), "model_id": point.model_id or ""}
+        for sensor_history in usecase.history_by_model(store, table, root, by, computed).sensors
+        for point in sensor_history.points
     ]
     return csv_of_rows(file_name(root, "history"), _HISTORY_COLUMNS, points)
 

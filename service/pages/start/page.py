@@ -39,7 +39,7 @@ def start(
         diagnosed = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
         models = [glance.model for glance in shown if glance.model is not None]
         verdict = verdicts.of_rows(connection, diagnosed, [row.id for row in models])
-        adoptions = {one.diagnosis_id: one for one in verdicts.adopted_versions(connection, models)}
+        adoptions = {adopted.diagnosis_id: adopted for adopted in verdicts.adopted_versions(connection, models)}
     answer = page(
         request,
         "start.html",

@@ -76,22 +76,22 @@ def view(request: Request, table: Table) -> Response:
     return page(
         request,
         "tables.html",
-        tables=[_described(folder, entry) for entry in tables(table, folder).tables],
+        tables=[_described(folder, tabulated) for tabulated in tables(table, folder).tables],
         prototype=f"h {_H:g} mm, E {_E:g} MPa, a sphere of R {_R:g} mm",
         same=same_request.get(request, "/v1/tables", "client.tables()"),
     )
 
 
-def _described(folder: Path, entry: TableEntry) -> DescribedTable:
-    file, title, holds = _HELD[entry.name]
-    versions = {name.removeprefix("version_"): value for name, value in entry.about.items() if "version_" in name}
+def _described(folder: Path, tabulated: TableEntry) -> DescribedTable:
+    file, title, holds = _HELD[tabulated.name]
+    versions = {name.removeprefix("version_"): value for name, value in tabulated.about.items() if "version_" in name}
     return DescribedTable(
-        **entry.model_dump(),
+        **tabulated.model_dump(),
         title=title,
         holds=holds,
-        domain=[(_AXES[axis.name][0], axis, _in_lab_units(axis)) for axis in entry.axes],
+        domain=[(_AXES[axis.name][0], axis, _in_lab_units(axis)) for axis in tabulated.axes],
         errors=_errors(folder / file),
-        made=[(words, entry.about[name]) for name, words in _MADE.items() if name in entry.about],
+        made=[(words, tabulated.about[name]) for name, words in _MADE.items() if name in tabulated.about],
         versions=", ".join(f"{name} {value}" for name, value in versions.items()),
     )
 

@@ -22,7 +22,7 @@ _NAME = "course"
 _SHOWN = ("displacement_mm", "force_n", "charge_pc")
 _MOST_BINS = 400  # of many samples, the lowest and the highest of each are drawn
 _ROW, _EDGES = 150, 120  # pixels
-_LOADING, _BACK, _USED, _LEFT_OUT = "loading", "way back", "used", "left out"
+_LOADING, _BACK, _USED, _EXCLUDED = "loading", "way back", "used", "left out"
 _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#8a949e"
 
 
@@ -73,7 +73,7 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
                     name=name,
                     legendgroup=name,
                     showlegend=row == 1,
-                    line={"color": colour, "width": 1.4, "dash": BOUND if name == _LEFT_OUT else SHOWN},
+                    line={"color": colour, "width": 1.4, "dash": BOUND if name == _EXCLUDED else SHOWN},
                     hovertemplate=f"{name}, sample %{{x}}: %{{y:.4g}} {unit}<extra></extra>",
                     row=row,
                     col=1,
@@ -101,11 +101,11 @@ def _readable(field: str, column: Floats) -> tuple[str, float]:
 
 def _parts(columns: Mapping[str, Floats], used: Mask) -> dict[str, tuple[str, Mask]]:
     """By name the colour of each part and where it is, (samples,); a curve is loaded up to its deepest sample."""
-    left_out = {_LEFT_OUT: (_GREY, ~used)}
+    excluded = {_EXCLUDED: (_GREY, ~used)}
     if "displacement_mm" not in columns:
-        return {_USED: (_BLUE, used)} | left_out
+        return {_USED: (_BLUE, used)} | excluded
     depth = np.where(used & np.isfinite(columns["displacement_mm"]), columns["displacement_mm"], -np.inf)
     number, turn = np.arange(len(depth)), int(np.argmax(depth))
     if not (used & (number < turn)).any():  # nothing is pressed in yet, such as where a sign is to be turned
-        return {_USED: (_BLUE, used)} | left_out
-    return {_LOADING: (_BLUE, used & (number <= turn)), _BACK: (_ORANGE, used & (number >= turn))} | left_out
+        return {_USED: (_BLUE, used)} | excluded
+    return {_LOADING: (_BLUE, used & (number <= turn)), _BACK: (_ORANGE, used & (number >= turn))} | excluded

@@ -31,9 +31,9 @@ def field_words(field: str) -> str:
     """A field as the form calls it; others as they are."""
     if field.startswith("derived."):
         return f"formula of {field.removeprefix('derived.')}"
-    place, _, of_channel = field.removeprefix("channels.").partition(".")
-    if place in CHOICES and of_channel in _OF_CHANNEL:
-        return f"{_OF_CHANNEL[of_channel]} of the {CHOICES[place]}"
+    part, _, of_channel = field.removeprefix("channels.").partition(".")
+    if part in CHOICES and of_channel in _OF_CHANNEL:
+        return f"{_OF_CHANNEL[of_channel]} of the {CHOICES[part]}"
     if field in _OF_CHANNEL:
         return _OF_CHANNEL[field]
     return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
@@ -48,7 +48,7 @@ def ids_of(refused: Sequence[Error], field: str) -> str:
     """The ids on the page of what is wrong with a field of the form, with blanks between them; none where it is wrong
     in a rig description that was sent."""
     places = [error["field"].removeprefix("skin.").removeprefix("recording.") for error in refused if RIG not in error]
-    return " ".join(f"refused-{number}" for number, place in enumerate(places, 1) if place == field)
+    return " ".join(f"refused-{number}" for number, refused_field in enumerate(places, 1) if refused_field == field)
 
 
 def what_came(error: Error, channels: Channels) -> Any:
@@ -76,5 +76,5 @@ def what_to_do(error: Error, channels: Channels) -> str:
 
 def _is_of_other_kind(error: Error) -> bool:
     """Whether a channel was refused since recordings of the chosen kind have none."""
-    place, _, field = str(error["field"]).partition(".")
-    return error["code"] == ErrorCode.NOT_ONE_OF and place == "channels" and field in CHOICES
+    part, _, field = str(error["field"]).partition(".")
+    return error["code"] == ErrorCode.NOT_ONE_OF and part == "channels" and field in CHOICES

@@ -37,9 +37,9 @@ def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFi
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending_uploads.in_use(pending):
         inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
-    campaigns = [one.with_estimator(pending.estimator) for one in inspected.campaigns]
+    campaigns = [campaign.with_estimator(pending.estimator) for campaign in inspected.campaigns]
     return replace(
-        inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns
+        inspected, campaigns=[campaign.with_curves_turned() for campaign in campaigns] if pending.turned else campaigns
     )
 
 
@@ -63,11 +63,11 @@ def _look_at_all(request: Request, pending: PendingUpload) -> bool:
         inspected = looked(request, pending, number)
         if inspected.contents is not None and pending.rig is not None:
             fits.append(has_channels(pending.rig, inspected.contents))
-        recordings += sum(one.recordings for one in inspected.campaigns)
+        recordings += sum(campaign.recordings for campaign in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
         pending.negative |= counts_pressing_negative(inspected)
-        known = worth_knowing(request, inspected, pending.skin, pending.corrects)
-        summary = seen(upload, inspected, known)
+        sentences = worth_knowing(request, inspected, pending.skin, pending.corrects)
+        summary = seen(upload, inspected, sentences)
         summaries.append(replace(summary, taken=_taken(inspected, _mapped(pending, inspected, summary))))
         if number == 0:
             drawn = _figures(pending, 0, inspected, summary)
@@ -99,8 +99,8 @@ def _shown(
 
 def _figures(pending: PendingUpload, number: int, inspected: InspectedFile, summary: FileSummary) -> list[Drawn]:
     mapped = _mapped(pending, inspected, summary)
-    course = course_figure.course(inspected, summary, pending.rig, turned=pending.turned)
-    return [*course, *figures(inspected, f"/upload/{pending.id}/{number}/", mapped)]
+    force_course = course_figure.course(inspected, summary, pending.rig, turned=pending.turned)
+    return [*force_course, *figures(inspected, f"/upload/{pending.id}/{number}/", mapped)]
 
 
 def _mapped(pending: PendingUpload, inspected: InspectedFile, summary: FileSummary) -> MappedFile | None:
@@ -120,13 +120,13 @@ def _taken(inspected: InspectedFile, mapped: MappedFile | None) -> dict[str, str
 
 def channels_of(pending: PendingUpload) -> list[ChannelSummary]:
     """Of all files, by name; those that hold the mapping's channels first come first."""
-    by_name = {channel.name: channel for one in reversed(pending.seen) for channel in reversed(one.channels)}
+    by_name = {channel.name: channel for file in reversed(pending.seen) for channel in reversed(file.channels)}
     return list(reversed(by_name.values()))
 
 
 def held_by_some(pending: PendingUpload) -> dict[str, list[str]]:
     """Of channels that not all files with channels have, by name: which files have them."""
-    files = [(one.label, {channel.name for channel in one.channels}) for one in pending.seen if one.channels]
+    files = [(file.label, {channel.name for channel in file.channels}) for file in pending.seen if file.channels]
     holders: dict[str, list[str]] = {}
     for label, names in files:
         for name in names:

@@ -9,20 +9,20 @@ from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.store import Missing
 
 
-def _found(request: Request, upload_id: str) -> PendingUpload:
+def _upload(request: Request, upload_id: str) -> PendingUpload:
     """The upload of an address; raises Missing where it is not the session's own."""
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
 
 
-Found = Annotated[PendingUpload, Depends(_found)]
+UploadOfSession = Annotated[PendingUpload, Depends(_upload)]
 
 
-def _pending(found: Found) -> PendingUpload:
+def _pending(upload: UploadOfSession) -> PendingUpload:
     """The same, which was not discarded; raises Missing where it was."""
-    if found.discarded:
+    if upload.discarded:
         raise Missing("This upload was discarded. For an hour it can be taken back on the page “Upload”.")
-    return found
+    return upload
 
 
 Pending = Annotated[PendingUpload, Depends(_pending)]

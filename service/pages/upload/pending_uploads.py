@@ -25,7 +25,7 @@ from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
 
 LASTS_S = 3600.0
-_MOST_KEPT = 50
+_MOST_UPLOADS = 50
 _MOST_OF_SESSION = 5
 _MOST_DRAWN = 6  # files whose figures are kept
 _GONE = (
@@ -99,12 +99,12 @@ class PendingUpload:
         """Forget what was said of channels, here or of earlier files."""
         self.rig = self.rig_label = self.draft = self.remembered = None
         self.turned, self.refused = False, []
-        self.say_of_files({}, {})
+        self.state_of_files({}, {})
 
-    def say_of_files(self, typed: Mapping[int, Mapping[str, str]], values: Mapping[int, Mapping[str, Any]]) -> None:
+    def state_of_files(self, typed: Mapping[int, Mapping[str, str]], values: Mapping[int, Mapping[str, Any]]) -> None:
         """Read single files by the fields of their recordings that were `typed`, which are these `values`."""
         self.of_files = typed
-        self.files = [replace(one, said=values.get(number)) for number, one in enumerate(self.files)]
+        self.files = [replace(file, said=values.get(number)) for number, file in enumerate(self.files)]
 
     def draw(self, number: int, figures: list[Drawn]) -> None:
         """Keep the figures of a file."""
@@ -128,8 +128,8 @@ class PendingUploads:
         name = secrets.token_urlsafe(16)
         folder = self._folder / f"shelf-{name}"
         folder.mkdir()
-        files = [replace(one, path=one.path.rename(folder / str(number))) for number, one in enumerate(sent)]
-        size = sum(one.path.stat().st_size for one in files)
+        files = [replace(file, path=file.path.rename(folder / str(number))) for number, file in enumerate(sent)]
+        size = sum(file.path.stat().st_size for file in files)
         added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic())
         with self._lock:
             gone = self._of_session(added.session)[_MOST_OF_SESSION - 1 :]
@@ -152,13 +152,13 @@ class PendingUploads:
 
     def waiting(self, cookie: str) -> list[PendingUpload]:
         """The session's own that were neither kept nor discarded, the one used last first."""
-        return [held for held in self._not_kept(cookie) if not held.discarded]
+        return [held for held in self._not_stored(cookie) if not held.discarded]
 
     def discarded(self, cookie: str) -> list[PendingUpload]:
         """The session's own that were discarded and can be taken back, the one used last first."""
-        return [held for held in self._not_kept(cookie) if held.discarded]
+        return [held for held in self._not_stored(cookie) if held.discarded]
 
-    def _not_kept(self, cookie: str) -> list[PendingUpload]:
+    def _not_stored(self, cookie: str) -> list[PendingUpload]:
         self._sweep()
         with self._lock:
             return [held for held in self._of_session(_digest(cookie)) if held.kept_at is None]
@@ -191,8 +191,8 @@ class PendingUploads:
         self._remove_files([pending])
 
     def _of_session(self, session: str) -> list[PendingUpload]:
-        own = [held for held in self._held.values() if held.session == session]
-        return sorted(own, key=_worth, reverse=True)
+        of_session = [held for held in self._held.values() if held.session == session]
+        return sorted(of_session, key=_worth, reverse=True)
 
     def _sweep(self) -> None:
         """Remove what is too old."""
@@ -208,7 +208,7 @@ class PendingUploads:
         total = coming + sum(held.size for held in by_age)
         for held in by_age:
             too_old = time.monotonic() - held.used > LASTS_S
-            if too_old or total > self._most_bytes or len(self._held) >= _MOST_KEPT:
+            if too_old or total > self._most_bytes or len(self._held) >= _MOST_UPLOADS:
                 total -= held.size
                 gone.append(self._held.pop(held.id))
         return gone

@@ -25,9 +25,9 @@ class SimilarErrors:
         """Place of the first."""
         return self.entries[0][0]
 
-    def holds(self, place: int) -> bool:
+    def holds(self, index: int) -> bool:
         """Whether the entry of that place is among them."""
-        return any(place == own for own, _ in self.entries)
+        return any(index == index_of_file for index_of_file, _ in self.entries)
 
 
 def of_files(files: Sequence[FileSummary]) -> list[SimilarErrors]:
@@ -37,26 +37,26 @@ def of_files(files: Sequence[FileSummary]) -> list[SimilarErrors]:
 
 def of_recordings(file: FileSummary) -> list[SimilarErrors]:
     """The refused recordings of a file."""
-    return _together([(entry["id"], entry["errors"]) for entry in file.refused])
+    return _together([(refused["id"], refused["errors"]) for refused in file.refused])
 
 
 def _reasons(file: FileSummary) -> Errors:
-    return [*file.errors, *(error for entry in file.refused for error in entry["errors"])]
+    return [*file.errors, *(error for refused in file.refused for error in refused["errors"])]
 
 
 def _together(entries: Sequence[tuple[str, Errors]]) -> list[SimilarErrors]:
     """By their first entries; fewer than three similar ones, and those without errors, are groups of one."""
     by_reason: dict[Any, list[int]] = {}
-    for place, (name, errors) in enumerate(entries):
-        reason = tuple(_what(name, error) for error in errors) or place
-        by_reason.setdefault(reason, []).append(place)
+    for index, (name, errors) in enumerate(entries):
+        reason = tuple(_what(name, error) for error in errors) or index
+        by_reason.setdefault(reason, []).append(index)
     groups = [
         part
         for places in by_reason.values()
-        for part in ([places] if len(places) >= _FEWEST else [[place] for place in places])
+        for part in ([places] if len(places) >= _FEWEST else [[index] for index in places])
     ]
     return [
-        SimilarErrors([(place, entries[place][0]) for place in places], entries[places[0]][1])
+        SimilarErrors([(index, entries[index][0]) for index in places], entries[places[0]][1])
         for places in sorted(groups)
     ]
 

@@ -14,7 +14,7 @@ _DIFFERING = (
     *("sensor", "indenter_radius_mm", "preload_n", "sample_height_mm", "sample_diameter_mm"),
     recorded_time.FIELD,
 )
-FIELDS = tuple(entry for entry in RECORDING if entry[0] in _DIFFERING)
+FIELDS = tuple(field for field in RECORDING if field[0] in _DIFFERING)
 _FIELD_WORDS = {name: words for name, words, *_ in FIELDS}
 _TEXTS = ("sensor", recorded_time.FIELD)
 

@@ -28,20 +28,22 @@ def guessed(
 
     It makes the force, and the stage's travel a depth; the constant is a property of the file in N/m, if there is one.
     """
-    lengths = [one for one in channels if (known := unit(one.unit)) and known.dimension == "length"]
-    springs = [one.name for one in lengths if any(word in one.name.lower() for word in _OF_SPRING)]
-    travel = next((one.name for one in lengths if one.name not in springs), None)
+    lengths = [
+        channel for channel in channels if (channel_unit := unit(channel.unit)) and channel_unit.dimension == "length"
+    ]
+    springs = [channel.name for channel in lengths if any(word in channel.name.lower() for word in _OF_SPRING)]
+    travel = next((channel.name for channel in lengths if channel.name not in springs), None)
     if "force_n" in fields or not springs or travel is None:
         return fields
     deflection = {"channel": springs[0]}
-    constant = next((one for one in properties if _is_stiffness(labelled_unit(one))), None)
+    constant = next((name for name in properties if _is_stiffness(labelled_unit(name))), None)
     force = {} if constant is None else {"force_n": {**deflection, SPRING: {"property": constant}}}
     return {**fields, "displacement_mm": {"channel": travel, DEFLECTION: deflection}, **force}
 
 
 def _is_stiffness(label: str) -> bool:
-    known = unit(label)
-    return known is not None and known.dimension == "force/length"
+    parsed = unit(label)
+    return parsed is not None and parsed.dimension == "force/length"
 
 
 def shown_as(document: Mapping[str, Any], name: str) -> tuple[str, Mapping[str, Any]]:
@@ -111,7 +113,7 @@ def _rounded(value: float) -> float:
 
 def curves_of(form: Mapping[str, str], base: Any) -> Any:
     """What a curve is, as the form says; as in `base` where it does not."""
-    said = form.get("curves")
-    if said is None:
+    typed = form.get("curves")
+    if typed is None:
         return base
-    return {said: form.get("curves-by", "")} if said in ("channel", "segments") else said or None
+    return {typed: form.get("curves-by", "")} if typed in ("channel", "segments") else typed or None

@@ -8,7 +8,7 @@ from underskin.recordings.frf.spectra import mean_of
 from underskin.units import readable_unit
 
 _ALIKE = 0.2  # of the stated preload: what a measured one may differ by
-_TOLD_ANYWAY = 3.0  # times the stated preload: beyond that, the findings of a campaign's d33 say so
+_REPORTED_RATIO = 3.0  # times the stated preload: beyond that, the findings of a campaign's d33 say so
 _PARTS, _STEADY = 4, 0.2  # of a recording, in which the means of a static force are alike, as a part of its mean
 
 
@@ -33,16 +33,20 @@ def in_words(force_n: float) -> str:
 def doubts(campaign: Campaign) -> list[str]:
     """In a sentence, the first recording of a campaign whose stated preload is not the one that it measured, and how
     many more there are."""
-    frfs = [one for one in campaign.recordings if isinstance(one, FrfRecording)]
-    measured = [(one, mean) for one in frfs if (mean := measured_otherwise(one)) is not None]
-    found = [(one, mean) for one, mean in measured if 1 / _TOLD_ANYWAY <= mean / one.preload_n <= _TOLD_ANYWAY]
-    if not found:
+    frfs = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
+    measured = [(recording, mean) for recording in frfs if (mean := measured_otherwise(recording)) is not None]
+    doubtful = [
+        (recording, mean)
+        for recording, mean in measured
+        if 1 / _REPORTED_RATIO <= mean / recording.preload_n <= _REPORTED_RATIO
+    ]
+    if not doubtful:
         return []
-    (first, mean), *others = found
+    (first, mean), *further = doubtful
     which = f"{first.id}: " if len(campaign.recordings) > 1 else ""
-    alike = more_alike(len(others), "recording")
-    said = (
+    alike = more_alike(len(further), "recording")
+    words = (
         f"{which}pressed by {first.preload_n:g} N as stated, but its force is {in_words(mean)} on average{alike}: "
         "is this the preload of this recording, and is its force measured from 0?"
     )
-    return [said]
+    return [words]

@@ -56,11 +56,11 @@ def use(store: Database, pending: PendingUpload, skin: Mapping[str, Any]) -> Non
 
     Raises Missing where there is none.
     """
-    row = next((found for file in pending.seen if (found := _latest(store, file)) is not None), None)
+    row = next((template for file in pending.seen if (template := _latest(store, file)) is not None), None)
     if row is None:
         raise Missing("There is no template for these files.")
-    known = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
-    document = with_skin(row.document, {"poisson_ratio": 0.5, **known})
+    skin_values = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
+    document = with_skin(row.document, {"poisson_ratio": 0.5, **skin_values})
     pending.rig, pending.draft, pending.refused = rig_description.from_dict(document), None, []
     pending.rig_label = "rig.json"  # as the page saves it
     pending.remembered = Remembered(document.get("name"), row.kept_at, row.kept_from)

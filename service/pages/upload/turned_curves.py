@@ -26,7 +26,7 @@ def turned(columns: Mapping[str, Any], fields: Sequence[str]) -> dict[str, Any]:
 def with_curves_turned(mapped: MappedFile) -> MappedFile:
     """A file with every such curve turned; what was taken for what says so, with the range of the first curve."""
     before: Sequence[dict[str, Any]] = mapped.document["recordings"]
-    recordings = [turned(one, counted_negative(one)) for one in before]
+    recordings = [turned(recording, counted_negative(recording)) for recording in before]
     taken = dict(mapped.taken)
     for field in counted_negative(before[0]) if before else ():
         channel = taken[field].rpartition(": ")[0]  # before the range that it came in
