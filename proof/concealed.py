@@ -25,7 +25,7 @@ def judge_open(work: Work, campaigns: Path, progress: Callable[[int, int], None]
         judge(case.name, report, {**(truth := truths[case.name]), "effects": one_name_each(truth["effects"])})
         for case, report in zip(cases, reports(work, cases, progress), strict=True)
     ]
-    return {"judged": [asdict(entry) for entry in judged]}
+    return {"judged": [asdict(judgement) for judgement in judged]}
 
 
 def report_sealed(work: Work, campaigns: Path, folder: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def _cases(folder: Path, work: Work) -> Sequence[FileCase]:
 def judged_of(result: Mapping[str, Any]) -> list[Judged]:
     """The judged reports of a stored result."""
     return [
-        Judged(**{**entry, "truth": tuple(entry["truth"]), "answer": tuple(entry["answer"]),
-                  "held_out": entry["held_out"] and tuple(entry["held_out"])})
-        for entry in result["judged"]
+        Judged(**{**fields, "truth": tuple(fields["truth"]), "answer": tuple(fields["answer"]),
+                  "held_out": fields["held_out"] and tuple(fields["held_out"])})
+        for fields in result["judged"]
     ]  # fmt: skip

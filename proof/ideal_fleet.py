@@ -22,17 +22,20 @@ def departures(joint: Joint) -> dict[str, float]:
     skins = [_states(document) for document in joint.documents]
     experiment = joint.documents[0].experiment
     declared = [experiment.skin.youngs_modulus_mpa, experiment.skin.thickness_mm, experiment.skin.d33_pc_per_n]
-    make = Batch(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
-    found = populations(skins, [make], SPREADS)
-    return {document.skin: 1 - own[REGULAR] for document, own in zip(joint.documents, found.departs, strict=True)}
+    batch = Batch(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
+    fitted = populations(skins, [batch], SPREADS)
+    return {
+        document.skin: 1 - class_probabilities[REGULAR]
+        for document, class_probabilities in zip(joint.documents, fitted.departs, strict=True)
+    }
 
 
 def _states(document: JointDocument) -> list[State]:
     truth = np.log([document.true_modulus_mpa, document.true_thickness_mm, document.experiment.skin.d33_pc_per_n])
     precision: Floats = np.linalg.inv(skin_covariance(document)).astype(np.float64)
-    said = Gaussian(precision, precision @ truth, float(-0.5 * truth @ precision @ truth))
+    estimate = Gaussian(precision, precision @ truth, float(-0.5 * truth @ precision @ truth))
     further = np.diag(np.square(FAR))
     return [
-        State(REGULAR, said, np.zeros(len(FAR))),
-        *(State(name, said, row) for name, row in zip(QUANTITIES, further, strict=True)),
+        State(REGULAR, estimate, np.zeros(len(FAR))),
+        *(State(name, estimate, row) for name, row in zip(QUANTITIES, further, strict=True)),
     ]

@@ -24,11 +24,11 @@ class Coordinate:
     high: float
     sign: int = 1
 
-    def value(self, place: float) -> float:
+    def value(self, position: float) -> float:
         """The parameter's value at a place from 0 to 1."""
         if self.parameter == "angle":
-            return 2 * math.pi * place
-        size = math.exp(math.log(self.low) + place * math.log(self.high / self.low))
+            return 2 * math.pi * position
+        size = math.exp(math.log(self.low) + position * math.log(self.high / self.low))
         if self.effect in INVERTED:
             return size**self.sign
         return self.sign * size
@@ -53,10 +53,10 @@ class Supposition:
         """The effects' names, sorted."""
         return tuple(sorted(self.fixed))
 
-    def effects(self, place: Floats) -> dict[str, Values]:
+    def effects(self, positions: Floats) -> dict[str, Values]:
         """The effects at a place."""
         result: dict[str, Values] = {name: dict(values) for name, values in self.fixed.items()}
-        for coordinate, at in zip(self.coordinates, place, strict=True):
+        for coordinate, at in zip(self.coordinates, positions, strict=True):
             result[coordinate.effect][coordinate.parameter] = coordinate.value(float(at))
         if "misalignment" in result:
             size, angle = (float(result["misalignment"].pop(name)) for name in ("size", "angle"))
@@ -65,24 +65,31 @@ class Supposition:
 
     def place_of(self, effects: Mapping[str, Values]) -> Floats | None:
         """The coordinates of these effects; None where this hypothesis does not contain them."""
-        place = self.place_of_shared(effects)
-        return place if set(effects) == set(self.fixed) and not np.isnan(place).any() else None
+        positions = self.place_of_shared(effects)
+        return positions if set(effects) == set(self.fixed) and not np.isnan(positions).any() else None
 
     def place_of_shared(self, effects: Mapping[str, Values]) -> Floats:
         """The coordinates of those effects that this hypothesis shares with the given ones; nan elsewhere."""
-        known = {name: dict(values) for name, values in effects.items()}
-        if "misalignment" in known:
-            x, y = (float(known["misalignment"][name]) for name in ("x_mm", "y_mm"))
-            known["misalignment"] = {"size": math.hypot(x, y), "angle": math.atan2(y, x)}
-        place = np.full(len(self.coordinates), np.nan)
+        values_of_effects = {name: dict(values) for name, values in effects.items()}
+        if "misalignment" in values_of_effects:
+            x, y = (float(values_of_effects["misalignment"][name]) for name in ("x_mm", "y_mm"))
+            values_of_effects["misalignment"] = {"size": math.hypot(x, y), "angle": math.atan2(y, x)}
+        positions = np.full(len(self.coordinates), np.nan)
         for name, values in self.fixed.items():
-            own = [index for index, entry in enumerate(self.coordinates) if entry.effect == name]
-            if name not in known or any(known[name].get(key) != value for key, value in values.items()):
+            indices = [index for index, coordinate in enumerate(self.coordinates) if coordinate.effect == name]
+            if name not in values_of_effects or any(
+                values_of_effects[name].get(key) != value for key, value in values.items()
+            ):
                 continue
-            at = np.array([self.coordinates[i].place(float(known[name][self.coordinates[i].parameter])) for i in own])
+            at = np.array(
+                [
+                    self.coordinates[i].place(float(values_of_effects[name][self.coordinates[i].parameter]))
+                    for i in indices
+                ]
+            )
             if np.all((at > -0.01) & (at < 1.01)):
-                place[own] = np.clip(at, 0.0, 1.0)
-        return place
+                positions[indices] = np.clip(at, 0.0, 1.0)
+        return positions
 
 
 def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:
@@ -90,7 +97,7 @@ def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:
     result = []
     for parts in product(*(list(_alone(name, ranges.get(name, {}))) for name in names)):
         fixed = {name: values for name, (values, _) in zip(names, parts, strict=True)}
-        result.append(Supposition(fixed, tuple(entry for _, coordinates in parts for entry in coordinates)))
+        result.append(Supposition(fixed, tuple(coordinate for _, coordinates in parts for coordinate in coordinates)))
     return result
 
 

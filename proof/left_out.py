@@ -42,17 +42,17 @@ def judge_left_out(work: Work, progress: Callable[[int, int], None]) -> dict[str
     truths = of_each(work, cases, partial(truth, work, sources("rig")), _silent)
     shown = [
         (case, effect)
-        for case, known in zip(cases, truths, strict=True)
-        for effect in one_name_each(known["effects"])
-        if known["identifiable"] and effect in CATALOGUE
+        for case, case_truth in zip(cases, truths, strict=True)
+        for effect in one_name_each(case_truth["effects"])
+        if case_truth["identifiable"] and effect in CATALOGUE
     ]
-    whole = reports(work, [case for case, _ in shown], _silent)
+    full_reports = reports(work, [case for case, _ in shown], _silent)
     without = of_each(work, shown, partial(_without, work, diagnosing()), progress)
     return {
         "drawn": len(cases),
         "judged": [
             {"name": case.name, "hidden": hidden, **compared(hidden, named, unnamed)}
-            for (case, hidden), named, unnamed in zip(shown, whole, without, strict=True)
+            for (case, hidden), named, unnamed in zip(shown, full_reports, without, strict=True)
         ],
     }
 
@@ -76,10 +76,10 @@ def compared(hidden: str, named: Mapping[str, Any], unnamed: Mapping[str, Any]) 
     """
     law = unnamed.get("unnamed")
     mechanism = CATALOGUE[hidden]
-    follows = {axis for one in mechanism.axes for axis in _AXES.get(one, (one,))}
+    follows = {axis for axis_name in mechanism.axes for axis in _AXES.get(axis_name, (axis_name,))}
     return {
         "verdict": unnamed["verdict"],
-        "named_instead": [entry["name"] for entry in unnamed["mechanisms"]],
+        "named_instead": [mechanism_named["name"] for mechanism_named in unnamed["mechanisms"]],
         "law": None if law is None else {key: law[key] for key in ("acts_on", "axis", "form")},
         "axis_right": law is not None and law["axis"] in follows,
         "entry_right": law is not None and law["acts_on"] in _ENTRIES.get(mechanism.stage, ()),

@@ -34,7 +34,8 @@ def _judge(work: Work, cases: list[DrawnCase], progress: Callable[[int, int], No
     results = reports(work, cases, progress)
     return {
         "judged": [
-            asdict(judge(case.name, report, known)) for case, report, known in zip(cases, results, truths, strict=True)
+            asdict(judge(case.name, report, case_truth))
+            for case, report, case_truth in zip(cases, results, truths, strict=True)
         ]
     }
 

@@ -49,12 +49,12 @@ def _sealed(work: Work, progress: Tell) -> dict[str, Any]:
 
 def _recordings(work: Work, progress: Tell) -> dict[str, Any]:
     entries = list(real.recorded())[: work.count]
-    place = data_folder("UNDERSKIN_RECORDINGS")
-    reported = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in entries], progress)
+    folder = data_folder("UNDERSKIN_RECORDINGS")
+    reported = reports(work, [MadeCase(recorded.name, recorded.make(folder)) for recorded in entries], progress)
     return {
         "campaigns": [
-            {"name": entry.name, "stated": entry.stated, "report": report}
-            for entry, report in zip(entries, reported, strict=True)
+            {"name": recorded.name, "stated": recorded.stated, "report": report}
+            for recorded, report in zip(entries, reported, strict=True)
         ]
     }
 

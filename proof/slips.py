@@ -69,10 +69,10 @@ def of_one(seed: int, number: int) -> dict[str, Any]:
     made, _ = from_dict(campaign(recorded))
     case = _case(made, recorded, sigma)
     committed = {}
-    for place, (slip, (make, reasons)) in enumerate(SLIPS.items()):
+    for index, (slip, (make, reasons)) in enumerate(SLIPS.items()):
         if number >= _FIRST and slip not in _SELDOM:
             continue
-        done = make(case, np.random.default_rng([number, place]))
+        done = make(case, np.random.default_rng([number, index]))
         if done is None:
             continue
         named = _named(done.campaign, sigma)
@@ -96,12 +96,12 @@ def _named(made: Campaign, sigma: SigmaTable) -> set[Reason]:
 
 def _case(made: Campaign, recorded: RecordedLines, sigma: SigmaTable) -> Case:
     """With the scatter of each recording's level: gain, position and lines."""
-    own = levels(made, frf_recordings(made), sigma)
+    own_levels = levels(made, frf_recordings(made), sigma)
     relative = recorded.line_variance / np.maximum(np.abs(recorded.exact) ** 2, 1e-300)
     scatter = np.full(len(recorded.exact), np.inf)
     lines = 1 / (1 / relative).sum(axis=1)
     noise = recorded.response.experiment.noise
-    scatter[own.number] = np.sqrt(noise.gain**2 + _of_place(recorded.response) + lines)[own.number]
+    scatter[own_levels.number] = np.sqrt(noise.gain**2 + _of_place(recorded.response) + lines)[own_levels.number]
     return Case(made, recorded, scatter)
 
 
@@ -117,10 +117,10 @@ def _of_place(response: TrueResponse) -> Floats:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    given = seeds.parser("slips", __doc__).parse_args(arguments)
+    options = seeds.parser("slips", __doc__).parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
-        judged = _judge(Work(Path(folder)), given.seed, range(given.count), lambda *_: None)
-    print(slips({"seed": given.seed, "judged": judged}))
+        judged = _judge(Work(Path(folder)), options.seed, range(options.count), lambda *_: None)
+    print(slips({"seed": options.seed, "judged": judged}))
 
 
 if __name__ == "__main__":

@@ -46,14 +46,18 @@ def of_one(seed: int, number: int) -> dict[str, Any]:
 
 def compared(report: Report, truth: Report) -> dict[str, Any]:
     """A report beside the truth of a campaign whose declared modulus is wrong."""
-    (gain,) = (entry["chi2_gain_joint"] for entry in truth["hidden"] if entry["effect"] == _ERROR)
+    (gain,) = (
+        hidden_effect["chi2_gain_joint"] for hidden_effect in truth["hidden"] if hidden_effect["effect"] == _ERROR
+    )
     sd = truth["documents"][0]["sd_ln_modulus_frf"]
     found = _found(report)
     d33, beyond = report["d33"], _beyond(truth["as_declared"])
     return {
         "what": truth["what"],
         "factor": truth["factor"],
-        "companions": [entry["effect"] for entry in truth["hidden"] if entry["effect"] != _ERROR],
+        "companions": [
+            hidden_effect["effect"] for hidden_effect in truth["hidden"] if hidden_effect["effect"] != _ERROR
+        ],
         "visible": gain is None or gain > _VISIBLE,  # None: the rig cannot calculate contacts as declared
         "determined": sd < _DETERMINED or truth["what"] != FRF,
         "sd_ln_modulus": truth["skins"][0]["sd_ln_modulus_joint"],
@@ -75,13 +79,18 @@ def _left_out(report: Report, beyond: int) -> int:
     """How many of the contacts `beyond` the tables as declared were left out: all, where the report tells of none kept;
     else those that it names."""
     findings = report["findings"]
-    named = sum(entry["code"] == _LEFT_OUT and "left out" in entry["statement"] for entry in findings)
-    return min(beyond, named) if any(entry["code"] == _KEPT for entry in findings) else beyond
+    named = sum(finding["code"] == _LEFT_OUT and "left out" in finding["statement"] for finding in findings)
+    return min(beyond, named) if any(finding["code"] == _KEPT for finding in findings) else beyond
 
 
 def _found(report: Report) -> dict[str, Any] | None:
     """The factor as a report states it."""
-    parameters = [entry for one in report["mechanisms"] if one["name"] == _ERROR for entry in one["parameters"]]
+    parameters = [
+        parameter
+        for mechanism in report["mechanisms"]
+        if mechanism["name"] == _ERROR
+        for parameter in mechanism["parameters"]
+    ]
     return dict(parameters[0]) if parameters else None
 
 
@@ -91,8 +100,8 @@ def _beyond(contacts: Mapping[str, list[float]]) -> int:
 
     domain = load_table().domain
     largest = [domain[name][1] for name in ("a_over_h", "load_parameter")]
-    each = zip(contacts["a_over_h"], contacts["load_parameter"], strict=True)
-    return sum(radius > largest[0] or load > largest[1] for radius, load in each)
+    contact_values = zip(contacts["a_over_h"], contacts["load_parameter"], strict=True)
+    return sum(radius > largest[0] or load > largest[1] for radius, load in contact_values)
 
 
 def _d33(truth: Report) -> float:

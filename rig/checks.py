@@ -19,13 +19,13 @@ def in_unit(field: str) -> str:
     return next((f" {unit}" for ending, unit in _UNITS.items() if f"_{name}".endswith(ending)), "")
 
 
-def mapping(field: str, value: Any, known: Sequence[str]) -> Mapping[str, Any]:
+def mapping(field: str, value: Any, allowed: Sequence[str]) -> Mapping[str, Any]:
     """A mapping whose names are all known."""
     if not isinstance(value, Mapping):
         raise RigError(field, value, "must be a mapping of names to values")
     for name in value:
-        if name not in known:
-            raise RigError(f"{field}.{name}", value[name], f"unknown; known: {', '.join(known)}")
+        if name not in allowed:
+            raise RigError(f"{field}.{name}", value[name], f"unknown; known: {', '.join(allowed)}")
     return value
 
 
@@ -50,7 +50,7 @@ def numbers(field: str, value: Any, low: float, high: float) -> tuple[float, ...
     entries = value if isinstance(value, list | tuple) else [value]
     if not entries:
         raise RigError(field, value, "must hold at least one number")
-    return tuple(number(f"{field}[{index}]", entry, low, high) for index, entry in enumerate(entries))
+    return tuple(number(f"{field}[{index}]", element, low, high) for index, element in enumerate(entries))
 
 
 def pair(field: str, value: Any, low: float, high: float) -> tuple[float, float]:

@@ -109,8 +109,8 @@ class _Contact:
         """Move the stage to `travel` within `seconds`."""
         elapsed = self.rate * seconds
         self.parts *= np.exp(-elapsed)[:, None]
-        kept = np.divide(-np.expm1(-elapsed), elapsed, out=np.ones_like(elapsed), where=elapsed > 0)
-        self.added = self.fraction * kept  # to the parts of every ring, for each unit of depth
+        retained = np.divide(-np.expm1(-elapsed), elapsed, out=np.ones_like(elapsed), where=elapsed > 0)
+        self.added = self.fraction * retained  # to the parts of every ring, for each unit of depth
         self.gain = float(self.added.sum())
         self.stress = self.parts.sum(axis=0)
         rings = np.diff(self.law.punch) * (self.stress[1:] + self.stress[:-1]) / 2

@@ -22,7 +22,7 @@ class SensorWeights:
 
     @classmethod
     def of(
-        cls, centres: Floats, own: NDArray[np.intp], position: Floats, gains: Floats, fraction: float
+        cls, centres: Floats, nearest: NDArray[np.intp], position: Floats, gains: Floats, fraction: float
     ) -> "SensorWeights":
         """The recording's own sensor and, with crosstalk, those within 1.2 pitch of it.
 
@@ -38,11 +38,11 @@ class SensorWeights:
         pitch = apart[apart > 0].min(initial=np.inf)
         weights = np.where((apart > 0) & (apart < _NEIGHBOUR * pitch), fraction, 0.0) * gains
         weights = weights / gains[:, None] + np.eye(len(centres))
-        used = np.flatnonzero((weights[own] != 0).any(axis=0)) if fraction else None
+        used = np.flatnonzero((weights[nearest] != 0).any(axis=0)) if fraction else None
         if used is None:
-            return cls(np.hypot(*(position - centres[own]).T)[:, None], np.ones((len(own), 1)))
+            return cls(np.hypot(*(position - centres[nearest]).T)[:, None], np.ones((len(nearest), 1)))
         distance = np.hypot(*(position[:, None] - centres[used]).transpose(2, 0, 1))
-        return cls(distance, weights[np.ix_(own, used)])
+        return cls(distance, weights[np.ix_(nearest, used)])
 
     def sigma(self, spectrum: Floats, contact: NDArray[np.intp], rt: float, thickness: float) -> Floats:
         """σ of each contributing sensor (rows, sensors); 0 where its weight is 0.

@@ -87,8 +87,8 @@ class _Fit:
         self.each = 2 + len(curves[0].columns)  # parameters of a curve: zero, gain, amounts of its columns
 
     def _of(self, point: Floats, number: int) -> tuple[float, float, Floats]:
-        own = point[1 + number * self.each : 1 + (number + 1) * self.each]
-        return float(own[0]), 1 + self.priors.gain * float(own[1]), own[2:]
+        of_curve = point[1 + number * self.each : 1 + (number + 1) * self.each]
+        return float(of_curve[0]), 1 + self.priors.gain * float(of_curve[1]), of_curve[2:]
 
     def predictions(self, point: Floats) -> list[Floats]:
         """The prediction of each curve."""

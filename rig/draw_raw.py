@@ -113,9 +113,9 @@ def _strength(
     if name == "contact_creep":
         values = {"fraction": _log(random, 0.05, 0.6), "time_s": seconds * _log(random, 0.05, 5)}
         if random.random() < 0.4:
-            left = 0.9 - values["fraction"]
+            largest = 0.9 - values["fraction"]
             later = values["time_s"] * _log(random, 5, 50)
-            values |= {"fraction_2": left * float(random.uniform(0.2, 0.8)), "time_2_s": later}
+            values |= {"fraction_2": largest * float(random.uniform(0.2, 0.8)), "time_2_s": later}
         return values
     if name == "strain_stiffening":
         law = str(random.choice(["linear", "limited"]))

@@ -216,16 +216,16 @@ def checked(kind: str, document: Any) -> dict[str, Values]:
         effect, field = KNOWN[name], f"effects.{name}"
         if kind not in effect.kinds:
             raise RigError(field, kind, f"acts on recordings of kind {', '.join(effect.kinds)}")
-        known = (*effect.parameters, *(("law",) if effect.laws else ()))
-        entry = checks.mapping(field, {} if parameters is None else parameters, known)
+        allowed = (*effect.parameters, *(("law",) if effect.laws else ()))
+        stated = checks.mapping(field, {} if parameters is None else parameters, allowed)
         values: Values = {}
         if effect.laws:
-            values["law"] = checks.one_of(f"{field}.law", entry.get("law", effect.laws[0]), effect.laws)
+            values["law"] = checks.one_of(f"{field}.law", stated.get("law", effect.laws[0]), effect.laws)
         for parameter, (low, high) in effect.parameters.items():
-            if parameter in entry:
-                values[parameter] = checks.number(f"{field}.{parameter}", entry[parameter], low, high)
+            if parameter in stated:
+                values[parameter] = checks.number(f"{field}.{parameter}", stated[parameter], low, high)
                 if kind == FRF and parameter in effect.only_curves:
-                    raise RigError(f"{field}.{parameter}", entry[parameter], "only for indentation and compression")
+                    raise RigError(f"{field}.{parameter}", stated[parameter], "only for indentation and compression")
             elif parameter not in effect.optional:
                 raise RigError(
                     f"{field}.{parameter}", None, f"required, {low:g} to {high:g}{checks.in_unit(parameter)}"

@@ -51,10 +51,10 @@ def _check_on_skin(field: str, offset: Sequence[float], skin: DeclaredSkin, sens
         centres = [centre[axis] for _, *centre in skin.sensors]
         middle = (min(centres) + max(centres)) / 2
         for sensor, *centre in skin.sensors:
-            place = centre[axis] + offset[axis]
-            if (not sensors or sensor in sensors) and abs(place - middle) > extent / 2:
+            at = centre[axis] + offset[axis]
+            if (not sensors or sensor in sensors) and abs(at - middle) > extent / 2:
                 allowed = (
-                    f"puts the sphere of {sensor} at {'xy'[axis]} = {place:g} mm: must be {middle - extent / 2:g} to "
+                    f"puts the sphere of {sensor} at {'xy'[axis]} = {at:g} mm: must be {middle - extent / 2:g} to "
                     f"{middle + extent / 2:g} mm, on the skin (skin.{name})"
                 )
                 raise RigError(field, list(offset), allowed)

@@ -101,8 +101,8 @@ class _Problem:
             here = _reached(part, values)
             block = np.zeros((len(here), len(self.names)))
             for name in part.parameters:
-                beside = _reached(part, values | {name: values[name] + step})
-                block[:, self.names.index(name)] = (beside - here) / step
+                stepped = _reached(part, values | {name: values[name] + step})
+                block[:, self.names.index(name)] = (stepped - here) / step
             blocks.append(block)
         return np.concatenate([*blocks, np.diag(1 / self.sd)])
 

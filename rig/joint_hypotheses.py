@@ -69,7 +69,7 @@ def hypothesis(
         if curves and document.curves is not None:
             truth = document.curves.experiment
             model = replace(truth, effects=_left(truth.effects, lacking))
-            parts += [CurvePart(one, truth, model, document.skin, free=free) for one in document.curves.recorded]
+            parts += [CurvePart(curve, truth, model, document.skin, free=free) for curve in document.curves.recorded]
             assert truth.curves is not None
             priors[f"{document.skin}/cell"] = Prior(0.0, max(truth.curves.cell_gain, 1e-6))
         priors |= _priors(document, lacking, declared=declared, free=free)

@@ -74,7 +74,7 @@ def _d33(document: JointDocument) -> dict[str, float]:
 
 def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
     everything = tuple(range(len(joint.documents)))
-    alone = _gain(joint, hidden, hidden.documents[-1:], curves=False)
+    gain_of_frfs = _gain(joint, hidden, hidden.documents[-1:], curves=False)
     together = _gain(joint, hidden, everything, curves=True)
     modulus_free = together
     if hidden.effect != "modulus_error":
@@ -86,7 +86,7 @@ def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
         "sensors": list(hidden.sensors) or None,
         "since": hidden.since,
         "departs": joint.documents[hidden.documents[0]].skin if hidden.departs else None,
-        "chi2_gain_alone": _rounded(alone),
+        "chi2_gain_alone": _rounded(gain_of_frfs),
         "chi2_gain_joint": _rounded(together),
         "chi2_gain_modulus_free": _rounded(modulus_free),
         "identifiable": together > SHOWS,

@@ -149,8 +149,8 @@ class LayerContacts:
         if not self._work:
             return hertz
         plane = self.effective_modulus / (1 - self.layer.poisson_ratio**2)
-        whole = 4 * plane * (alpha * h) ** 3 / (3 * self.radius) / self.force
-        return whole[:, None] * hertz + (1 - whole)[:, None] * np.sinc(np.multiply.outer(alpha, k) / np.pi)
+        total = 4 * plane * (alpha * h) ** 3 / (3 * self.radius) / self.force
+        return total[:, None] * hertz + (1 - total)[:, None] * np.sinc(np.multiply.outer(alpha, k) / np.pi)
 
 
 def stiffening(values: Values, strain: Floats) -> Floats:

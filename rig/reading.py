@@ -14,7 +14,7 @@ class _PlainLoader(yaml.SafeLoader):
 
 _FLOAT = "tag:yaml.org,2002:float"
 _PlainLoader.yaml_implicit_resolvers = {
-    first: [entry for entry in resolvers if entry[0] not in ("tag:yaml.org,2002:timestamp", _FLOAT)]
+    first: [resolver for resolver in resolvers if resolver[0] not in ("tag:yaml.org,2002:timestamp", _FLOAT)]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
 _PlainLoader.add_implicit_resolver(

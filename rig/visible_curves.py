@@ -48,18 +48,20 @@ class Visibility:
         return self.chi2_gain > THRESHOLD
 
 
-def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tuple[str, ...] = ()) -> Visibility:
-    """Visibility of the effects against a model that has only the effects `known`, at their true strength."""
+def visibility(
+    experiment: Experiment, recorded: list[RecordedCurve], effects_in_model: tuple[str, ...] = ()
+) -> Visibility:
+    """Visibility of the effects against a model with only those of `effects_in_model`, at their true strength."""
     design = experiment.curves
     assert design is not None
-    depth, on = design.largest_displacement_mm, {name: experiment.effects[name] for name in known}
+    depth, on = design.largest_displacement_mm, {name: experiment.effects[name] for name in effects_in_model}
     exact, base = [curve.exact_force_n for curve in recorded], _Base(experiment, recorded, on)
     curves = [_Base(experiment, recorded, {}).measured(number) for number in range(len(recorded))]
     priors = base.priors()
     fits: Iterator[tuple[float, list[Floats]]] = (
         least_chi2(base.law(), curves, priors, shift * depth, _STEP * depth) for shift in _SHIFTS
     )
-    if known:
+    if effects_in_model:
         fits = iter([next((fit for fit in fits if np.isfinite(fit[0])), _OUT_OF_REACH)])
     chi2, fitted = min(fits, key=lambda result: result[0])
     if not np.isfinite(chi2):
@@ -71,8 +73,8 @@ def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tup
         0.0,
         _STEP * depth,
     )
-    left = sum(float(np.sum((mine - other) ** 2)) for mine, other in zip(fitted, exact, strict=True))
-    return Visibility(chi2 - true, 100 * float(np.sqrt(left / sum(float(np.sum(force**2)) for force in exact))))
+    misfit = sum(float(np.sum((mine - other) ** 2)) for mine, other in zip(fitted, exact, strict=True))
+    return Visibility(chi2 - true, 100 * float(np.sqrt(misfit / sum(float(np.sum(force**2)) for force in exact))))
 
 
 def force_deviation(design: CurveDesign, slope: Floats, largest_n: float) -> Floats:
@@ -130,9 +132,9 @@ class _Base:
         return true_modulus(self.experiment) * float(np.exp(log_modulus))
 
     def _neo_hookean(self, number: int, log_modulus: float, shift: float) -> Floats:
-        entry = self.recorded[number].entry
-        area = np.pi / 4 * entry["sample_diameter_mm"] ** 2
-        stretch = np.maximum(1 - self._displacement(number, shift) / entry["sample_height_mm"], _LEAST_STRETCH)
+        header = self.recorded[number].entry
+        area = np.pi / 4 * header["sample_diameter_mm"] ** 2
+        stretch = np.maximum(1 - self._displacement(number, shift) / header["sample_height_mm"], _LEAST_STRETCH)
         return self._modulus(log_modulus) * area * (stretch**-2 - stretch) / 3
 
     def _hertz(self, number: int, log_modulus: float, shift: float) -> Floats:

@@ -72,7 +72,9 @@ def _drawn(random: np.random.Generator, name: str, skin: str) -> Joint:
         _press_harder(random, description)
     ranges = of_frf(description)
     factor = evenly_in_log(random, *_FACTORS) ** float(random.choice([-1, 1]))
-    effects = {one: drawn_parameters(random, one, ranges) for one in sorted(names)} | {_ERROR: {"factor": factor}}
+    effects = {effect: drawn_parameters(random, effect, ranges) for effect in sorted(names)} | {
+        _ERROR: {"factor": factor}
+    }
     declared = float(f"{description['skin']['youngs_modulus_mpa'] / factor:.3g}")
     true = description["skin"] | {"youngs_modulus_mpa": declared * factor}
     description["skin"]["youngs_modulus_mpa"] = declared
@@ -85,7 +87,7 @@ def _drawn(random: np.random.Generator, name: str, skin: str) -> Joint:
         together |= pressed.effects  # those of curves may have more parameters
     gains = tuple(float(gain) for gain in lines.response.sensor_gains)
     hidden = [
-        Hidden(one, values, gains=gains if one == "sensor_spread" else ()) for one, values in together.items()
+        Hidden(effect, values, gains=gains if effect == "sensor_spread" else ()) for effect, values in together.items()
     ]  # fmt: skip
     return Joint(name, kind, (JointDocument(lines, curves),), tuple(hidden))
 

@@ -89,8 +89,8 @@ class DrawnFrf(Item):
 
     def truth(self) -> Truth:
         """By the rig's own fit."""
-        known = truth_of_lines(record(self._case.description))
-        return {**_that_shows(known, THRESHOLD), "d33": known["d33_pc_per_n"]}
+        entry_of_truth = truth_of_lines(record(self._case.description))
+        return {**_that_shows(entry_of_truth, THRESHOLD), "d33": entry_of_truth["d33_pc_per_n"]}
 
 
 @dataclass(frozen=True)
@@ -109,8 +109,8 @@ class DrawnRawCurves(Item):
 
     def truth(self) -> Truth:
         """By the rig's own fit."""
-        known = truth_of_curves(*drawn_curves(CURVE_SEED, self.number, INDENTATION, self._case.what))
-        return {**_that_shows(known, CURVE_THRESHOLD), "youngs_modulus": known["youngs_modulus_mpa"]}
+        entry_of_truth = truth_of_curves(*drawn_curves(CURVE_SEED, self.number, INDENTATION, self._case.what))
+        return {**_that_shows(entry_of_truth, CURVE_THRESHOLD), "youngs_modulus": entry_of_truth["youngs_modulus_mpa"]}
 
 
 @dataclass(frozen=True)
@@ -199,10 +199,10 @@ class Concealed(Item):
 
     def truth(self) -> Truth:
         """Effects, and whether they show."""
-        known = self.known
+        entry_of_truth = self.known
         value = {"d33": "d33_pc_per_n", "youngs_modulus": "youngs_modulus_mpa"}
-        values = {name: known[field] for name, field in value.items() if field in known}
-        return {**_that_shows(known, CURVE_THRESHOLD if "youngs_modulus" in values else THRESHOLD), **values}
+        values = {name: entry_of_truth[field] for name, field in value.items() if field in entry_of_truth}
+        return {**_that_shows(entry_of_truth, CURVE_THRESHOLD if "youngs_modulus" in values else THRESHOLD), **values}
 
 
 @dataclass(frozen=True)
@@ -211,9 +211,13 @@ class UnlistedLaw(Concealed):
 
     def truth(self) -> Truth:
         """The law, and whether it shows."""
-        known = self.known
-        law = f"{known['law']['acts_on']} over {known['law']['axis']}"
-        return {"effects": [law], "shows": [law] if known["identifiable"] else [], "d33": known["d33_pc_per_n"]}
+        entry_of_truth = self.known
+        law = f"{entry_of_truth['law']['acts_on']} over {entry_of_truth['law']['axis']}"
+        return {
+            "effects": [law],
+            "shows": [law] if entry_of_truth["identifiable"] else [],
+            "d33": entry_of_truth["d33_pc_per_n"],
+        }
 
     def grade(self, report: Report, truth: Truth, /) -> str:
         """Right where it is recognised as unlisted and placed; open where it is recognised or left open."""
@@ -231,16 +235,16 @@ class Solved(Concealed):
 
     def truth(self) -> Truth:
         """The effect, and the true d33 or E."""
-        known = self.known
-        quantity = "youngs_modulus" if "case" in known else "d33"
-        value = known["youngs_modulus_mpa" if "case" in known else "d33_pc_per_n"]
-        return {"effects": [known["effect"]], "shows": [], quantity: value}
+        entry_of_truth = self.known
+        quantity = "youngs_modulus" if "case" in entry_of_truth else "d33"
+        value = entry_of_truth["youngs_modulus_mpa" if "case" in entry_of_truth else "d33_pc_per_n"]
+        return {"effects": [entry_of_truth["effect"]], "shows": [], quantity: value}
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """By the scorer's classes."""
         scorer = _module(data_folder(_CAMPAIGNS) / "solved-open" / "score.py")
-        known = self.known
-        judged = (scorer.grade_curve if "case" in known else scorer.grade)(known, report)
+        entry_of_truth = self.known
+        judged = (scorer.grade_curve if "case" in entry_of_truth else scorer.grade)(entry_of_truth, report)
         return _SOLVED_GRADES[judged["cls"]]
 
 
@@ -257,9 +261,12 @@ class Real(Item):
 
     def documents(self) -> list[dict[str, Any]]:
         """Its files as text: what they are read as belongs to the answer."""
-        known = self.known
-        folder = data_folder(_RECORDINGS) / "real" / "open" / known["folder"]
-        paths = [folder / name for name in (*known["files"], *([known["rig"]] if known["rig"] else []))]
+        entry_of_truth = self.known
+        folder = data_folder(_RECORDINGS) / "real" / "open" / entry_of_truth["folder"]
+        paths = [
+            folder / name
+            for name in (*entry_of_truth["files"], *([entry_of_truth["rig"]] if entry_of_truth["rig"] else []))
+        ]
         return [{"name": path.name, "content": path.read_bytes().hex()} for path in paths]
 
     def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
@@ -269,10 +276,10 @@ class Real(Item):
         from underskin.recordings.rig_description import parse
 
         contents = {one["name"]: bytes.fromhex(one["content"]) for one in documents}
-        known = self.known
+        entry_of_truth = self.known
         try:
-            rig = parse(contents[known["rig"]], known["rig"]) if known["rig"] else None
-            readings = [read_file(contents[name], name, rig) for name in known["files"]]
+            rig = parse(contents[entry_of_truth["rig"]], entry_of_truth["rig"]) if entry_of_truth["rig"] else None
+            readings = [read_file(contents[name], name, rig) for name in entry_of_truth["files"]]
             report = diagnose(readings[0]) if len(readings) == 1 else diagnose_together(readings, self.name)
         except UnderskinError as error:
             return {"verdict": "refused", "probability": 0.0, "statement": str(error), "mechanisms": []}
@@ -312,17 +319,17 @@ NEEDS = {name: _CAMPAIGNS for name in PARTS if name.endswith("-open") or name.st
 }
 
 
-def _that_shows(known: Mapping[str, Any], threshold: float) -> Truth:
+def _that_shows(entry_of_truth: Mapping[str, Any], threshold: float) -> Truth:
     """The effects, and those that show: all together gain in χ² over the base model, and each over the others.
 
     As a whole, where the gain of each is unknown; two effects that cancel each other do not show.
     """
-    effects = list(known["effects"])
-    if not effects or not known["identifiable"]:
+    effects = list(entry_of_truth["effects"])
+    if not effects or not entry_of_truth["identifiable"]:
         return {"effects": sorted(effects), "shows": []}
-    gains = list(known.get("chi2_gain_of_each") or [])
-    if isinstance(known.get("chi2_gain_of_each"), Mapping):
-        gains = list(known["chi2_gain_of_each"].values())
+    gains = list(entry_of_truth.get("chi2_gain_of_each") or [])
+    if isinstance(entry_of_truth.get("chi2_gain_of_each"), Mapping):
+        gains = list(entry_of_truth["chi2_gain_of_each"].values())
     if len(effects) == 1 or len(gains) != len(effects):
         return {"effects": sorted(effects), "shows": sorted(effects)}
     seen = [effect for effect, gain in zip(effects, gains, strict=True) if gain is None or gain > threshold]

@@ -69,16 +69,16 @@ def solve(skin: Skin, radius: float, lowest: float, highest: float, fineness: fl
     pressed = PressedLayer(skin.sublayers, radius, float(widest), fineness, skin.lateral)
     end = float(pressed.r.max())
     r = np.linspace(0, end, int(end * 500) + 1)
-    depth, force, kept = 0.5 * np.cbrt(0.5625 * _MARGIN * lowest * radius) ** 2 / radius, 0.0, []
-    growth = (highest / lowest) ** (0.6 / _STEPS)  # of the depth, as F ~ δ^(3/2) or steeper
+    depth, force, steps = 0.5 * np.cbrt(0.5625 * _MARGIN * lowest * radius) ** 2 / radius, 0.0, []
+    ratio = (highest / lowest) ** (0.6 / _STEPS)  # of the depth, as F ~ δ^(3/2) or steeper
     while force < highest / _MARGIN:
         force = pressed.press(float(depth))
         if force > _MARGIN * lowest:
-            kept.append((force, pressed.contact_radius(), pressed.base_pressure(r)))
-            depth *= growth
+            steps.append((force, pressed.contact_radius(), pressed.base_pressure(r)))
+            depth *= ratio
         else:
-            depth *= max(growth, min(1.5, (_MARGIN * lowest / force) ** 0.5 + 0.02))
-    forces, contacts, pressures = zip(*kept, strict=True)
+            depth *= max(ratio, min(1.5, (_MARGIN * lowest / force) ** 0.5 + 0.02))
+    forces, contacts, pressures = zip(*steps, strict=True)
     return Course(np.array(forces), np.array(contacts), r, np.array(pressures))
 
 

@@ -61,10 +61,10 @@ class NotConverged(Exception):
     """Newton's method did not converge at an indentation, even in smaller steps."""
 
 
-def graded(first: float, growth: float, length: float) -> Floats:
+def graded(first: float, ratio: float, length: float) -> Floats:
     """Sizes of elements that grow from about `first` and fill a length."""
-    count = max(2, int(np.ceil(np.log1p((growth - 1) * length / first) / np.log(growth))))
-    sizes = growth ** np.arange(count)
+    count = max(2, int(np.ceil(np.log1p((ratio - 1) * length / first) / np.log(ratio))))
+    sizes = ratio ** np.arange(count)
     return np.asarray(length * sizes / sizes.sum())
 
 
@@ -72,13 +72,13 @@ def _shape(x: float) -> tuple[Floats, Floats]:
     return np.array([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2]), np.array([x - 0.5, -2 * x, x + 0.5])
 
 
-def _edges(sublayers: tuple[Sublayer, ...], size: float, growth: float) -> tuple[Floats, list[Material]]:
+def _edges(sublayers: tuple[Sublayer, ...], size: float, ratio: float) -> tuple[Floats, list[Material]]:
     """Heights of the elements' edges, from the base up, and the material of each row of elements."""
     top = sum(part.thickness for part in sublayers)
     edges, rows, low = [0.0], [], 0.0
     for part in sublayers:
-        fine = size + (growth - 1) * (top - low - part.thickness)  # an element's size there
-        steps = graded(min(fine, part.thickness / 2), growth, part.thickness)[::-1]
+        fine = size + (ratio - 1) * (top - low - part.thickness)  # an element's size there
+        steps = graded(min(fine, part.thickness / 2), ratio, part.thickness)[::-1]
         edges += list(low + np.cumsum(steps))
         rows += [part.material] * len(steps)
         low += part.thickness
@@ -100,11 +100,11 @@ class PressedLayer:
         self.radius = radius
         self.top = float(sum(part.thickness for part in sublayers))
         size = min(widest / 20, _COARSEST) / fineness
-        growth = 1 + 0.35 / fineness
+        ratio = 1 + 0.35 / fineness
         fine = np.linspace(0, 1.1 * widest, int(np.ceil(1.1 * widest / size)) + 1)
         end = widest + _REACH if lateral is None else lateral
-        edges_r = np.concatenate([fine, fine[-1] + np.cumsum(graded(size, growth, end - fine[-1]))])
-        edges_z, rows = _edges(sublayers, min(1.5 * size, 0.12 / fineness), growth)
+        edges_r = np.concatenate([fine, fine[-1] + np.cumsum(graded(size, ratio, end - fine[-1]))])
+        edges_z, rows = _edges(sublayers, min(1.5 * size, 0.12 / fineness), ratio)
         self._build(edges_r, edges_z, rows)
         self.hardest = max(part.material.modulus for part in sublayers)
         self.penalty = _PENALTY * self.hardest
@@ -312,5 +312,5 @@ class PressedLayer:
         cell = np.clip(np.searchsorted(r[::2], at, side="right") - 1, 0, (nodes - 3) // 2)
         x = 2 * (at - r[2 * cell]) / (r[2 * cell + 2] - r[2 * cell]) - 1
         n = np.stack([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2])
-        found = np.sum(n * values[2 * cell + np.arange(3)[:, None]], axis=0)
-        return np.where(at <= r[-1], found, 0.0)
+        pressure = np.sum(n * values[2 * cell + np.arange(3)[:, None]], axis=0)
+        return np.where(at <= r[-1], pressure, 0.0)

@@ -131,7 +131,7 @@ def candidates(name: str, column: Column) -> list[Shape]:
     x = filled(column)
     levels = np.unique(x)
     low, span = float(levels[0]), float(np.ptp(levels))
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for form in possible(name, column):
         if form == "saturating":
             least = max(float(levels[1] - low), 0.02 * span)
@@ -150,8 +150,8 @@ def candidates(name: str, column: Column) -> list[Shape]:
             grid = [(t, w) for t in np.linspace(0.0, 1.0, 13) for w in (0.06, 0.12, 0.25)]
         else:
             grid = [()]
-        found += [shape(form, column, p) for p in grid]
-    return found
+        shapes += [shape(form, column, p) for p in grid]
+    return shapes
 
 
 def periods(name: str, column: Column) -> list[float]:

@@ -56,6 +56,6 @@ def least_chi2(residual: Callable[[Array], Array], starts: list[Array], low: Arr
     costs = [float((residual(p) ** 2).sum()) for p in points]
     best = min(costs)
     for i in np.argsort(costs)[: LEADING if low.size else 0]:
-        found = least_squares(residual, points[i], bounds=(low, high), x_scale="jac", max_nfev=EVALUATIONS)
-        best = min(best, 2.0 * float(found.cost))
+        solution = least_squares(residual, points[i], bounds=(low, high), x_scale="jac", max_nfev=EVALUATIONS)
+        best = min(best, 2.0 * float(solution.cost))
     return best
