@@ -23,27 +23,27 @@ _KINDS = {".py", ".c", ".html", ".js", ".css", ".h5"}
 
 def measure() -> list[Figure]:
     """What the soak of the code as it is has measured so far."""
-    kept = folder_of_the_code() / _FIGURES
-    if not kept.exists():
+    results_file = folder_of_the_code() / _FIGURES
+    if not results_file.exists():
         return []
     by_test: dict[tuple[str, str], Figure] = {}  # of a test that was run again the last
-    for entry in map(json.loads, kept.read_text().splitlines()):
-        figure = Figure(**entry["figure"])
-        by_test[entry["test"], figure.name] = figure
-    found: dict[str, Figure] = {}
+    for line in map(json.loads, results_file.read_text().splitlines()):
+        figure = Figure(**line["figure"])
+        by_test[line["test"], figure.name] = figure
+    figures: dict[str, Figure] = {}
     for figure in by_test.values():
-        other = found.get(figure.name, figure)
-        if other is not figure:
-            both = other.value, figure.value
+        earlier = figures.get(figure.name, figure)
+        if earlier is not figure:
+            both = earlier.value, figure.value
             figure = replace(figure, value=sum(both) if figure.better == "higher" else max(both))
-        found[figure.name] = figure
-    return sorted(found.values(), key=lambda figure: figure.name)
+        figures[figure.name] = figure
+    return sorted(figures.values(), key=lambda figure: figure.name)
 
 
 def passed(test: str) -> bool:
     """Whether a test, by its id, has passed on the code as it is."""
-    kept = folder_of_the_code() / "passed"
-    return kept.exists() and test in kept.read_text().splitlines()
+    passed_file = folder_of_the_code() / "passed"
+    return passed_file.exists() and test in passed_file.read_text().splitlines()
 
 
 def keep_passed(test: str) -> None:
@@ -64,8 +64,8 @@ def record(figure: Figure) -> None:
 def _append(file: str, line: str) -> None:
     folder = folder_of_the_code()
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / file).open("a") as kept:
-        kept.write(f"{line}\n")
+    with (folder / file).open("a") as stream:
+        stream.write(f"{line}\n")
 
 
 @functools.cache

@@ -12,7 +12,7 @@ from typing import Any
 
 from proof.cases import FileCase
 from proof.judge import Judged, judge
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.stored import Work, reports
 from underskin.cli.diagnose import write_report
 
@@ -22,7 +22,7 @@ def judge_open(work: Work, campaigns: Path, progress: Callable[[int, int], None]
     truths = json.loads((campaigns / "open-truth.json").read_text(encoding="utf-8"))
     cases = _cases(campaigns / "open", work)
     judged = [
-        judge(case.name, report, {**(truth := truths[case.name]), "effects": one_name_each(truth["effects"])})
+        judge(case.name, report, {**(truth := truths[case.name]), "effects": distinct_names(truth["effects"])})
         for case, report in zip(cases, reports(work, cases, progress), strict=True)
     ]
     return {"judged": [asdict(judgement) for judgement in judged]}

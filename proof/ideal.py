@@ -23,7 +23,7 @@ from scipy.stats import qmc
 from proof.cases import DrawnCase
 from proof.ideal_laws import Supposition, suppositions
 from proof.judge import UNKNOWN as UNKNOWN_ANSWER
-from proof.names import one_name_each
+from proof.names import distinct_names
 from rig.draw import CATALOGUED, SHARES, UNKNOWN, drawn, record
 from rig.effects import Values, of
 from rig.errors import RigError
@@ -150,7 +150,7 @@ def diagnosed(case: DrawnCase) -> dict[str, Any]:
     starts += [
         (supposition, coordinates)
         for supposition, *_ in coarse
-        if (coordinates := supposition.place_of(truth)) is not None
+        if (coordinates := supposition.positions_of(truth)) is not None
     ]
     tried = [_integrated(supposition, likelihood, coordinates) for supposition, coordinates in starts]
     evidence: dict[tuple[str, ...], float] = {}
@@ -173,13 +173,13 @@ def _starts_at(supposed: Supposition, truth: Mapping[str, Values]) -> bool:
     """Whether a pair has the law and the sign of the true effect that it shares; a single may have any."""
     if len(supposed.names) < 2:
         return True
-    shared_known = np.isfinite(supposed.place_of_shared(truth))
+    shared_known = np.isfinite(supposed.positions_of_shared(truth))
     shared = [coordinate.effect in truth for coordinate in supposed.coordinates]
     return bool(shared_known[shared].all())
 
 
 def _answer(names: tuple[str, ...]) -> tuple[str, ...]:
-    return (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else one_name_each(names)
+    return (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else distinct_names(names)
 
 
 def _over_rivals(tried: list[Tried], truth: tuple[str, ...]) -> float:
@@ -206,7 +206,7 @@ def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:
 
 def _best_of(supposed: Supposition, likelihood: Likelihood, truth: Mapping[str, Values]) -> tuple[Floats, float]:
     """The best of evenly spread places (Halton), effects that are true held at their true values, and ln p there."""
-    shared_known = supposed.place_of_shared(truth)
+    shared_known = supposed.positions_of_shared(truth)
     free = np.isnan(shared_known)
     if not free.any():
         return shared_known, likelihood(supposed.effects(shared_known))

@@ -33,7 +33,7 @@ class Coordinate:
             return size**self.sign
         return self.sign * size
 
-    def place(self, value: float) -> float:
+    def position_of(self, value: float) -> float:
         """The place of a value, outside 0 to 1 or nan where this coordinate does not reach it."""
         if self.parameter == "angle":
             return value / (2 * math.pi) % 1
@@ -63,12 +63,12 @@ class Supposition:
             result["misalignment"] = {"x_mm": size * math.cos(angle), "y_mm": size * math.sin(angle)}
         return result
 
-    def place_of(self, effects: Mapping[str, Values]) -> Floats | None:
+    def positions_of(self, effects: Mapping[str, Values]) -> Floats | None:
         """The coordinates of these effects; None where this hypothesis does not contain them."""
-        positions = self.place_of_shared(effects)
+        positions = self.positions_of_shared(effects)
         return positions if set(effects) == set(self.fixed) and not np.isnan(positions).any() else None
 
-    def place_of_shared(self, effects: Mapping[str, Values]) -> Floats:
+    def positions_of_shared(self, effects: Mapping[str, Values]) -> Floats:
         """The coordinates of those effects that this hypothesis shares with the given ones; nan elsewhere."""
         values_of_effects = {name: dict(values) for name, values in effects.items()}
         if "misalignment" in values_of_effects:
@@ -83,7 +83,7 @@ class Supposition:
                 continue
             at = np.array(
                 [
-                    self.coordinates[i].place(float(values_of_effects[name][self.coordinates[i].parameter]))
+                    self.coordinates[i].position_of(float(values_of_effects[name][self.coordinates[i].parameter]))
                     for i in indices
                 ]
             )
@@ -95,13 +95,13 @@ class Supposition:
 def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:
     """All laws and signs of a set of effects."""
     result = []
-    for parts in product(*(list(_alone(name, ranges.get(name, {}))) for name in names)):
+    for parts in product(*(list(_of_effect(name, ranges.get(name, {}))) for name in names)):
         fixed = {name: values for name, (values, _) in zip(names, parts, strict=True)}
         result.append(Supposition(fixed, tuple(coordinate for _, coordinates in parts for coordinate in coordinates)))
     return result
 
 
-def _alone(name: str, ranges: Mapping[str, tuple[float, float]]) -> Iterator[tuple[Values, tuple[Coordinate, ...]]]:
+def _of_effect(name: str, ranges: Mapping[str, tuple[float, float]]) -> Iterator[tuple[Values, tuple[Coordinate, ...]]]:
     effect = KNOWN[name]
     for law in effect.laws or (None,):
         values: Values = {} if law is None else {"law": law}

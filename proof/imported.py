@@ -3,7 +3,7 @@
 import ast
 from collections.abc import Collection, Mapping
 
-_BEGUN = ("underskin.diagnosis.diagnose", "underskin.recordings.campaign", "underskin.surrogate.sigma_table")
+_ROOTS = ("underskin.diagnosis.diagnose", "underskin.recordings.campaign", "underskin.surrogate.sigma_table")
 _BY_NAME = "underskin.mechanisms."  # laws are found by the folder that they are in
 # Of the package's own list of names, or where a file is read
 _UNUSED = ("underskin.cli.", "underskin.client.", "underskin.figures.", "underskin.recordings.readers.")
@@ -12,7 +12,7 @@ _UNUSED = ("underskin.cli.", "underskin.client.", "underskin.figures.", "undersk
 def of_a_diagnosis(texts: Mapping[str, str]) -> dict[str, str]:
     """Those of the texts of modules by their dotted names, packages as `package.__init__`."""
     file_of_module = {name.removesuffix(".__init__"): name for name in texts}
-    to_read = [name for name in file_of_module if name in _BEGUN or name.startswith(_BY_NAME)]
+    to_read = [name for name in file_of_module if name in _ROOTS or name.startswith(_BY_NAME)]
     modules: set[str] = set()
     while to_read:
         name = to_read.pop()

@@ -33,10 +33,10 @@ def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, A
 def _judged(work: Work, version: str, case: tuple[int, str]) -> dict[str, Any]:
     number, what = case
     key = digest_of(["joint", SEED, number, what, version])
-    return stored(work.folder / "joint", key, partial(_one, number, what))
+    return stored(work.folder / "joint", key, partial(_judged_answer, number, what))
 
 
-def _one(number: int, what: str) -> dict[str, Any]:
+def _judged_answer(number: int, what: str) -> dict[str, Any]:
     documents, truth = drawn_joint(SEED, number, what)
     hidden = [effect for effect in truth["hidden"] if effect["identifiable"]]
     head = {"name": truth["name"], "what": what, "hidden": [effect["effect"] for effect in truth["hidden"]]}
@@ -136,7 +136,9 @@ def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[
     fleet = diagnosed_by(_fleet, documents)
     hidden_in = {hidden_effect["departs"] for hidden_effect in truth["hidden"] if hidden_effect["departs"]}
     populations = fleet.get("population") or ()
-    values = next((population["skins"] for population in populations if population["parameter"] == "d33"), [])
+    values: list[Report] = next(
+        (population["skins"] for population in populations if population["parameter"] == "d33"), []
+    )
     d33 = {value["skin"]: value for value in values}
     true_d33 = {document["skin"]: next(iter(document["d33_pc_per_n"].values())) for document in truth["documents"]}
     return {

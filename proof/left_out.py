@@ -11,7 +11,7 @@ from typing import Any
 
 from proof.cases import DrawnCase
 from proof.judge import unnamed_over_noise
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.own_rig import truth
 from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, reports, sources, stored
 from underskin.mechanisms.base import Stage
@@ -43,7 +43,7 @@ def judge_left_out(work: Work, progress: Callable[[int, int], None]) -> dict[str
     shown = [
         (case, effect)
         for case, case_truth in zip(cases, truths, strict=True)
-        for effect in one_name_each(case_truth["effects"])
+        for effect in distinct_names(case_truth["effects"])
         if case_truth["identifiable"] and effect in CATALOGUE
     ]
     full_reports = reports(work, [case for case, _ in shown], _silent)

@@ -16,18 +16,18 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-Tell = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 
 
 @contextmanager
-def progress_bars() -> Iterator[Callable[[str], Tell]]:
+def progress_bars() -> Iterator[Callable[[str], OnProgress]]:
     """Makes a bar of a name; the bar is told how many are done, of how many."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True)) as bars:
-        yield lambda name: partial(_tell, bars, bars.add_task(name, total=None))
+        yield lambda name: partial(_update, bars, bars.add_task(name, total=None))
 
 
-def _tell(bars: Progress, task: TaskID, done: int, total: int) -> None:
+def _update(bars: Progress, task: TaskID, done: int, total: int) -> None:
     bars.update(task, completed=done, total=total)
     if not bars.console.is_terminal:
         typer.echo(f"{bars.tasks[task].description}: {done} of {total}", err=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 from proof import seeds
 from proof.cases import DrawnCase
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.stored import Work, diagnosing, digest_of, of_each, sources, stored
 from proof.text_wide import is_miss
 from proof.true_starts import with_true_values
@@ -53,7 +53,7 @@ def compared(case: DrawnCase) -> Result:
     is not; None where nothing can be concluded from the campaign, or it does not support what is hidden."""
     description = case.description
     effects = description["effects"]
-    hidden = one_name_each(effects)
+    hidden = distinct_names(effects)
     head: Result = {"name": case.name, "truth": list(hidden)}
     problem_and_search = searched(case.document())
     if problem_and_search is None:

@@ -54,7 +54,7 @@ class Slip:
     over_rivals: float | None = None
 
 
-Make = Callable[[Case, np.random.Generator], Slip | None]
+MakeSlip = Callable[[Case, np.random.Generator], Slip | None]
 
 
 def _scaled(case: Case, logarithm: Floats) -> Slip:
@@ -139,10 +139,10 @@ def _of_gains(case: Case, turned: Mask, first: str, second: str) -> tuple[float,
     return scattered(first), scattered(second)
 
 
-def conjugated(share: float) -> Make:
+def conjugated(share: float) -> MakeSlip:
     """FRFs in the other sign convention."""
 
-    def make(case: Case, random: np.random.Generator) -> Slip | None:
+    def make_slip(case: Case, random: np.random.Generator) -> Slip | None:
         turned = _some(case, random, share)
         if not turned.any() or (share < 1 and 2 * turned.sum() >= len(turned)):
             return None
@@ -155,7 +155,7 @@ def conjugated(share: float) -> Make:
         rivals = left_of_conjugated(case.recorded) if turned.all() else over_one_sign(case.recorded, turned, share)
         return Slip(case.with_entries(entries), chi2, min(chi2, rivals))
 
-    return make
+    return make_slip
 
 
 def polarity(case: Case, random: np.random.Generator) -> Slip | None:
@@ -191,30 +191,30 @@ def dead(case: Case, random: np.random.Generator) -> Slip | None:
     return Slip(case.with_entries(entries), _of_places(case, of_sensor))
 
 
-def warm_up(amplitude: float) -> Make:
+def warm_up(amplitude: float) -> MakeSlip:
     """The first recordings' gain 1 + A e^(−j/τ); a fall only where no load cycles are noted."""
 
-    def make(case: Case, random: np.random.Generator) -> Slip | None:
+    def make_slip(case: Case, random: np.random.Generator) -> Slip | None:
         if amplitude > 0 and all(recording.load_cycles is not None for recording in case.entries):
             return None  # `ageing` explains it as well
         order = recording_order(case.entries)
         return _scaled(case, np.log(1 + amplitude * np.exp(-order / float(random.uniform(1.0, 4.0)))))
 
-    return make
+    return make_slip
 
 
-def factor(value: float) -> Make:
+def factor(value: float) -> MakeSlip:
     """A third of the recordings at a factor: peak-to-peak or rms for peak."""
 
-    def make(case: Case, random: np.random.Generator) -> Slip | None:
+    def make_slip(case: Case, random: np.random.Generator) -> Slip | None:
         off = _some(case, random, 1 / 3)
         return None if 2 * off.sum() >= len(off) else _scaled(case, np.log(value) * off)
 
-    return make
+    return make_slip
 
 
 # Each slip, and the reasons of findings that name it.
-SLIPS: Mapping[str, tuple[Make, tuple[Reason, ...]]] = {
+SLIPS: Mapping[str, tuple[MakeSlip, tuple[Reason, ...]]] = {
     "labels exchanged": (labels, (Reason.LABELS_EXCHANGED,)),
     "cables exchanged": (cables, (Reason.CABLES_EXCHANGED, Reason.LABELS_EXCHANGED)),
     "all conjugated": (conjugated(1.0), (Reason.ALL_CONJUGATED,)),

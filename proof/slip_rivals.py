@@ -33,12 +33,12 @@ _SPREAD, _SENSOR, _MODULUS, _THICKNESS = 0.25, 0.01, 0.02, 0.01  # standard devi
 _STEP = 1e-3
 _DELAY = "timing_delay"
 _LADDER: Values = {"law": "ladder"}
-_ONE_STEP: Values = {"law": "step"}
+_STEP_LAW: Values = {"law": "step"}
 # Effects that turn the phase: what is fitted of each, and its law.
 _TURNING: tuple[tuple[str, tuple[str, ...], Values], ...] = (
     ("amplifier_high_pass", ("corner_hz",), {}),
     ("sensor_relaxation", ("exponent",), _LADDER),
-    ("sensor_relaxation", ("step", "corner_hz"), _ONE_STEP),
+    ("sensor_relaxation", ("step", "corner_hz"), _STEP_LAW),
     ("contact_resonance", ("tip_mass_g", "damping"), {}),
 )
 
@@ -57,8 +57,8 @@ class LevelRivals:
 
     def left_of(self, logarithm: Floats) -> float:
         """χ² that the best of them leaves of changes of ln level (recordings,)."""
-        projector = self._left(self.free)
-        spread = self._left(np.column_stack([self.free, self.spread]))
+        projector = self._projector(self.free)
+        spread = self._projector(np.column_stack([self.free, self.spread]))
         residuals = [float(logarithm @ projector @ logarithm), float(logarithm @ spread @ logarithm)]
         for rival in self.rivals:
             along, size = float(rival @ projector @ logarithm), float(rival @ projector @ rival)
@@ -66,7 +66,7 @@ class LevelRivals:
             residuals.append(residuals[0] - 2 * share * along + share**2 * size)
         return min(residuals)
 
-    def _left(self, columns: Floats) -> Floats:
+    def _projector(self, columns: Floats) -> Floats:
         """The matrix of the χ² that columns of normal coefficients leave; the first's is free."""
         weighted = self.weight[:, None] * columns
         penalty = np.diag([0.0, *np.ones(columns.shape[1] - 1)])

@@ -101,11 +101,11 @@ def _case(made: Campaign, recorded: RecordedLines, sigma: SigmaTable) -> Case:
     scatter = np.full(len(recorded.exact), np.inf)
     lines = 1 / (1 / relative).sum(axis=1)
     noise = recorded.response.experiment.noise
-    scatter[own_levels.number] = np.sqrt(noise.gain**2 + _of_place(recorded.response) + lines)[own_levels.number]
+    scatter[own_levels.number] = np.sqrt(noise.gain**2 + _of_positions(recorded.response) + lines)[own_levels.number]
     return Case(made, recorded, scatter)
 
 
-def _of_place(response: TrueResponse) -> Floats:
+def _of_positions(response: TrueResponse) -> Floats:
     """The variance of ln level from the scatter of places (recordings,)."""
     size = response.experiment.noise.position_mm
     if size == 0:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from proof.cases import MadeCase
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.stored import Work, digest_of, of_each, reports, sources, stored
 from rig.solved.campaign import document, drawn
 from rig.solved.worlds import PLAIN
@@ -101,7 +101,7 @@ def _visible(truth: Truth) -> bool:
 def _names(report: Report) -> tuple[str, ...]:
     if report["verdict"] not in ("explained", "ambiguous"):
         return ()
-    return one_name_each(mechanism["name"] for mechanism in report["mechanisms"])
+    return distinct_names(mechanism["name"] for mechanism in report["mechanisms"])
 
 
 def rows(judged: Sequence[Judgement]) -> dict[str, list[Judgement]]:

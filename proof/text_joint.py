@@ -10,7 +10,7 @@ from proof.statistics import share
 Result = Mapping[str, Any]
 
 
-BESIDE_CURVES = ("compression", "indentation")
+WITH_CURVES = ("compression", "indentation")
 
 
 def told_apart(entries: Sequence[Result], how: str) -> list[bool]:
@@ -26,7 +26,7 @@ def told_apart(entries: Sequence[Result], how: str) -> list[bool]:
 def joint(result: Result) -> str:
     """Of joint campaigns what is told together and apart."""
     judged = result["judged"]
-    kinds = [judgement for judgement in judged if judgement["what"] in BESIDE_CURVES]
+    kinds = [judgement for judgement in judged if judgement["what"] in WITH_CURVES]
     dates = [judgement for judgement in judged if judgement["what"] == "dates"]
     skins = [judgement for judgement in judged if judgement["what"] == "skins"]
     return f"""\
@@ -46,16 +46,16 @@ own equations tell from an error of E are counted.
 def _of_kinds(entries: Sequence[Result]) -> str:
     rows = []
     for what, called in zip(
-        (BESIDE_CURVES[:1], BESIDE_CURVES[1:], BESIDE_CURVES),
+        (WITH_CURVES[:1], WITH_CURVES[1:], WITH_CURVES),
         ("FRFs and a block", "FRFs and indentations", "both"),
         strict=True,
     ):
-        chosen = [judgement for judgement in entries if judgement["what"] in what]
-        row = [called, str(len(chosen))]
+        of_these = [judgement for judgement in entries if judgement["what"] in what]
+        row = [called, str(len(of_these))]
         for how in ("alone", "together"):
-            row += [_of([judgement["right"][how] for judgement in chosen]), _of(told_apart(chosen, how))]
-        held = [is_held for judgement in chosen for is_held in judgement["modulus_held"]]
-        rows.append([*row, _of(held), str(sum(judgement["contradicted"] for judgement in chosen))])
+            row += [_of([judgement["right"][how] for judgement in of_these]), _of(told_apart(of_these, how))]
+        held = [is_held for judgement in of_these for is_held in judgement["modulus_held"]]
+        rows.append([*row, _of(held), str(sum(judgement["contradicted"] for judgement in of_these))])
     heads = ["right, FRFs alone", "told apart, FRFs alone", "right, together", "told apart, together"]
     head = ["kinds", "campaigns", *heads, "E of the curves held by its interval", "said to contradict"]
     return table(head, rows)

@@ -52,7 +52,7 @@ def recordings(result: Result) -> str:
         ["campaign", "what the diagnosis was told"],
         [[campaign["name"], campaign["stated"]] for campaign in result["campaigns"]],
     )
-    where = "\n".join(f"- **{campaign['name']}**: {_said(campaign['report'])}" for campaign in result["campaigns"])
+    where = "\n".join(f"- **{campaign['name']}**: {_sentence(campaign['report'])}" for campaign in result["campaigns"])
     header = [
         "campaign", "verdict", "named", "rivals", "E before → after, MPa",
         "least squares, in sample, before → after, %",
@@ -76,7 +76,7 @@ What each report says, in its own words:
 """
 
 
-def _said(report: Result) -> str:
+def _sentence(report: Result) -> str:
     """A report's statement without the laws, and where it locates the misfit."""
     sentences = report["statement"].split(". ")
     chosen = sentences if report["verdict"] == "unexplained" else sentences[:1]

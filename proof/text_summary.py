@@ -8,7 +8,7 @@ from proof.concealed import judged_of
 from proof.judge import QUIET, Judged
 from proof.phrases import percent, right
 from proof.statistics import calibration, share
-from proof.text_joint import BESIDE_CURVES, told_apart
+from proof.text_joint import WITH_CURVES, told_apart
 from proof.text_wide import that_show
 from rig.identifiable import THRESHOLD
 
@@ -80,7 +80,7 @@ def _coverage(result: Result) -> str:
 
 
 def _joint(result: Result) -> str:
-    with_curves = [judgement for judgement in result["judged"] if judgement["what"] in BESIDE_CURVES]
+    with_curves = [judgement for judgement in result["judged"] if judgement["what"] in WITH_CURVES]
     frfs_only, together = (
         (
             percent(share([judgement["right"][how] for judgement in with_curves])),

@@ -12,7 +12,7 @@ from proof.statistics import share
 Result = Mapping[str, Any]
 _QUIET = ("no_mismatch", "insufficient_data")
 _THRESHOLDS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-_UNLISTED_LIMIT, _LEFT_OUT_LIMIT = 1.5, 1.3  # times the noise, and the error with the mechanism's own name
+_UNLISTED_LIMIT, _EXCLUDED_LIMIT = 1.5, 1.3  # times the noise, and the error with the mechanism's own name
 
 
 def hidden(result: Result, quiet: Result | None = None) -> str:
@@ -113,10 +113,10 @@ def left_out(result: Result) -> str:
             ]
         )
     ratios = [ratio for judgement in judged if (ratio := _ratio(judgement)) is not None]
-    close = percent(share([ratio <= _LEFT_OUT_LIMIT for ratio in ratios]))
+    close = percent(share([ratio <= _EXCLUDED_LIMIT for ratio in ratios]))
     sentence = (
         f"Error held out with the law over that with the named mechanism, both over their noise: median "
-        f"{median_of(ratios)}; at most {_LEFT_OUT_LIMIT} times in {close} of those that have a law."
+        f"{median_of(ratios)}; at most {_EXCLUDED_LIMIT} times in {close} of those that have a law."
         if ratios
         else ""
     )
@@ -135,10 +135,10 @@ def left_out(result: Result) -> str:
 
 {result["drawn"]} campaigns of our own rig with one effect (`proof/left_out.py`), diagnosed without that mechanism in
 the catalogue: {len(judged)} are visible. *Found*: a law is stated, over an axis on which the mechanism acts, and it
-enters where the mechanism does, or predicts recordings held out at most {_LEFT_OUT_LIMIT} times as badly as with the
+enters where the mechanism does, or predicts recordings held out at most {_EXCLUDED_LIMIT} times as badly as with the
 mechanism's own name. Errors are
 medians, in multiples of the noise of what was held out. *Predicts as well*: other mechanisms are named, by which
-recordings held out are predicted at most {_LEFT_OUT_LIMIT} times as badly as with its own name: what was left out and
+recordings held out are predicted at most {_EXCLUDED_LIMIT} times as badly as with its own name: what was left out and
 these cannot be told apart in that design.
 
 {table(header, rows)}
@@ -155,7 +155,7 @@ def _placed(judgement: Result) -> bool:
     """Whether a law stands for the mechanism that was left out."""
     ratio = _ratio(judgement)
     return bool(
-        judgement["axis_right"] and (judgement["entry_right"] or (ratio is not None and ratio <= _LEFT_OUT_LIMIT))
+        judgement["axis_right"] and (judgement["entry_right"] or (ratio is not None and ratio <= _EXCLUDED_LIMIT))
     )
 
 
@@ -166,7 +166,7 @@ def _ratio(judgement: Result, of: str = "unnamed_over_noise") -> float | None:
 
 def _names_an_equivalent(judgement: Result) -> bool:
     ratio = _ratio(judgement, "instead_over_noise")
-    return ratio is not None and ratio <= _LEFT_OUT_LIMIT
+    return ratio is not None and ratio <= _EXCLUDED_LIMIT
 
 
 def _instead(entries: Sequence[Result]) -> str:

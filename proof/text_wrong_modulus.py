@@ -48,14 +48,14 @@ Not named or grouped, of the visible:
 def _row(entries: Sequence[Result]) -> list[str]:
     determined = [judgement for judgement in entries if judgement["determined"]]
     return [
-        percent(share([_is_told(judgement) for judgement in entries])),
+        percent(share([_is_named(judgement) for judgement in entries])),
         percent(share([judgement["held"] for judgement in entries if judgement["named"]])),
         percent(share([_is_close(judgement) for judgement in determined])),
         percent(share([_is_close(judgement) for judgement in determined if judgement["named"]])),
     ]
 
 
-def _is_told(judgement: Result) -> bool:
+def _is_named(judgement: Result) -> bool:
     return bool(judgement["named"] or judgement["grouped"])
 
 
@@ -93,7 +93,7 @@ def _missed(entries: Sequence[Result]) -> str:
         [judgement["name"], judgement["what"], f"{judgement['factor']:.3g}", ", ".join(judgement["companions"]) or "–",
          f"{judgement['sd_ln_modulus']:.2g}",
          f"{judgement['answer'][0]}: {', '.join(judgement['answer'][1]) or 'nothing'}"]
-        for judgement in entries if not _is_told(judgement)
+        for judgement in entries if not _is_named(judgement)
     ]  # fmt: skip
     if not rows:
         return "None.\n"

@@ -21,7 +21,7 @@ _ERROR = "modulus_error"
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8
 _DETERMINED = 0.05  # standard deviation of ln E
-_LEFT_OUT, _KEPT = "out_of_domain", "contacts_kept"
+_OUT_OF_DOMAIN, _CONTACTS_KEPT = "out_of_domain", "contacts_kept"
 
 Report = Mapping[str, Any]
 
@@ -50,7 +50,7 @@ def compared(report: Report, truth: Report) -> dict[str, Any]:
         hidden_effect["chi2_gain_joint"] for hidden_effect in truth["hidden"] if hidden_effect["effect"] == _ERROR
     )
     sd = truth["documents"][0]["sd_ln_modulus_frf"]
-    found = _found(report)
+    found = _reported_error(report)
     d33, beyond = report["d33"], _beyond(truth["as_declared"])
     return {
         "what": truth["what"],
@@ -68,22 +68,22 @@ def compared(report: Report, truth: Report) -> dict[str, Any]:
         "held": found is not None and found["low"] <= truth["factor"] <= found["high"],
         "off": None if found is None else abs(math.log(found["value"] / truth["factor"])),
         "beyond": beyond,
-        "left_out": _left_out(report, beyond),
+        "left_out": _contacts_excluded(report, beyond),
         "recordings": len(truth["as_declared"]["a_over_h"]),
         "d33_off": None if d33 is None else abs(math.log(d33["value"] / _d33(truth))),
         "d33_quotable": d33 is not None and d33["quotable"],
     }
 
 
-def _left_out(report: Report, beyond: int) -> int:
+def _contacts_excluded(report: Report, beyond: int) -> int:
     """How many of the contacts `beyond` the tables as declared were left out: all, where the report tells of none kept;
     else those that it names."""
     findings = report["findings"]
-    named = sum(finding["code"] == _LEFT_OUT and "left out" in finding["statement"] for finding in findings)
-    return min(beyond, named) if any(finding["code"] == _KEPT for finding in findings) else beyond
+    named = sum(finding["code"] == _OUT_OF_DOMAIN and "left out" in finding["statement"] for finding in findings)
+    return min(beyond, named) if any(finding["code"] == _CONTACTS_KEPT for finding in findings) else beyond
 
 
-def _found(report: Report) -> dict[str, Any] | None:
+def _reported_error(report: Report) -> dict[str, Any] | None:
     """The factor as a report states it."""
     parameters = [
         parameter

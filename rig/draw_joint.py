@@ -29,17 +29,17 @@ _FACTORS = {"modulus_error": (1.1, 4.0), "thickness_error": (1.03, 1.3)}
 _DECLARED = {"modulus_error": "youngs_modulus_mpa", "thickness_error": "thickness_mm"}
 
 
-def beside_a_block(random: np.random.Generator, name: str, skin: str) -> Joint:
+def with_block(random: np.random.Generator, name: str, skin: str) -> Joint:
     """FRFs of a skin, and one to three compressions of a block of its elastomer."""
-    return _beside_curves(random, name, skin, COMPRESSION)
+    return _with_curves(random, name, skin, COMPRESSION)
 
 
-def beside_indentations(random: np.random.Generator, name: str, skin: str) -> Joint:
+def with_indentations(random: np.random.Generator, name: str, skin: str) -> Joint:
     """FRFs of a skin, and one to four raw curves of a sphere pressed into it."""
-    return _beside_curves(random, name, skin, INDENTATION)
+    return _with_curves(random, name, skin, INDENTATION)
 
 
-def _beside_curves(random: np.random.Generator, name: str, skin: str, kind: str) -> Joint:
+def _with_curves(random: np.random.Generator, name: str, skin: str, kind: str) -> Joint:
     names = _names(random, kind)
     description = frf_description(random, name, skin, names or {str(random.choice(CATALOGUED))})
     ranges = of_frf(description)

@@ -20,7 +20,7 @@ _SD = (0.01, 0.1)
 _LEAST_SDS = 4.0  # by which E or d33 departs
 
 
-def skins_of_one_make(random: np.random.Generator, name: str, make: str) -> Joint:
+def skins_of_one_batch(random: np.random.Generator, name: str, make: str) -> Joint:
     """FRFs of three to six skins of one make, one of them with few recordings; the make's E is declared for all."""
     common = frf_description(random, name, make, {"modulus_error", str(random.choice(CATALOGUED))})
     skin, sds = common["skin"], {"modulus_error": _log(random, *_SD), D33_DEPARTURE: _log(random, *_SD)}

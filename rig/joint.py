@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from rig import checks
-from rig.draw_joint import beside_a_block, beside_indentations
+from rig.draw_joint import with_block, with_indentations
 from rig.draw_joint_dates import two_dates
-from rig.draw_joint_skins import skins_of_one_make
+from rig.draw_joint_skins import skins_of_one_batch
 from rig.joint_campaign import Joint, first_feasible
 from rig.joint_truth import joint_truth
 
 _DRAWN = {
-    "compression": beside_a_block,
-    "indentation": beside_indentations,
+    "compression": with_block,
+    "indentation": with_indentations,
     "dates": two_dates,
-    "skins": skins_of_one_make,
+    "skins": skins_of_one_batch,
 }  # fmt: skip
 WHAT = tuple(_DRAWN)
 

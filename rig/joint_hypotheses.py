@@ -68,7 +68,7 @@ def hypothesis(
         parts.append(_lines(document, lacking, free=free))
         if curves and document.curves is not None:
             truth = document.curves.experiment
-            model = replace(truth, effects=_left(truth.effects, lacking))
+            model = replace(truth, effects=_remaining(truth.effects, lacking))
             parts += [CurvePart(curve, truth, model, document.skin, free=free) for curve in document.curves.recorded]
             assert truth.curves is not None
             priors[f"{document.skin}/cell"] = Prior(0.0, max(truth.curves.cell_gain, 1e-6))
@@ -91,7 +91,7 @@ def skin_covariance(document: JointDocument) -> Floats:
     return covariance([_lines(document, None, free=False)], gains, names)
 
 
-def _left(effects: dict[str, Values], without: Hidden | None) -> dict[str, Values]:
+def _remaining(effects: dict[str, Values], without: Hidden | None) -> dict[str, Values]:
     if without is None or without.effect in _BY_PRIORS:
         return effects
     return {name: values for name, values in effects.items() if name != without.effect}
@@ -100,7 +100,7 @@ def _left(effects: dict[str, Values], without: Hidden | None) -> dict[str, Value
 def _lines(document: JointDocument, without: Hidden | None, *, free: bool) -> LinesPart:
     response = document.lines.response
     gains = response.sensor_gains / (without.gains if without is not None and without.gains else 1.0)
-    experiment = replace(response.experiment, effects=_left(response.experiment.effects, without))
+    experiment = replace(response.experiment, effects=_remaining(response.experiment.effects, without))
     return LinesPart(document.lines, replace(response, experiment=experiment, sensor_gains=gains), free=free)
 
 

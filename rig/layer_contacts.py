@@ -51,12 +51,12 @@ class LayerContacts:
     def at(self, force: Floats) -> "LayerContacts":
         """The same contacts under another force (rows,); cached."""
         key = force.tobytes()
-        if key not in self._others:
-            self._others[key] = LayerContacts(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
-        return self._others[key]
+        if key not in self._by_force:
+            self._by_force[key] = LayerContacts(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
+        return self._by_force[key]
 
     @cached_property
-    def _others(self) -> dict[bytes, "LayerContacts"]:
+    def _by_force(self) -> dict[bytes, "LayerContacts"]:
         return {}
 
     @cached_property

@@ -27,7 +27,7 @@ from rig.strengths import drawn_parameters, evenly_in_log, of_frf
 _ERROR = "modulus_error"
 _FACTORS = (2.0, 4.0)
 _KINDS = {FRF: 0.5, COMPRESSION: 0.25, INDENTATION: 0.25}
-_BESIDE = (*COMPANIONS, "adhesion", "contact_creep")
+_COMPANIONS = (*COMPANIONS, "adhesion", "contact_creep")
 _COMPANY = 0.35
 _HARD = 0.5  # share of the draws with loads up to what the skin bears
 _WIDEST, _HARDEST = 2.9, 0.09  # a/h and L that it bears
@@ -66,7 +66,7 @@ def drawn_wrong_modulus(seed: int, number: int) -> tuple[dict[str, Any], dict[st
 
 def _drawn(random: np.random.Generator, name: str, skin: str) -> Joint:
     kind = str(random.choice(list(_KINDS), p=list(_KINDS.values())))
-    names = {_ERROR} | ({str(random.choice(_BESIDE))} if random.random() < _COMPANY else set())
+    names = {_ERROR} | ({str(random.choice(_COMPANIONS))} if random.random() < _COMPANY else set())
     description = frf_description(random, name, skin, names)
     if random.random() < _HARD:
         _press_harder(random, description)

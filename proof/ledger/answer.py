@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from proof.judge import UNKNOWN
-from proof.names import one_name_each
+from proof.names import distinct_names
 from rig.identifiable import THRESHOLD
 
 Report = Mapping[str, Any]
@@ -78,7 +78,7 @@ def _of_rival(names: Collection[str]) -> list[str]:
 
 
 def _merged(names: Collection[str]) -> set[str]:
-    return set(one_name_each(names))
+    return set(distinct_names(names))
 
 
 def _rounded(value: float | None) -> float | None:

@@ -89,8 +89,8 @@ class DrawnFrf(Item):
 
     def truth(self) -> Truth:
         """By the rig's own fit."""
-        entry_of_truth = truth_of_lines(record(self._case.description))
-        return {**_that_shows(entry_of_truth, THRESHOLD), "d33": entry_of_truth["d33_pc_per_n"]}
+        facts = truth_of_lines(record(self._case.description))
+        return {**_identifiable_effects(facts, THRESHOLD), "d33": facts["d33_pc_per_n"]}
 
 
 @dataclass(frozen=True)
@@ -109,8 +109,11 @@ class DrawnRawCurves(Item):
 
     def truth(self) -> Truth:
         """By the rig's own fit."""
-        entry_of_truth = truth_of_curves(*drawn_curves(CURVE_SEED, self.number, INDENTATION, self._case.what))
-        return {**_that_shows(entry_of_truth, CURVE_THRESHOLD), "youngs_modulus": entry_of_truth["youngs_modulus_mpa"]}
+        facts = truth_of_curves(*drawn_curves(CURVE_SEED, self.number, INDENTATION, self._case.what))
+        return {
+            **_identifiable_effects(facts, CURVE_THRESHOLD),
+            "youngs_modulus": facts["youngs_modulus_mpa"],
+        }
 
 
 @dataclass(frozen=True)
@@ -193,16 +196,19 @@ class Concealed(Item):
         return [json.loads((data_folder(_CAMPAIGNS) / self.folder / f"{self.name}.json").read_text(encoding="utf-8"))]
 
     @property
-    def known(self) -> Truth:
+    def recorded_truth(self) -> Truth:
         """Its entry in the file of truths."""
         return dict(_read(data_folder(_CAMPAIGNS) / self.truths)[self.name])
 
     def truth(self) -> Truth:
         """Effects, and whether they show."""
-        entry_of_truth = self.known
+        facts = self.recorded_truth
         value = {"d33": "d33_pc_per_n", "youngs_modulus": "youngs_modulus_mpa"}
-        values = {name: entry_of_truth[field] for name, field in value.items() if field in entry_of_truth}
-        return {**_that_shows(entry_of_truth, CURVE_THRESHOLD if "youngs_modulus" in values else THRESHOLD), **values}
+        values = {name: facts[field] for name, field in value.items() if field in facts}
+        return {
+            **_identifiable_effects(facts, CURVE_THRESHOLD if "youngs_modulus" in values else THRESHOLD),
+            **values,
+        }
 
 
 @dataclass(frozen=True)
@@ -211,17 +217,17 @@ class UnlistedLaw(Concealed):
 
     def truth(self) -> Truth:
         """The law, and whether it shows."""
-        entry_of_truth = self.known
-        law = f"{entry_of_truth['law']['acts_on']} over {entry_of_truth['law']['axis']}"
+        facts = self.recorded_truth
+        law = f"{facts['law']['acts_on']} over {facts['law']['axis']}"
         return {
             "effects": [law],
-            "shows": [law] if entry_of_truth["identifiable"] else [],
-            "d33": entry_of_truth["d33_pc_per_n"],
+            "shows": [law] if facts["identifiable"] else [],
+            "d33": facts["d33_pc_per_n"],
         }
 
     def grade(self, report: Report, truth: Truth, /) -> str:
         """Right where it is recognised as unlisted and placed; open where it is recognised or left open."""
-        judged = judged_by_law(self.name, self.known, report)
+        judged = judged_by_law(self.name, self.recorded_truth, report)
         if not truth["shows"]:
             return RIGHT if report["verdict"] in judge.QUIET or judged["recognised"] else WRONG
         if judged["recognised"]:
@@ -235,16 +241,16 @@ class Solved(Concealed):
 
     def truth(self) -> Truth:
         """The effect, and the true d33 or E."""
-        entry_of_truth = self.known
-        quantity = "youngs_modulus" if "case" in entry_of_truth else "d33"
-        value = entry_of_truth["youngs_modulus_mpa" if "case" in entry_of_truth else "d33_pc_per_n"]
-        return {"effects": [entry_of_truth["effect"]], "shows": [], quantity: value}
+        facts = self.recorded_truth
+        quantity = "youngs_modulus" if "case" in facts else "d33"
+        value = facts["youngs_modulus_mpa" if "case" in facts else "d33_pc_per_n"]
+        return {"effects": [facts["effect"]], "shows": [], quantity: value}
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """By the scorer's classes."""
         scorer = _module(data_folder(_CAMPAIGNS) / "solved-open" / "score.py")
-        entry_of_truth = self.known
-        judged = (scorer.grade_curve if "case" in entry_of_truth else scorer.grade)(entry_of_truth, report)
+        facts = self.recorded_truth
+        judged = (scorer.grade_curve if "case" in facts else scorer.grade)(facts, report)
         return _SOLVED_GRADES[judged["cls"]]
 
 
@@ -255,18 +261,15 @@ class Real(Item):
     needs: ClassVar[str] = _RECORDINGS
 
     @property
-    def known(self) -> Truth:
+    def recorded_truth(self) -> Truth:
         """Its entry in the file of truths."""
         return dict(_read(data_folder(_RECORDINGS) / "real" / "open" / "truth.json")[self.name])
 
     def documents(self) -> list[dict[str, Any]]:
         """Its files as text: what they are read as belongs to the answer."""
-        entry_of_truth = self.known
-        folder = data_folder(_RECORDINGS) / "real" / "open" / entry_of_truth["folder"]
-        paths = [
-            folder / name
-            for name in (*entry_of_truth["files"], *([entry_of_truth["rig"]] if entry_of_truth["rig"] else []))
-        ]
+        facts = self.recorded_truth
+        folder = data_folder(_RECORDINGS) / "real" / "open" / facts["folder"]
+        paths = [folder / name for name in (*facts["files"], *([facts["rig"]] if facts["rig"] else []))]
         return [{"name": path.name, "content": path.read_bytes().hex()} for path in paths]
 
     def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
@@ -276,10 +279,10 @@ class Real(Item):
         from underskin.recordings.rig_description import parse
 
         contents = {one["name"]: bytes.fromhex(one["content"]) for one in documents}
-        entry_of_truth = self.known
+        facts = self.recorded_truth
         try:
-            rig = parse(contents[entry_of_truth["rig"]], entry_of_truth["rig"]) if entry_of_truth["rig"] else None
-            readings = [read_file(contents[name], name, rig) for name in entry_of_truth["files"]]
+            rig = parse(contents[facts["rig"]], facts["rig"]) if facts["rig"] else None
+            readings = [read_file(contents[name], name, rig) for name in facts["files"]]
             report = diagnose(readings[0]) if len(readings) == 1 else diagnose_together(readings, self.name)
         except UnderskinError as error:
             return {"verdict": "refused", "probability": 0.0, "statement": str(error), "mechanisms": []}
@@ -287,12 +290,16 @@ class Real(Item):
 
     def truth(self) -> Truth:
         """What its owner says."""
-        return {"effects": self.known["required"], "shows": self.known["required"], "says": self.known["truth"]}
+        return {
+            "effects": self.recorded_truth["required"],
+            "shows": self.recorded_truth["required"],
+            "says": self.recorded_truth["truth"],
+        }
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """By the judge's words."""
         judging = _module(data_folder(_RECORDINGS) / "real" / "judge.py")
-        word = judging.judge(self.known, None if report["verdict"] == "refused" else report)[0]
+        word = judging.judge(self.recorded_truth, None if report["verdict"] == "refused" else report)[0]
         return next(grade for grade, words in _GRADES.items() if word in words)
 
 
@@ -319,17 +326,17 @@ NEEDS = {name: _CAMPAIGNS for name in PARTS if name.endswith("-open") or name.st
 }
 
 
-def _that_shows(entry_of_truth: Mapping[str, Any], threshold: float) -> Truth:
+def _identifiable_effects(facts: Mapping[str, Any], threshold: float) -> Truth:
     """The effects, and those that show: all together gain in χ² over the base model, and each over the others.
 
     As a whole, where the gain of each is unknown; two effects that cancel each other do not show.
     """
-    effects = list(entry_of_truth["effects"])
-    if not effects or not entry_of_truth["identifiable"]:
+    effects = list(facts["effects"])
+    if not effects or not facts["identifiable"]:
         return {"effects": sorted(effects), "shows": []}
-    gains = list(entry_of_truth.get("chi2_gain_of_each") or [])
-    if isinstance(entry_of_truth.get("chi2_gain_of_each"), Mapping):
-        gains = list(entry_of_truth["chi2_gain_of_each"].values())
+    gains = list(facts.get("chi2_gain_of_each") or [])
+    if isinstance(facts.get("chi2_gain_of_each"), Mapping):
+        gains = list(facts["chi2_gain_of_each"].values())
     if len(effects) == 1 or len(gains) != len(effects):
         return {"effects": sorted(effects), "shows": sorted(effects)}
     seen = [effect for effect, gain in zip(effects, gains, strict=True) if gain is None or gain > threshold]

@@ -61,7 +61,7 @@ def differences(stored: Line, new: Line) -> Iterator[str]:
     before, after = stored["answer"], new["answer"]
     for name in ("verdict", "names"):
         if before[name] != after[name]:
-            yield f"{_said(before[name])} → {_said(after[name])}"
+            yield f"{_in_words(before[name])} → {_in_words(after[name])}"
     if abs(before.get("probability", 0.0) - after.get("probability", 0.0)) > _PROBABILITY:
         yield f"probability {before['probability']:.2f} → {after['probability']:.2f}"
     for quantity in _QUANTITIES:
@@ -93,7 +93,7 @@ def _interval(stated: Sequence[float | None] | None) -> str:
     return f"{value:g}" if low is None or high is None else f"{value:g} ({low:g} to {high:g})"
 
 
-def _said(value: Any) -> str:
+def _in_words(value: Any) -> str:
     return value if isinstance(value, str) else " + ".join(value) or "nothing"
 
 
@@ -105,7 +105,7 @@ def text(compared: Sequence[Compared]) -> str:
         if changed:
             lines.append(f"{part.part}: {len(changed)} of {len(part.pairs)} answers changed{_by_effect(changed)}")
         for stored, new in changed:
-            hidden = _said(stored["truth"].get("effects", ()))
+            hidden = _in_words(stored["truth"].get("effects", ()))
             graded = new["grade"] if stored["grade"] == new["grade"] else f"{stored['grade']} → {new['grade']}"
             lines.append(f"  {new['name']} ({hidden}; {graded}): {'; '.join(differences(stored, new))}")
     header = [

@@ -15,19 +15,19 @@ from proof.progress import progress_bars
 from proof.stored import FAILED, Work, diagnosing, digest_of, of_each, sources, stored
 from underskin.compiled import load_all
 
-KEPT = Path(__file__).parent / "kept"
+LEDGER = Path(__file__).parent / "kept"
 _SECONDS = "seconds.json"
 _SOURCES = ("rig", "proof/slip*.py")
 
 
-def run(parts: Mapping[str, Sequence[Item]], work: Work, *, keep: bool, folder: Path = KEPT) -> list[Compared]:
+def run(parts: Mapping[str, Sequence[Item]], work: Work, *, keep: bool, folder: Path = LEDGER) -> list[Compared]:
     """Diagnose the campaigns of the parts and compare with the answers in `folder`; `keep` writes the new ones."""
     recorded = folder / _SECONDS
     seconds: dict[str, float] = json.loads(recorded.read_text()) if recorded.exists() else {}
     compared = []
     with progress_bars() as bar:
         for part, items in parts.items():
-            before = _kept(folder / f"{part}.jsonl")
+            before = _stored_lines(folder / f"{part}.jsonl")
             version = f"{diagnosing()} {sources(*_SOURCES)}"
             lines = of_each(work, items, partial(_line, work, version, before), bar(part))
             spent = sum(line.pop("seconds") for line in lines)
@@ -41,7 +41,7 @@ def run(parts: Mapping[str, Sequence[Item]], work: Work, *, keep: bool, folder: 
     return compared
 
 
-def _kept(path: Path) -> dict[str, Line]:
+def _stored_lines(path: Path) -> dict[str, Line]:
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     return {line["name"]: line for line in map(json.loads, lines)}
 

@@ -14,7 +14,7 @@ from rig.solved.worlds import SHARES, World, drawn_world
 
 _ATTEMPTS = 20
 _START = datetime(2024, 3, 4, 8, 30, tzinfo=UTC)
-_SAME_PLACE = 1e-3  # mm: charge curves are shared within
+_DISTANCE_STEP_MM = 1e-3  # mm: charge curves are shared within
 FINENESS = 1.5  # of the mesh
 
 
@@ -65,7 +65,7 @@ def levels(design: Design, world: World, fineness: float = FINENESS) -> tuple[Fl
 def _shares(charge_curve: Course, design: Design, rows: NDArray[np.intp], force: Floats, dynamic: Floats) -> Floats:
     """First harmonic over force of the share borne by the disc, for the rows of one sphere."""
     true, shares = design.true, np.empty(len(rows))
-    places = np.round(design.distance[rows] / _SAME_PLACE) * _SAME_PLACE
+    places = np.round(design.distance[rows] / _DISTANCE_STEP_MM) * _DISTANCE_STEP_MM
     for distance in np.unique(places):
         here = places == distance
         share = charge_curve.share(true.sensor_radius / true.thickness, float(distance / true.thickness))

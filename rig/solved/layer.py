@@ -212,7 +212,7 @@ class PressedLayer:
 
         `held` are the points that touch (edges, points), even where they must pull; otherwise those inside the sphere.
         """
-        r, below = self._place()
+        r, below = self._positions()
         distance = np.hypot(r, below)
         gap = distance - self.radius
         touching = gap < 0 if held is None else held
@@ -287,16 +287,16 @@ class PressedLayer:
     def contact_radius(self) -> float:
         """Radius of the outermost point in contact."""
         touching = self._gap() < 0
-        return float(self._place()[0][touching].max()) if touching.any() else 0.0
+        return float(self._positions()[0][touching].max()) if touching.any() else 0.0
 
-    def _place(self) -> tuple[Floats, Floats]:
+    def _positions(self) -> tuple[Floats, Floats]:
         """Radius of the points of the upper face, and how far they lie below the sphere's centre."""
         u = self.u[self.edges]
         below = self.top + self.radius - self.depth - (self.z[self.edges] + u[..., 1]) @ self.n.T
         return (self.r[self.edges] + u[..., 0]) @ self.n.T, below
 
     def _gap(self) -> Floats:
-        return np.asarray(np.hypot(*self._place()) - self.radius)
+        return np.asarray(np.hypot(*self._positions()) - self.radius)
 
     def base_pressure(self, at: Floats) -> Floats:
         """Compressive stress on the base at radii, from the nodal reactions by the consistent mass of the base."""
