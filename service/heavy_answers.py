@@ -1,4 +1,4 @@
-"""Answers that take long to compute: a few at a time, the others wait in turn without a thread."""
+"""Answers that take long to compute: a few at a time; the others wait without occupying a thread."""
 
 import asyncio
 import functools
@@ -12,7 +12,7 @@ _Parameters = ParamSpec("_Parameters")
 
 
 async def in_turn(work: Callable[[], _Answer]) -> _Answer:
-    """What `work` answers, in a thread beside the event loop."""
+    """The result of `work`, computed in a thread outside the event loop."""
     async with _AT_ONCE:
         return await asyncio.to_thread(work)
 

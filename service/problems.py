@@ -65,11 +65,11 @@ class Refusal(Exception):
         super().__init__(detail)
 
     def status_for(self, path: str) -> int:
-        """Status of the answer to `path`: UM-Bridge knows 400 only for what is wrong with a request's content."""
+        """Status of the answer to `path`: UM-Bridge knows only 400 for invalid content."""
         return 400 if self.status == 422 and _is_umbridge(path) else self.status
 
     def in_log(self) -> str | None:
-        """What the log says of it: the refused fields and what is allowed, never what came, which may be a secret."""
+        """For the log: the rejected fields and what is allowed, never the values, which may be secret."""
         if self.status < HTTPStatus.BAD_REQUEST:
             return None
         if not self.errors:
@@ -83,7 +83,7 @@ class Refusal(Exception):
         return "application/json" if _is_umbridge(path) else MEDIA_TYPE
 
     def body(self, path: str, request_id: str) -> bytes:
-        """The problem document, or under /umbridge what that protocol says instead."""
+        """The problem document, or UM-Bridge's own form under /umbridge."""
         if _is_umbridge(path):
             error = {"type": self.title.title().replace(" ", ""), "message": self.detail}
             return orjson.dumps({"error": error})
@@ -113,7 +113,7 @@ def _is_umbridge(path: str) -> bool:
 
 
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
-    """The problem of values that cannot be used, of which the first hundred are told: 422."""
+    """The problem of invalid values, of which the first hundred are listed: 422."""
     remaining = iter(errors)
     shortened = [_shortened(error) for error in islice(remaining, _MOST_LISTED_ERRORS)]
     more = sum(1 for _ in remaining)
@@ -138,7 +138,7 @@ def _shortened(error: InvalidInput) -> InvalidInput:
 
 
 def given_twice(field: str, part: str) -> Refusal:
-    """The problem of a key that comes again in its JSON object, at `part`: 422."""
+    """The problem of a repeated key in a JSON object, at `part`: 422."""
     name = _brief(field)
     allowed = f"is given twice: must be given once in its object; it comes again at {part}"
     error = {"code": str(ErrorCode.NOT_UNIQUE), "field": name, "index": None, "value": None, "allowed": allowed}
@@ -146,7 +146,7 @@ def given_twice(field: str, part: str) -> Refusal:
 
 
 def unexpected() -> Refusal:
-    """The problem of an error that nobody foresaw: 500."""
+    """The problem of an unexpected error: 500."""
     return Refusal(500, "Something went wrong in the server; its log has the request's id.")
 
 
@@ -170,7 +170,7 @@ def _listed(errors: ValidationError | Sequence[Any]) -> Iterator[InvalidInput]:
 
 
 def _guessed(error: InvalidInput, names: Collection[str]) -> InvalidInput:
-    """The error; of an unknown field with the one that was probably meant."""
+    """The error; for an unknown field with the most similar known one."""
     unknown = error.code == ErrorCode.UNKNOWN_FIELD and error.field not in names
     close = _nearest(error.field, names) if unknown else None
     if close is None:
@@ -183,7 +183,7 @@ def _nearest(name: str, names: Collection[str]) -> str | None:
 
 
 def validated(kind: type[_Model], document: Any) -> _Model:
-    """The model of a document; raises Refusal with all that is wrong."""
+    """The model of a document; raises Refusal with all errors."""
     require_few_fields(document)
     try:
         return kind.model_validate(document)
@@ -192,7 +192,7 @@ def validated(kind: type[_Model], document: Any) -> _Model:
 
 
 def parsed(kind: type[_Model], document: Any) -> _Model:
-    """The model of a document; raises SeveralInvalid with all that is wrong."""
+    """The model of a document; raises SeveralInvalid with all errors."""
     try:
         return kind.model_validate(document)
     except ValidationError as error:
@@ -237,7 +237,7 @@ def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
 
 
 def _brief(value: Any) -> Any:
-    """A refused value in few words: a whole batch may have been sent where a number belongs."""
+    """A rejected value, shortened: a whole batch may have been sent in place of a number."""
     if isinstance(value, int) and abs(value) >= 2**53:
         return "a very large integer"
     if value is None or isinstance(value, int | float):

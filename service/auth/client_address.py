@@ -1,4 +1,4 @@
-"""Whose request it is: the address of the client, also where it comes through a proxy."""
+"""The client's address, also behind a proxy."""
 
 import ipaddress
 from collections.abc import Sequence
@@ -12,8 +12,8 @@ _IPV6_PREFIX = 64  # one subscriber has all the addresses of such a network
 
 
 def client_address(request: Request, proxies: Sequence[_Network] = ()) -> str:
-    """The peer's address; of a peer on this machine, or in one of `proxies`, the last in `X-Forwarded-For`, which the
-    proxy there has set."""
+    """The peer's address; for a peer on this machine or in one of `proxies`, the last address in `X-Forwarded-For`,
+    which that proxy has set."""
     peer = request.client.host if request.client else ""
     address = _parsed(peer)
     if address is not None and (address.is_loopback or any(address in network for network in proxies)):
@@ -23,7 +23,7 @@ def client_address(request: Request, proxies: Sequence[_Network] = ()) -> str:
 
 
 def network_of(address: str) -> str:
-    """What tries are counted by: an address, of IPv6 its network of 64 bits."""
+    """The key by which login attempts are counted: the address, for IPv6 its /64 network."""
     parsed = _parsed(address)
     if parsed is None or parsed.version == 4:
         return str(parsed or address)
@@ -31,7 +31,7 @@ def network_of(address: str) -> str:
 
 
 def _parsed(text: str) -> _Address | None:
-    """An address; one of IPv4 also where a socket of IPv6 writes it as `::ffff:192.0.2.7`. None where it is none."""
+    """An IP address, None if invalid; an IPv4-mapped IPv6 address (`::ffff:192.0.2.7`) gives the IPv4 address."""
     try:
         address = ipaddress.ip_address(text)
     except ValueError:

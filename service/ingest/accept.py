@@ -1,4 +1,4 @@
-"""Storing the campaigns of uploads in one transaction; a repeated request is answered as before."""
+"""Stores the campaigns of uploads in one transaction; a repeated request gets the earlier answer."""
 
 import hashlib
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ _MOST_LISTED_ERRORS = 3  # of them in its sentence
 
 @dataclass(frozen=True)
 class IngestOptions:
-    """What a client says about its uploads."""
+    """Options of an upload request."""
 
     skin: str | None
     corrects: str | None
@@ -58,7 +58,7 @@ class IngestOptions:
             validation.name("together", self.together, False)
 
     def request(self, uploads: Sequence[Upload]) -> answers.KnownRequest | None:
-        """What makes a repetition of this request recognisable."""
+        """Identity of this request, by which a repetition is recognised."""
         if self.idempotency_key is None:
             return None
         options: list[Any] = [self.skin, self.corrects, self.reason, self.all_or_nothing]
@@ -72,10 +72,8 @@ class IngestOptions:
 
 
 def accept(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> tuple[dict[str, Any], bool]:
-    """Keep what is good; the answer is a CampaignResult, or a BatchResult for a form or a list; True: it is repeated.
-
-    Raises Refusal where nothing is kept.
-    """
+    """Store the valid campaigns. Returns a CampaignResult, or a BatchResult for a form or a list, and whether the
+    request is a repetition. Raises Refusal if nothing is stored."""
     request = options.request(uploads)
     if request is not None:
         before = store.read(answers.replayed, request)
@@ -93,7 +91,7 @@ def accept(store: Database, uploads: Sequence[Upload], options: IngestOptions) -
 
 
 def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> RigDescription | None:
-    """The rig description that was sent, or else the one kept with the skin or with that of the corrected campaign."""
+    """The rig description of the request, or else the one stored with the skin or the corrected campaign."""
     for upload in uploads:
         if upload.field == RIG:
             try:
@@ -122,13 +120,13 @@ def sent_rig(upload: Upload) -> RigDescription:
 
 
 def stored_rig(connection: Connection, skin_id: str) -> RigDescription | None:
-    """The rig description that is kept with a skin."""
+    """The rig description stored with a skin."""
     document = skins.rig_of(connection, skin_id)
     return None if document is None else from_dict(orjson.loads(document))
 
 
 def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: IngestOptions) -> list[CheckedCampaign]:
-    """The campaigns of all files; one of them all where they go together."""
+    """The campaigns of all files; a single one if the files belong together."""
     files: list[ReadCampaign] = []
     recordings = 0
     held = HeldArrays(options.most_unfolded_bytes)
@@ -157,7 +155,7 @@ def _require_keepable(arrived: Sequence[CheckedCampaign], options: IngestOptions
 
 
 def _in_words(arrived: Sequence[CheckedCampaign]) -> str:
-    """The first errors; those alike of many recordings are one."""
+    """The first errors in words; equal errors of many recordings are merged."""
     messages = [line for file in arrived for line in _lines(file)]
     if not messages:
         return "No campaign was sent."
@@ -177,7 +175,7 @@ def _lines(campaign: CheckedCampaign) -> list[str]:
 
 
 def _flat(campaign: CheckedCampaign, *, many: bool) -> list[dict[str, Any]]:
-    """All errors of a campaign as a problem lists them."""
+    """All errors of a campaign, in the form of a problem document."""
     prefix = f"{campaign.file}: " if many and campaign.file else ""
     placed = [
         (f"{_recording_prefix(refused['id'])}.", error) for refused in campaign.refused for error in refused["errors"]
@@ -219,7 +217,7 @@ def _store_campaign(
 
 
 def _of_corrected(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
-    """What is said of a correction that changes nothing, or names another skin than the campaign it corrects is on."""
+    """Notes on a correction that changes nothing, or that names another skin than the corrected campaign's."""
     same = repeats.changes_nothing(connection, campaign, options.skin, options.corrects)
     notes = ["it says the same as the campaign that it corrects"] if same else []
     stored_skin = None if options.skin else repeats.otherwise_named(connection, campaign, options.corrects)
@@ -230,7 +228,7 @@ def _of_corrected(connection: Connection, campaign: Campaign, options: IngestOpt
 
 
 def _repeats(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
-    """What is said of recordings that are here already."""
+    """Notes on recordings that are already stored."""
     earlier = repeats.earlier_campaign(connection, campaign, options.skin, options.corrects)
     if earlier is None:
         return []

@@ -1,4 +1,4 @@
-"""From uploaded files to campaigns, with what is wrong in each."""
+"""Reads uploaded files as campaigns, with the errors in each."""
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
@@ -40,7 +40,7 @@ _MOST_ERRORS = 100  # listed of each campaign
 
 @asynccontextmanager
 async def keeping(store: Database) -> AsyncIterator[None]:
-    """A place for reading what is kept at once; raises OperationalError where others have just waited in vain."""
+    """A slot for reading data that is stored at once; raises OperationalError if writers have just waited in vain."""
     async with _KEEPING_SLOTS:
         store.require_hope()
         yield
@@ -48,7 +48,7 @@ async def keeping(store: Database) -> AsyncIterator[None]:
 
 @dataclass(frozen=True)
 class ReadCampaign:
-    """What was read of one campaign, or why the whole is refused."""
+    """A campaign as read, or the reason why it is rejected as a whole."""
 
     file: str | None
     reading: Reading | None = None
@@ -59,24 +59,24 @@ class ReadCampaign:
 
     @property
     def recordings(self) -> int:
-        """How many were sent, good or not."""
+        """Number of recordings sent, valid or not."""
         if self.reading is None:
             return 0
         refused = {problem.recording for problem in self.reading.problems}
         return len(refused) + len(self.reading.campaign.recordings)
 
     def with_estimator(self, estimator: Estimator | None) -> "ReadCampaign":
-        """The same with the FRFs of its time series estimated so."""
+        """The same with the FRFs of its time series estimated by this estimator."""
         return replace(self, reading=None if self.reading is None else self.reading.with_estimator(estimator))
 
     def with_curves_turned(self) -> "ReadCampaign":
-        """The same with curves that count pressing negative turned."""
+        """The same with the sign of curves reversed that count pressing negative."""
         return replace(self, reading=None if self.reading is None else self.reading.with_curves_turned())
 
 
 @dataclass(frozen=True)
 class CheckedCampaign:
-    """What one campaign became: None where the whole was refused; `refused` has one entry a recording."""
+    """A checked campaign, None if it was rejected as a whole; `refused` has one entry per rejected recording."""
 
     file: str | None
     campaign: Campaign | None = None
@@ -91,7 +91,7 @@ class CheckedCampaign:
 
 @dataclass(frozen=True)
 class InspectedFile:
-    """A file that was read and not stored: its format, its channels where it has any, and its campaigns."""
+    """A file that was read but not stored: its format, its channels if any, and its campaigns."""
 
     kind: str
     contents: Contents | None
@@ -99,7 +99,7 @@ class InspectedFile:
 
 
 def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> InspectedFile:
-    """The campaigns of a file, by its content, with its format and channels: JSON may hold one or a list of them."""
+    """The campaigns of a file, by its content, with its format and channels; JSON may hold one or a list of them."""
     label = upload.label or _UNLABELLED
     kind, contents = "", None
     try:
@@ -124,7 +124,7 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
 def _understood(
     held: Contents | Document, label: str, rig: RigDescription | None, stated: Mapping[str, Any] | None
 ) -> Reading:
-    """A file by its rig description and what was said of it alone, which is then told."""
+    """A file read by its rig description and by the values stated for this file alone, which are reported as a note."""
     if rig is None or not stated or not isinstance(held, Contents):
         return understood(held, label, rig)
     reading = understood(held, label, rig.with_recording(stated))
@@ -132,7 +132,7 @@ def _understood(
 
 
 def checked(read: ReadCampaign) -> CheckedCampaign:
-    """A campaign with its refused recordings; one of which nothing is left is refused as a whole."""
+    """A campaign with its rejected recordings; a campaign without a valid recording is rejected as a whole."""
     written_by = () if read.instrument is None else (read.instrument,)
     campaign_checked = CheckedCampaign(
         read.file, errors=read.errors, by_rig=read.by_rig, in_list=read.in_list, instruments=written_by
@@ -157,10 +157,8 @@ def checked(read: ReadCampaign) -> CheckedCampaign:
 
 
 def joined(files_read: Sequence[ReadCampaign], name: str, skin_id: str | None) -> CheckedCampaign:
-    """All of them as one campaign; a file that cannot be read is a refused recording, by the file's name.
-
-    Raises InvalidInput where they are not of one skin.
-    """
+    """All files as one campaign; an unreadable file counts as a rejected recording with the file's name. Raises
+    InvalidInput if the files are of several skins."""
     files = [(file.file or _UNLABELLED, file.reading) for file in files_read if file.reading is not None]
     unread = [{"id": file.file or _UNLABELLED, "errors": file.errors} for file in files_read if file.reading is None]
     in_list = files_read[0].in_list
@@ -175,7 +173,7 @@ def joined(files_read: Sequence[ReadCampaign], name: str, skin_id: str | None) -
 
 
 def require_few(campaigns: int, recordings: int) -> None:
-    """Refuses a request of more than can be answered in one go."""
+    """Rejects a request with more recordings than one answer can hold."""
     for count, most, noun in ((campaigns, MOST_CAMPAIGNS, "campaigns"), (recordings, MOST_RECORDINGS, "recordings")):
         if count > most:
             raise Refusal(413, f"A request may bring up to {most} {noun}; send more in several requests.")
@@ -250,5 +248,5 @@ def _invalid(error: InvalidInput) -> dict[str, Any]:
 
 
 def field_error(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
-    """An error as answers and pages list it."""
+    """An error in the form of answers and pages."""
     return dict(zip(_LISTED, (str(code), name, value, allowed), strict=True))

@@ -1,4 +1,4 @@
-"""What a rig description says, in sentences that are kept with the campaigns that were read by it."""
+"""A rig description in sentences, stored with the campaigns that were read with it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,8 +11,8 @@ _CURVES = {"file": "a curve is the whole file", "groups": "a curve is each group
 
 
 def rig_sentences(rig: RigDescription) -> list[str]:
-    """A sentence for each channel, one for all that is said of the recordings, and one for what a curve is, if that is
-    said. Of formulas, tare and trim the reading's own notes tell."""
+    """A sentence for each channel, one for the values stated for the recordings, and one for the definition of a curve,
+    if stated. Formulas, tare and trim are in the reader's own notes."""
     channels = [f"{CHANNELS[field]}: {_channel(rig, mapping)}" for field, mapping in rig.channels.items()]
     values = _values(rig.recording)
     recordings = [f"said of its recordings: {'; '.join(values)}"] if values else []
@@ -26,7 +26,7 @@ def template_sentence(fields: Mapping[str, Any]) -> str:
 
 
 def typed_of(rig: RigDescription) -> list[str]:
-    """What was typed of all recordings alike, a value each, and is not read from each file."""
+    """The values typed for all recordings, as opposed to values read from each file."""
     return _values({field: value for field, value in rig.recording.items() if not isinstance(value, Property)})
 
 

@@ -1,4 +1,4 @@
-"""An exported skin: looked at, and brought in. Every part of its file is checked before the first is kept."""
+"""Import of an exported skin. Every part of its file is checked before anything is stored."""
 
 import asyncio
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ class ExportedCampaignSummary:
 
 @dataclass(frozen=True)
 class CheckedExport:
-    """A file of which every part was checked; `clashes`: sentences, what of it contradicts the store."""
+    """A file of which every part was checked; `clashes`: contradictions with the store, in sentences."""
 
     overview: Overview
     skins: import_checks.CheckedOverview
@@ -51,7 +51,7 @@ class CheckedExport:
 
 
 def look(store: Database, upload: Upload) -> CheckedExport:
-    """Check a file against itself and against the store; raises InvalidInput that names what in it is wrong."""
+    """Check a file in itself and against the store; raises InvalidInput naming the invalid part."""
     with upload.path.open("rb") as stream, _naming_the_part(upload, ""):
         overview = read_overview(stream, _label(upload))
         skins = import_checks.overview(overview)
@@ -82,7 +82,7 @@ def look(store: Database, upload: Upload) -> CheckedExport:
 
 
 def bring_in(store: Database, upload: Upload) -> Imported:
-    """Keep what is not there; raises as `look`, and Conflict, with nothing kept, where it contradicts the store."""
+    """Store what is not there yet; raises as `look`, and Conflict, with nothing stored, if it contradicts the store."""
     checked = look(store, upload)
     if checked.clashes:
         more = f", and {len(checked.clashes) - 1} more clashes" if len(checked.clashes) > 1 else ""
@@ -113,7 +113,7 @@ def _label(upload: Upload) -> str:
 
 @contextmanager
 def _naming_the_part(upload: Upload, part: str) -> Iterator[None]:
-    """Turns what is raised about a part of a file into InvalidInput that names the part."""
+    """Turns exceptions about a part of a file into InvalidInput that names the part."""
     try:
         yield
     except InvalidInput as error:
@@ -125,7 +125,7 @@ def _naming_the_part(upload: Upload, part: str) -> Iterator[None]:
 
 
 def _words(error: Exception) -> str:
-    """What is wrong, where pydantic and look-ups say it in many lines."""
+    """An error of pydantic or of a look-up in one line."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False)[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg'][:1].lower()}{first['msg'][1:]}"[:500]

@@ -1,6 +1,6 @@
-"""Next experiments within the limits of a rig: each is planned in a worker process, one at a time.
+"""Next experiments within the limits of a rig, each planned in a worker process, one at a time.
 
-Plans are not stored: a server remembers the latest ones, and plans again after a restart.
+Plans are not stored: a server caches the latest, and computes them again after a restart.
 """
 
 import threading
@@ -26,7 +26,7 @@ _RETRY_S = 60.0  # how long a failure is answered before the plan is tried again
 
 @dataclass
 class Planned:
-    """One plan; `plan` is empty where no experiment would separate the explanations better."""
+    """One plan; `plan` is empty if no experiment would separate the explanations better."""
 
     state: Literal["queued", "running", "done", "failed"] = "queued"
     progress: float = 0.0
@@ -40,7 +40,7 @@ class Planned:
 
 
 class Planner:
-    """Plans next experiments one after another, until `stop`, and remembers the latest."""
+    """Plans next experiments one after another until `stop`, and caches the latest."""
 
     def __init__(self, store: Database, processes: WorkerProcesses, workers: int) -> None:
         """`workers`: 0 where this server runs no diagnoses and plans nothing."""
@@ -54,8 +54,8 @@ class Planner:
         self._thread = threading.Thread(target=self._work, name="planning", daemon=True)
 
     def plan(self, row: AnyRow, limits: "RigLimits") -> Planned:
-        """That of a diagnosis within these limits: begun where it is not known, or failed a minute ago; raises
-        Refusal 503 where too many wait, or where this server runs no diagnoses."""
+        """The plan of a diagnosis within these limits; computed if it is not cached, or failed over a minute ago.
+        Raises Refusal 503 if too many are waiting, or if this server runs no diagnoses."""
         key = (str(row.id), repr(limits))
         with self._lock:
             remembered = self._plans.get(key)
@@ -77,7 +77,7 @@ class Planner:
         return planned
 
     def stop(self) -> None:
-        """End what is being worked out."""
+        """Stop the computation under way."""
         self._ending.set()
         self._waiting.put(None)
         if self._thread.ident is not None:

@@ -1,4 +1,4 @@
-"""The server's end of worker processes: a fork server (fork_server.py), and the workers that it forks."""
+"""The server's side of worker processes: a fork server (fork_server.py) and the workers that it forks."""
 
 import os
 import select
@@ -31,7 +31,7 @@ _LOADING_S = (
 
 
 class ForkServer:
-    """A process that forks workers; it loads the program and a table first."""
+    """A process that forks workers after loading the program and a table."""
 
     def __init__(self, table: Path) -> None:
         """Start it; raises OSError where the system has no room for a process."""
@@ -50,11 +50,11 @@ class ForkServer:
 
     @property
     def runs(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the process is alive."""
         return self._process.poll() is None
 
     def fork(self) -> "WorkerProcess":
-        """A new worker; raises OSError with the process' last words where it has ended or does not answer."""
+        """A new worker; raises OSError with the process's last message if it has ended or does not answer."""
         with ExitStack() as ours, ExitStack() as theirs:
 
             def pipe(*, to_worker: bool) -> BinaryIO:
@@ -93,7 +93,7 @@ class ForkServer:
 
 @dataclass(frozen=True)
 class WorkerProcess:
-    """A worker's process descriptor and what is shared with it; from `status` its exit code can be read at its end."""
+    """A worker's process descriptor and pipes; its exit code can be read from `status` when it has ended."""
 
     descriptor: int
     stdin: BinaryIO
@@ -103,12 +103,12 @@ class WorkerProcess:
     _shared: ExitStack
 
     def kill(self) -> None:
-        """End it, whatever it does."""
+        """Kill the worker."""
         with suppress(ProcessLookupError):
             signal.pidfd_send_signal(self.descriptor, signal.SIGKILL)
 
     def wait(self) -> int | None:
-        """Its exit code, or −signal, once it has ended; None where the process that forked it has ended before."""
+        """Its exit code, or −signal, once it has ended; None if the process that forked it ended before."""
         ended = select.poll()  # select() takes no descriptor beyond 1,023
         ended.register(self.descriptor, select.POLLIN)
         ended.poll()
@@ -116,14 +116,14 @@ class WorkerProcess:
         return int(code) if code else None
 
     def close(self) -> None:
-        """Close what is shared with it."""
+        """Close its pipes."""
         with suppress(OSError):  # what it had not read is lost with it
             self._shared.close()
 
 
 @dataclass(frozen=True)
 class CampaignInput:
-    """A campaign for a worker: its document, its skin, and the recordings left out of it, each with the reason."""
+    """A campaign for a worker: its document, its skin, and the excluded recordings, each with the reason."""
 
     document: bytes
     skin_id: str
@@ -131,7 +131,7 @@ class CampaignInput:
 
     @classmethod
     def of(cls, campaign: Campaign, skin_id: str, excluded: Sequence[tuple[str, str]] = ()) -> Self:
-        """From a campaign that lacks what is left out."""
+        """From a campaign without its excluded recordings."""
         return cls(json_file.write(campaign), skin_id, excluded)
 
 
@@ -141,8 +141,8 @@ def _end_of(stderr: BinaryIO) -> str:
 
 
 class WorkerProcesses:
-    """Workers for jobs. Their fork server starts with the first one, or when it is to be ready, and goes on until
-    `stop` or, where none is to be kept ready, until the last worker has ended."""
+    """Workers for jobs. Their fork server starts with the first worker, or by `get_ready`, and runs until `stop` or, if
+    none is to be kept ready, until the last worker has ended."""
 
     def __init__(
         self, table: Path, table_sha256: str, memory_bytes: int, cpu_seconds: float, *, keeps_ready: bool
@@ -159,7 +159,7 @@ class WorkerProcesses:
         self._lock = threading.Lock()
 
     def get_ready(self) -> None:
-        """See to it that the fork server runs, if it is to be kept ready; without room for it now, a job starts it."""
+        """Start the fork server if it is to be kept ready; if the system has no room now, a job starts it."""
         if self._keeps_ready:
             with self._lock, suppress(OSError):
                 self._running()
@@ -172,7 +172,7 @@ class WorkerProcesses:
         kind: DiagnosisKind = "campaign",
         name: str | None = None,
     ) -> "Worker":
-        """A worker at its job, on campaigns; see `Job`."""
+        """A worker for a job on campaigns; see `Job`."""
         parts = [Part(campaign.skin_id, len(campaign.document), campaign.excluded) for campaign in campaigns]
         job = Job(parts, self.table_sha256, self._memory_bytes, self._cpu_seconds, limits, without, kind, name)
         content = [campaign.document for campaign in campaigns]
@@ -198,7 +198,7 @@ class WorkerProcesses:
         return self._server
 
     def _is_done(self) -> None:
-        """A worker has ended."""
+        """Count a worker that has ended."""
         with self._lock:
             self._at_work -= 1
             if not self._at_work and not self._keeps_ready:
@@ -211,7 +211,7 @@ class WorkerProcesses:
 
 
 class Worker:
-    """A worker at its job. `news` is set when it has ended. Leaving the block ends it in any case."""
+    """A running worker. `news` is set when it has ended. Leaving the block kills it if it still runs."""
 
     def __init__(
         self, job: Job, documents: Sequence[bytes], process: WorkerProcess, is_done: Callable[[], None]
@@ -252,7 +252,7 @@ class Worker:
 
     @property
     def last_words(self) -> str:
-        """The end of what it wrote to stderr."""
+        """The end of its stderr."""
         return _end_of(self._process.stderr)
 
     def _send(self, job: Job, documents: Sequence[bytes]) -> None:

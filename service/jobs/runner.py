@@ -28,16 +28,16 @@ _STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
 def basis(table_sha256: str) -> diagnoses.Basis:
-    """What this server diagnoses with, as it is now."""
+    """The versions with which this server diagnoses at present."""
     return diagnoses.Basis(table_sha256, __version__, digest())
 
 
 @dataclass
 class _Job:
-    """A diagnosis in a thread of this server; without a worker while that starts.
+    """A diagnosis in a thread of this server; it has no worker while that starts.
 
-    One that is `aside` runs beside as many as there are workers, all of them long, and goes back into the queue where
-    it is long itself.
+    A job that is `aside` runs in addition to the regular workers while all of those are busy with long jobs, and
+    returns to the queue if it takes long itself.
     """
 
     row: AnyRow
@@ -48,7 +48,7 @@ class _Job:
 
     @property
     def lasted_s(self) -> float:
-        """How long it runs."""
+        """Its running time [s]."""
         return time.monotonic() - self.started
 
 
@@ -70,12 +70,12 @@ class Runner:
         self._dispatcher = threading.Thread(target=self._dispatch, name="diagnosing", daemon=True)
 
     def start(self) -> None:
-        """Take up what is in the queue, and what was running when its server ended."""
+        """Process the queue, including diagnoses that ran when their server ended."""
         if self._workers:
             self._dispatcher.start()
 
     def stir(self) -> None:
-        """Look at once at what has changed: something new in the queue, or cancelled."""
+        """Check at once for new or cancelled diagnoses."""
         self._stirred.set()
         with self._lock:
             for job in self._jobs.values():
@@ -83,7 +83,7 @@ class Runner:
                     job.worker.news.set()
 
     def stop(self) -> None:
-        """End all workers; what they were at goes back into the queue."""
+        """Kill all workers; their diagnoses return to the queue."""
         self._ending.set()
         self.stir()
         if self._dispatcher.ident is not None:
@@ -126,8 +126,8 @@ class Runner:
             raise OSError(str(error)) from error
 
     def _claim(self) -> bool:
-        """Start the next diagnosis, where there is one and a place for it: that of a worker, or, where all of those
-        have been at theirs for long, one aside, for the smallest."""
+        """Start the next diagnosis if there is one and a free worker or, where all workers have been busy for long, one
+        aside for the smallest."""
         jobs = self._under_way()
         aside = sum(not job.aside for job in jobs) >= self._workers
         if aside and any(job.aside or job.lasted_s < _LONG_S for job in jobs):
@@ -155,7 +155,7 @@ class Runner:
             self._stirred.set()
 
     def _run(self, row: AnyRow) -> None:
-        """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
+        """Run a diagnosis until it has ended, another server has claimed it, or this server ends."""
         without = diagnoses.without(row)
         with self._processes.at_work(self._campaign_inputs(row), None, without, row.kind, row.name) as worker:
             with self._lock:
@@ -181,7 +181,8 @@ class Runner:
                 self._end(row, diagnoses.fail, worker.failure)
 
     def _campaign_inputs(self, row: AnyRow) -> list[CampaignInput]:
-        """The campaigns of a diagnosis, read one after another; those of one name are told apart by their ids."""
+        """The campaigns of a diagnosis, read one after another; campaigns with the same name are distinguished by their
+        ids."""
         members = self._store.read(diagnoses.members, row)
         names = [member.name for member in members]
         campaigns = []
@@ -194,7 +195,7 @@ class Runner:
         return campaigns
 
     def _is_ours(self, row: AnyRow, progress: float) -> bool:
-        """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
+        """Renew the claim; False if it was cancelled or another server claimed it, True if the store fails."""
         try:
             ours = self._store.write(diagnoses.keep_alive, row.number, self._server, progress)
         except _STORE_FAILED as error:
@@ -204,7 +205,7 @@ class Runner:
         return ours
 
     def _end(self, row: AnyRow, change: Callable[..., bool], *outcome: Any) -> None:
-        """Store the outcome, and try again where the store fails: it took long to compute."""
+        """Store the outcome, and retry if the store fails: it took long to compute."""
         while True:
             try:
                 self._store.write(change, row.number, self._server, *outcome)

@@ -1,10 +1,9 @@
-"""A worker: campaigns in, one or several, their report or next experiment out, within a limit on memory.
+"""A worker process: one or several campaigns in, their report or next experiment out, within a memory limit.
 
-It is a process that fork_server.py forks for one job, so that nothing of a job is left for the next.
-
-Standard input: a line of JSON (`Job`), then its campaigns (`campaign/1`), then nothing until the runner ends: a worker
-whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and, of one
-campaign, one with its figures, or one with the plan where the job has limits of a rig, or one with the error.
+fork_server.py forks one process for each job, so no state of a job reaches the next. Standard input: a line of JSON
+(`Job`), then its campaigns (`campaign/1`), then nothing; a worker ends when the runner closes it. Standard output: a
+line of JSON for each progress, then one with the report and, for a single campaign, one with its figures; or one with
+the plan if the job has limits of a rig; or one with the error.
 """
 
 import math
@@ -55,7 +54,7 @@ _FEW_NUMBERS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Part:
-    """A campaign of a job: its skin, how many bytes its document has, and what was left out of it and why."""
+    """A campaign of a job: its skin, the size of its document in bytes, and excluded recordings with the reasons."""
 
     skin_id: str
     size: int
@@ -64,12 +63,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker needs beside the campaigns: what each of them is, the table's hash, the memory and the time on a
-    processor that it may take.
+    """What a worker needs besides the campaigns: a `Part` for each, the table's hash, and limits on memory and CPU
+    time.
 
-    With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report. Mechanisms
-    `without` which it is to be explained are left out. Where it is of several campaigns, of one skin or of a fleet by
-    `kind`, the report bears `name`.
+    With `limits` (of `RigLimits`, by name) it plans the next experiment within them and makes no report. The mechanisms
+    `without` are not used to explain the data. The report of several campaigns, of one skin or of a fleet (`kind`), has
+    the name `name`.
     """
 
     parts: Sequence[Part]
@@ -82,7 +81,7 @@ class Job:
     name: str | None = None
 
     def line(self) -> bytes:
-        """As the worker reads it."""
+        """As one line of JSON."""
         return orjson.dumps(asdict(self), option=orjson.OPT_APPEND_NEWLINE)
 
     @classmethod
@@ -93,7 +92,7 @@ class Job:
 
 
 def work(table: "SigmaTable | None", problem: str) -> None:
-    """The job on standard input; `problem` says why there is no table."""
+    """Do the job on standard input; `problem` says why there is no table."""
     from underskin.errors import UnderskinError
 
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
@@ -123,7 +122,7 @@ def work(table: "SigmaTable | None", problem: str) -> None:
 
 
 def warm_up(table: "SigmaTable") -> None:
-    """Diagnose a few numbers, so that what is loaded at its first use is loaded before the first job."""
+    """Diagnose a few numbers, so that lazily loaded code is loaded before the first job."""
     from underskin.diagnosis.pipeline import diagnose
     from underskin.diagnosis.reporting.figures import figures
     from underskin.diagnosis.reporting.report import report
@@ -135,7 +134,7 @@ def warm_up(table: "SigmaTable") -> None:
 
 
 def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", send_message: SendMessage) -> None:
-    """The report, with what was left out of it among the findings, within the limit on memory."""
+    """The report, with exclusions among its findings, within the memory limit."""
     from underskin.errors import TableError
     from underskin.mechanisms.registry import CATALOGUE
     from underskin.parallel import limit_process
@@ -154,7 +153,7 @@ def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", send_messag
 
 
 def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", send_message: SendMessage) -> None:
-    """One campaign; its figures come after the report, which is kept without them too."""
+    """Diagnose one campaign; its figures follow the report, which is stored even without them."""
     from underskin.diagnosis.pipeline import diagnose, with_refused
     from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.diagnosis.reporting.figures import figures
@@ -174,7 +173,7 @@ def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", send_message: S
 def _together(
     job: Job, readings: "Sequence[Reading]", table: "SigmaTable", send_message: SendMessage
 ) -> dict[str, Any]:
-    """The report of several campaigns of a skin, or of those of a fleet."""
+    """The report on several campaigns of a skin, or on those of a fleet."""
     name = job.name or ""
     campaigns = [reading.campaign for reading in readings]
 
@@ -194,8 +193,8 @@ def _together(
 
 
 def _with_exclusions(job: Job, document: dict[str, Any], readings: "Sequence[Reading]") -> dict[str, Any]:
-    """A report whose findings begin with the recordings that had been excluded; of several campaigns with its name, and
-    with those that are refused."""
+    """A report whose findings start with the recordings excluded beforehand; for several campaigns each finding names
+    its campaign, and rejected recordings follow."""
     from underskin.diagnosis.pipeline import refused
     from underskin.findings.codes import Reason
     from underskin.findings.finding import Finding
@@ -219,7 +218,7 @@ def _with_exclusions(job: Job, document: dict[str, Any], readings: "Sequence[Rea
 
 
 def _read(document: bytes) -> Any:
-    """A campaign's JSON, which the server has written: where it cannot be read, memory is short."""
+    """A campaign's JSON as written by the server: if it cannot be read, memory was short (MemoryError)."""
     try:
         return orjson.loads(document)
     except orjson.JSONDecodeError as error:

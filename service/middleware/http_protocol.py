@@ -1,6 +1,5 @@
-"""HTTP/1.1 as uvicorn speaks it, with limits on what takes memory, time and places without a key: headers and trailers
-without end, requests sent ahead of their answers, clients that stop sending or reading, and many connections.
-"""
+"""HTTP/1.1 by uvicorn, with limits on the use of memory, time and connections by clients without a key: endless
+headers and trailers, pipelined requests, clients that stop sending or reading, and many connections."""
 
 from collections.abc import Sized
 from typing import Any
@@ -18,11 +17,11 @@ _SELDOMEST_CHECK_S = 1.0
 
 
 class _RefusedError(Exception):
-    """A request that is not parsed further; its client was told."""
+    """A request that is not parsed further; the client has been answered."""
 
 
 class _Flow(FlowControl):
-    """Reads no more while requests wait for the answers before theirs."""
+    """Stops reading while pipelined requests wait for earlier answers."""
 
     def __init__(self, transport: Any, waiting: Sized) -> None:
         super().__init__(transport)
@@ -49,7 +48,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         self._answered: float | None = None  # when a request was whose body still comes
 
     def connection_made(self, transport: Any) -> None:
-        """Beyond the limit others give way, or `/health` alone is answered."""
+        """Beyond the limit idle connections are closed, or only `/health` is answered."""
         super().connection_made(transport)
         self.flow = _Flow(transport, self.pipeline)
         if len(self.connections) > self.limits.connections:
@@ -100,7 +99,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         super().on_response_complete()
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse what was sent; without a word where that would stand within, before or after another answer."""
+        """Reject the request; silently if an answer would interfere with another one."""
         if self.transport.is_closing():
             return
         if self.pipeline or (self.cycle is not None and self.cycle.response_started and not self._is_answered()):
@@ -137,7 +136,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
             self.transport.close()
 
     def _is_turn_of_server(self) -> bool:
-        """Whether a request is being answered, or the server does not take more of its body now."""
+        """Whether a request is being answered, or the server currently does not read more of its body."""
         if self.cycle is None or self._is_answered():
             return False
         return not self._in_body or self.flow.read_paused or self.cycle.waiting_for_100_continue
@@ -152,7 +151,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         return [protocol for protocol in ours if protocol is not self and not protocol.transport.is_closing()]
 
     def _find_room(self) -> None:
-        """For this connection, which is one too many unless others are closing."""
+        """Free a place for this connection, which is one too many unless others are closing."""
         open_protocols, most = self._other_connections(), self.limits.connections
         if len(open_protocols) < most:
             return

@@ -1,4 +1,4 @@
-"""Long bodies of JSON are parsed in a process of their own: in this one they would hold up all other requests."""
+"""Long JSON bodies are parsed in a separate process, because parsing in this one would block all other requests."""
 
 import sys
 import tempfile
@@ -23,7 +23,8 @@ class NotJson(Exception):
 
 
 def document_of(body: bytes) -> Any:
-    """What a JSON body holds, long lists of numbers as arrays; raises as `read`, and 413 where a list is too long."""
+    """The content of a JSON body, long lists of numbers as arrays; raises as `read`, and 413 for a list that is too
+    long."""
     with tempfile.TemporaryFile() as stream:
         stream.write(body)
         stream.flush()
@@ -31,9 +32,9 @@ def document_of(body: bytes) -> Any:
 
 
 def read(stream: BinaryIO, most_numbers: int = sys.maxsize) -> Any:
-    """What an open JSON file holds, long lists of numbers as arrays; `most_numbers` may be in one.
+    """The content of an open JSON file, long lists of numbers as arrays; each may have `most_numbers`.
 
-    Raises NotJson, Refusal 422 where a key comes twice, and 413 where it takes too much memory or time.
+    Raises NotJson, Refusal 422 for a repeated key, and 413 if it takes too much memory or time.
     """
     size = stream.seek(0, 2)
     memory_bytes = max(_LEAST_MEMORY_BYTES, _MEMORY_TIMES * size)

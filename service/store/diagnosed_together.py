@@ -1,6 +1,5 @@
-"""What a diagnosis of several campaigns is of: the campaigns as they were when it was asked for, and the skins of which
-all were asked for.
-"""
+"""The campaigns of a diagnosis of several, as they were when it was requested, and the skins of which all campaigns
+were requested."""
 
 import hashlib
 from collections.abc import Sequence
@@ -20,7 +19,7 @@ from service.store.tables import skins as skin_rows
 
 @dataclass(frozen=True)
 class Member:
-    """A campaign of a diagnosis: its number and id, the skin that was asked for, how many recordings are left out."""
+    """A campaign of a diagnosis: its number and id, the requested skin, and how many recordings are excluded."""
 
     number: int
     campaign_id: str
@@ -31,7 +30,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Together:
-    """Campaigns to diagnose together; `all_of`: the skins of which they are all."""
+    """Campaigns to diagnose together; `all_of`: the skins of which all campaigns are meant."""
 
     kind: DiagnosisKind
     name: str
@@ -40,7 +39,7 @@ class Together:
 
     @property
     def sha256(self) -> str:
-        """The same for the same campaigns in the same state, asked for in the same way."""
+        """Equal for the same campaigns in the same state, requested in the same way."""
         members = [[diagnosed.skin_id, diagnosed.campaign_id, diagnosed.excluded] for diagnosed in self.members]
         content = orjson.dumps([self.kind, self.name, members, sorted(self.all_of)])
         return hashlib.sha256(content).hexdigest()
@@ -48,7 +47,7 @@ class Together:
 
 def usable(connection: Connection, skin_id: str) -> list[Member]:
     """The current campaigns with recordings of a skin and of those joined to it, by arrival; locked until the
-    transaction ends, so that they stay so."""
+    transaction ends."""
     query = select(campaigns).where(_usable(skin_id)).order_by(campaigns.c.number).with_for_update()
     return [member(row, skin_id) for row in connection.execute(query)]
 
@@ -76,7 +75,7 @@ def member(row: AnyRow, skin_id: str) -> Member:
 
 
 def keep(connection: Connection, diagnosis: int, together: Together) -> None:
-    """Keep what the diagnosis of this number is of."""
+    """Store the members of the diagnosis with this number."""
     rows = [
         {"diagnosis": diagnosis, "position": position, "campaign": diagnosed.number, "skin_id": diagnosed.skin_id,
          "excluded": diagnosed.excluded}
@@ -90,7 +89,7 @@ def keep(connection: Connection, diagnosis: int, together: Together) -> None:
 
 
 def members_of(connection: Connection, numbers: Sequence[int]) -> dict[int, list[Member]]:
-    """The campaigns of those of these diagnoses that are of several, by the diagnosis' number."""
+    """The members of those of these diagnoses that are of several campaigns, by the diagnosis' number."""
     columns = (campaigns.c.number, campaigns.c.id, campaigns.c.name)
     of_diagnosis = (diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.skin_id, diagnosed_campaigns.c.excluded)
     query = select(*columns, *of_diagnosis).join(campaigns, campaigns.c.number == diagnosed_campaigns.c.campaign)
@@ -102,7 +101,7 @@ def members_of(connection: Connection, numbers: Sequence[int]) -> dict[int, list
 
 
 def all_of(connection: Connection, number: int) -> list[str]:
-    """The skins of which a diagnosis has all campaigns that there were."""
+    """The skins of which a diagnosis has all campaigns that existed."""
     query = select(diagnosed_skins.c.skin_id).where(diagnosed_skins.c.diagnosis == number)
     return list(connection.execute(query.order_by(diagnosed_skins.c.skin_id)).scalars())
 
@@ -120,7 +119,7 @@ def has_other_than(numbers: Select[Any]) -> ColumnElement[bool]:
 
 
 def changed() -> ScalarSelect[str]:
-    """What became of the first campaign that is no longer as a diagnosis of several has it; null where all are."""
+    """What became of the first campaign that is no longer as a diagnosis of several used it; null if none changed."""
     of_diagnosis = diagnosed_campaigns.alias("own")
     its = campaigns.alias("its")
     differs = its.c.excluded != of_diagnosis.c.excluded
@@ -142,7 +141,8 @@ def changed() -> ScalarSelect[str]:
 
 
 def added() -> ScalarSelect[str]:
-    """The first campaign in use that a diagnosis of all of them lacks: it came later; null where there is none."""
+    """The first campaign in use that a diagnosis of all campaigns lacks because it came later; null if there is
+    none."""
     skin_diagnosed, its, new = skin_rows.alias("asked"), skin_rows.alias("counting"), campaigns.alias("new")
     has = diagnosed_campaigns.alias("has")
     there = exists().where(has.c.diagnosis == diagnoses.c.number, has.c.campaign == new.c.number)
@@ -161,7 +161,7 @@ def added() -> ScalarSelect[str]:
 
 
 def outdated(row: AnyRow) -> str | None:
-    """Why a diagnosis of several campaigns is not of them as they are now, by its row; None where it is."""
+    """Why a diagnosis of several campaigns, by its row, is outdated; None if it is up to date."""
     if row.member_changed is not None:
         return str(row.member_changed)
     return None if row.member_added is None else f"campaign {row.member_added} was added"

@@ -1,7 +1,7 @@
-"""Diagnoses that have ended, and the models adopted from them, in a skin's export: out, checked, and in.
+"""Finished diagnoses, and the models adopted from them, in a skin's export: written, checked, and imported.
 
-What waits or runs stays behind: it is asked for again elsewhere. So does what is also of campaigns of other skins,
-which the file lacks. Figures derived with models are computed again.
+Pending diagnoses are not exported, nor those that include campaigns of other skins, which the file lacks. Figures
+derived with models are computed again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -57,7 +57,7 @@ class _D33(BaseModel):
 
 
 class _AnyReport(BaseModel):
-    """What is read again of every report; the rest is handed on."""
+    """The fields of every report that are checked; the rest is passed through."""
 
     document: Literal["report/1"] = Field(alias="schema")
     verdict: Verdict
@@ -70,7 +70,7 @@ class _AnyReport(BaseModel):
 
 
 class _Report(_AnyReport):
-    """Of a report on one campaign d33 too, for a model of the skin may be adopted from it."""
+    """For a report on one campaign also d33, because a model of the skin may be adopted from it."""
 
     d33: _D33 | None
 
@@ -127,7 +127,7 @@ class ModelRow(ImportedRow):
 
 @dataclass(frozen=True)
 class Checked:
-    """Diagnoses and models of an export that hold together."""
+    """Diagnoses and models of an export that are consistent."""
 
     diagnoses: Sequence[DiagnosisRow]
     models: Sequence[ModelRow]
@@ -149,7 +149,7 @@ def checked(
     diagnosed: Sequence[Mapping[str, Any]], adopted: Sequence[Mapping[str, Any]], campaign_ids: Sequence[str],
     skin_ids: Sequence[str],
 ) -> Checked:  # fmt: skip
-    """The rows of an export; raises pydantic's ValidationError, or KeyError where one refers to what is not there."""
+    """The rows of an export; raises pydantic's ValidationError, or KeyError for a reference to a missing row."""
     rows = [DiagnosisRow.model_validate(row) for row in diagnosed]
     model_rows = [ModelRow.model_validate(row) for row in adopted]
     for row in rows:
@@ -175,7 +175,7 @@ def checked(
 
 
 def _require_complete(row: DiagnosisRow, skin_ids: Sequence[str]) -> None:
-    """What a diagnosis says of several campaigns holds together; raises KeyError."""
+    """Check that what a diagnosis says of several campaigns is consistent; raises KeyError."""
     several = row.kind != "campaign"
     if several != (len(row.members) > 1) or several != (row.name is not None) or (row.all_of and not several):
         raise KeyError(f"diagnosis {row.id}: members")
@@ -186,13 +186,13 @@ def _require_complete(row: DiagnosisRow, skin_ids: Sequence[str]) -> None:
 
 
 def stored_ids(connection: Connection, file: Checked) -> set[str]:
-    """Ids of those diagnoses and models that are in the store, the same or not."""
+    """Ids of those diagnoses and models that are in the store, identical or not."""
     ids = {row.id for row in file.diagnoses if holds(connection, diagnoses, id=row.id)}
     return ids | {row.id for row in file.models if holds(connection, models, id=row.id)}
 
 
 def clashes(connection: Connection, file: Checked) -> list[str]:
-    """Which diagnoses and versions of models are there already and differ."""
+    """Diagnoses and models that are in the store and differ."""
     sentences = []
     for row in file.diagnoses:
         there = connection.execute(_DIAGNOSES.where(diagnoses.c.id == row.id)).first()
@@ -206,7 +206,7 @@ def clashes(connection: Connection, file: Checked) -> list[str]:
 
 
 def add(store: Database, file: Checked) -> None:
-    """Keep what is not there; the skins and campaigns are."""
+    """Store what is missing; the skins and campaigns are stored already."""
     with store.writing() as connection:
         for row in file.diagnoses:
             if not holds(connection, diagnoses, id=row.id):

@@ -1,6 +1,6 @@
-"""What an export must be to come into the store: nothing that the service could not have kept itself.
+"""Checks of an export before import: only data that the service could have stored itself are accepted.
 
-Every check raises InvalidInput, or pydantic's ValidationError, KeyError or TypeError where a row has another shape.
+Every check raises InvalidInput, or pydantic's ValidationError, KeyError or TypeError for a row of another shape.
 """
 
 from collections.abc import Sequence
@@ -247,7 +247,7 @@ def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) ->
 
 
 def _require_of(change: ChangeRow, campaigns: Sequence[str]) -> None:
-    """What can be changed of a skin or of one of the campaigns, with values as the service keeps them."""
+    """Check the type and the values of a change of a skin or of one of the campaigns."""
     campaign_id = change.campaign_id
     _require(
         campaign_id is None or campaign_id in campaigns, "changes", campaign_id, "must be of a campaign in the file"
@@ -265,7 +265,7 @@ def _require_of(change: ChangeRow, campaigns: Sequence[str]) -> None:
 
 
 def _require_joined(root: str, rows: Sequence[SkinRow]) -> None:
-    """Each skin once, with an id of ours; every one but the root joined to another, and so in the end to the root."""
+    """Each skin once, with a valid id; all but the root joined to another, and so in the end to the root."""
     joined_to = {row.id: row.joined_to for row in rows}
     _require(root in joined_to, "skin", root, "must be one of the file's skins")
     _require(len(joined_to) == len(rows), "skins", len(rows), "must have ids that differ")

@@ -1,4 +1,4 @@
-"""Whether requests need a key: kept in the store from the first key on, and lifted by `underskin key open` alone."""
+"""Whether requests need a key: stored from the first key on, and lifted only by `underskin key open`."""
 
 from sqlalchemy import Connection, inspect, select
 

@@ -1,4 +1,4 @@
-"""Models of skins, adopted from diagnoses; each stays, and the last one is in force unless it was withdrawn."""
+"""Models of skins, adopted from diagnoses; all are stored, and the latest is in force unless it was withdrawn."""
 
 import secrets
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Skins at a glance: how many campaigns, the latest, d33 over the last few, and what was diagnosed last."""
+"""Overview of skins: number of campaigns, the latest one, d33 over the last few, and the latest diagnosis."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -96,7 +96,7 @@ def glances(
 
 
 def _add_d33(connection: Connection, glance: Glance, campaign: AnyRow, table_sha256: str) -> None:
-    """That of the array in a campaign, by the paper's model and by the one in force."""
+    """Add d33 of the array in a campaign, by the paper's model and by the one in force."""
     by_paper = inversions.find(connection, campaign, table_sha256)
     glance.paper_array = None if by_paper is None else by_paper["array"]
     if glance.model is not None:
@@ -134,7 +134,7 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
 
 
 def measured_sensors(connection: Connection, numbers: Sequence[int], table_sha256: str) -> dict[int, tuple[int, int]]:
-    """Of how many sensors d33 is kept, and how many the skin has, by those campaigns of which any is kept."""
+    """How many sensors have a stored d33, and how many the skin has, by campaign."""
     counted = (
         select(sensor_d33.c.campaign, func.count().label("measured"))
         .join(campaigns, campaigns.c.number == sensor_d33.c.campaign)

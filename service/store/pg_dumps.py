@@ -1,4 +1,4 @@
-"""Dumps of a PostgreSQL store: made by pg_dump, and put in place of the store by pg_restore and psql."""
+"""Dumps of a PostgreSQL store: written by pg_dump, and restored by pg_restore and psql."""
 
 import os
 import re
@@ -43,17 +43,17 @@ def dump(database: Database, part: Path, copied: Copied) -> None:
 
 
 def versions(file: Path) -> list[str]:
-    """What a dump says of its schema's version, after all of it was read; raises StoreError where it is damaged."""
+    """The schema version of a dump, after reading all of it; raises StoreError if it is damaged."""
     _run("pg_restore", "--file=/dev/null", str(file))
     dumped = _run("pg_restore", "--data-only", "--table=alembic_version", "--file=-", str(file)).splitlines()
     return [dumped[number + 1] for number, line in enumerate(dumped) if line.startswith("COPY ")]
 
 
 def replace(database: Database, file: Path, copied: Copied) -> None:
-    """Put a dump in place of the store in one transaction, whose end alone its readers wait for; raises StoreError.
+    """Replace the store by a dump in one transaction; readers wait only for its end. Raises StoreError.
 
-    The dump is read into tables of a schema apart, which then take the names of the store's. Of these none is left,
-    also where the dump's version lacks one.
+    The dump is read into tables of a separate schema, which then take the names of the store's tables. No table of the
+    store remains, even if the dump's version lacks it.
     """
     for program in ("psql", "pg_restore"):
         _require(program)
@@ -84,7 +84,7 @@ def replace(database: Database, file: Path, copied: Copied) -> None:
 def _write_script(
     file: Path, tables: Collection[str], script: IO[bytes], complaints: IO[bytes], copied: Copied
 ) -> bool:
-    """Write a dump as SQL that makes its tables in the schema apart; whether all of it was good."""
+    """Write a dump as SQL that creates its tables in the separate schema; returns whether all of it was good."""
     command = ["pg_restore", "--no-owner", "--file=-"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints) as made:
         assert made.stdin is not None
@@ -111,7 +111,7 @@ def _feed(file: Path, sink: IO[bytes], copied: Copied) -> None:
 
 
 def _in_schema_apart(lines: Iterable[bytes], tables: Collection[str]) -> Iterator[bytes]:
-    """The lines of a dump with another schema before the names of its tables and their sequences; rows as they are."""
+    """The lines of a dump with another schema before the names of its tables and sequences; rows are unchanged."""
     names = "|".join(map(re.escape, tables))
     named = re.compile(rf"\b\w+\.(?=(?:{names})(?:_\w+_seq)?\b)".encode())
     in_rows = False

@@ -1,6 +1,5 @@
-"""Changes taken back, for as long as nothing builds on them: no diagnosis was asked for and no model adopted since, of
-the campaign or of its skin, and no later change of the same stands in between.
-"""
+"""Undo of changes as long as nothing builds on them: no later diagnosis or adopted model of the campaign or its
+skin, and no later change of the same thing."""
 
 from collections.abc import Sequence
 
@@ -21,7 +20,7 @@ _FIGURES = ("withdraw", "exclude", "correct", "join")  # what changes figures; s
 
 
 def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRow:
-    """Take a change back and keep that it was; the change. Raises Missing, Conflict."""
+    """Undo a change and record that; returns the change. Raises Missing, Conflict."""
     if holds(connection, models, id=change_id):
         raise Conflict("This cannot be undone: a model that was withdrawn is adopted again from its diagnosis.")
     change = kept.find(connection, change_id)
@@ -51,10 +50,10 @@ def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRo
 
 
 def standing(connection: Connection, change: AnyRow, of_same: Sequence[AnyRow]) -> str | None:
-    """Why a change stands: it was undone already, or something builds on it; None where it can be undone.
+    """Why a change cannot be undone: it was undone already, or something builds on it; None if it can.
 
-    `of_same`: all changes of its campaign; of a change of a skin itself, those of the skin that it counts as and of all
-    joined to that.
+    `of_same`: all changes of its campaign; for a change of a skin itself, those of the skin that it counts as and of
+    all joined to that.
     """
     if change.action == "undo":
         return "it took another change back"
@@ -79,7 +78,7 @@ def of_same(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
 
 
 def _stacks(change: AnyRow, other: AnyRow) -> bool:
-    """Whether a later change of the same rests on the earlier one."""
+    """Whether a later change of the same thing builds on the earlier one."""
     if other.action == "undo" or _of_figures(change) != _of_figures(other):
         return False
     return _of_figures(change) or other.skin_id == change.skin_id
@@ -90,7 +89,7 @@ def _of_figures(change: AnyRow) -> bool:
 
 
 def _joined_still(connection: Connection, change: AnyRow) -> bool:
-    """Whether the skin counts as itself, and the one that was joined to it as this skin."""
+    """Whether the skin is still a root, and the joined one still counts as it."""
     skin_id, other = change.skin_id, skins.find(connection, change.before["skin_id"])
     return (
         skins.require_root(connection, skin_id) == skin_id
@@ -100,7 +99,7 @@ def _joined_still(connection: Connection, change: AnyRow) -> bool:
 
 
 def _corrected_since(connection: Connection, change: AnyRow) -> str | None:
-    """The correction itself is a change of the campaign that took the place of this one."""
+    """Whether the campaign was corrected since; the correction itself is a change of the campaign that replaced it."""
     newer = select(campaigns.c.corrected_by).where(campaigns.c.id == change.campaign_id)
     corrected_by = connection.execute(newer).scalar()
     return None if corrected_by is None else f"its campaign was corrected since, by {corrected_by!r}"
@@ -121,8 +120,8 @@ def _built_since(connection: Connection, change: AnyRow) -> str | None:
 
 
 def _built_on(connection: Connection, change: AnyRow, root: str) -> str | None:
-    """What was built since on a skin and on all that count as it, or on the campaign that was changed; their times are
-    in the order in which they were made (moments.py)."""
+    """What was built since on a skin and all that count as it, or on the changed campaign; times are in order of
+    creation (moments.py)."""
     numbers = numbers_of(root)
     of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     if change.campaign_id is not None:
@@ -164,7 +163,7 @@ def _uncorrect(connection: Connection, change: AnyRow, made_from: str | None) ->
 
 
 def _part(connection: Connection, change: AnyRow) -> None:
-    """Let the skin that was joined, and those that counted as it, count for themselves again."""
+    """Separate the joined skin, and those that counted as it."""
     other, members = change.before["skin_id"], change.before["members"]
     counted = skin_rows.c.id.in_(members) & (skin_rows.c.root_id == change.skin_id)
     connection.execute(update(skin_rows).where(counted).values(root_id=other))
