@@ -102,13 +102,13 @@ def _curve(
         force = true_modulus(experiment) * cylinder_force(experiment.effects, shape, time, displacement)
     reading = instrument.shown(experiment, number, time, displacement, force)
     measured, noisy = instrument.noisy(experiment, number, reading)
-    header: dict[str, Any] = {"id": f"c{number + 1:02d}", "kind": experiment.kind, **shape}
-    header |= {"displacement_mm": _written(measured), "force_n": _written(noisy)}
+    recording: dict[str, Any] = {"id": f"c{number + 1:02d}", "kind": experiment.kind, **shape}
+    recording |= {"displacement_mm": _written(measured), "force_n": _written(noisy)}
     if curves.times:
-        header["time_s"] = _written(time)
+        recording["time_s"] = _written(time)
     if curves.stage_stiffness_n_per_mm and curves.stage_declared:
-        header["stage_stiffness_n_per_mm"] = curves.stage_stiffness_n_per_mm
-    return RecordedCurve(header, reading.displacement_mm, reading.force_n, time, reading.zero_mm)
+        recording["stage_stiffness_n_per_mm"] = curves.stage_stiffness_n_per_mm
+    return RecordedCurve(recording, reading.displacement_mm, reading.force_n, time, reading.zero_mm)
 
 
 def _written(values: Floats) -> list[float]:

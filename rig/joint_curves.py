@@ -44,7 +44,7 @@ class CurvePart:
 
     def __init__(self, curve: RecordedCurve, truth: Experiment, model: Experiment, skin: str, *, free: bool) -> None:
         assert model.curves is not None
-        self._model, self._design, self._skin, self._header = model, model.curves, skin, curve.entry
+        self._model, self._design, self._skin, self._recording = model, model.curves, skin, curve.entry
         at = np.unique(np.linspace(0, len(curve.time_s) - 1, _SAMPLES).astype(int))
         self._time_s = curve.time_s[at]
         self._displacement_mm = (curve.exact_displacement_mm - curve.zero_mm)[at]  # from the touch of the surfaces
@@ -71,7 +71,7 @@ class CurvePart:
         experiment = scaled(assumed, self._skin, values)
         displacement, modulus = self._displacement_mm - shift_mm, true_modulus(experiment)
         if experiment.kind != INDENTATION:
-            return modulus * cylinder_force(experiment.effects, self._header, self._time_s, displacement)
+            return modulus * cylinder_force(experiment.effects, self._recording, self._time_s, displacement)
         body = replace(self._body(experiment, values), modulus=modulus)
         return course(body, self._time_s, displacement, frame_compliance(experiment.effects))[1]
 
@@ -79,7 +79,7 @@ class CurvePart:
         key = tuple(values[name] for name in self._shape)
         if key not in self._bodies:
             deepest = _BEYOND * float(self._displacement_mm.max())
-            radius = self._header["indenter_radius_mm"]
+            radius = self._recording["indenter_radius_mm"]
             self._bodies[key] = pressed_body(experiment, experiment.effects, radius, deepest)
         return self._bodies[key]
 

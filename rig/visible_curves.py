@@ -132,9 +132,9 @@ class _Base:
         return true_modulus(self.experiment) * float(np.exp(log_modulus))
 
     def _neo_hookean(self, number: int, log_modulus: float, shift: float) -> Floats:
-        header = self.recorded[number].entry
-        area = np.pi / 4 * header["sample_diameter_mm"] ** 2
-        stretch = np.maximum(1 - self._displacement(number, shift) / header["sample_height_mm"], _LEAST_STRETCH)
+        recording = self.recorded[number].entry
+        area = np.pi / 4 * recording["sample_diameter_mm"] ** 2
+        stretch = np.maximum(1 - self._displacement(number, shift) / recording["sample_height_mm"], _LEAST_STRETCH)
         return self._modulus(log_modulus) * area * (stretch**-2 - stretch) / 3
 
     def _hertz(self, number: int, log_modulus: float, shift: float) -> Floats:

@@ -55,8 +55,8 @@ class KeyStore:
         return self.path.exists()
 
     def in_use(self) -> bool:
-        """Whether there is or was a file of keys: revoking the last key, or damaging the file, does not open the
-        server."""
+        """Whether the file of keys exists: it does after the last key was revoked and if it is damaged, so neither
+        opens the server."""
         self._keep_fresh()
         return self._stamp is not None
 

@@ -1,4 +1,4 @@
-"""A skin's adopted model: adopted, shown with its evidence, and from the store to rows of a request."""
+"""A skin's adopted model: adoption, display with its evidence, and its application to the rows of a request."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class ModelInForce:
 
 
 def model_in_force(store: Database, skin_id: str) -> ModelInForce:
-    """The model in force; raises Refusal 404 where there is none, Conflict where it is outdated."""
+    """The model in force; raises Refusal 404 if there is none, Conflict if it is outdated."""
     with store.reading() as connection:
         skin = skins.find(connection, skin_id)
         row = None if skin is None else models.in_force(connection, skin.root_id)
@@ -59,7 +59,7 @@ def model_in_force(store: Database, skin_id: str) -> ModelInForce:
 
 
 def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
-    """The model of a diagnosis that is done; raises InvalidInput where it cannot serve."""
+    """The model of a finished diagnosis; raises InvalidInput if it cannot be used as a model."""
     from underskin.prediction.adopted_model import adopted
 
     model = _cache.get(row.id)
@@ -109,7 +109,7 @@ def entry(connection: Connection, row: AnyRow) -> ModelEntry:
 
 
 def requested_model(store: Database, request: PressedSkinColumns) -> ModelInForce:
-    """The model that a request asks for."""
+    """The model named by a request."""
     if request.skin_id is None:
         raise required("skin_id", "is required with model adopted")
     if "contact" in request.model_fields_set:
@@ -131,7 +131,7 @@ class RowsUnderModel:
     _by_paper: Callable[[Mask], Words | None]  # which limit of the paper's model each row exceeds that is not inside
 
     def limits(self, inside: Mask) -> Words | None:
-        """Of each row that is not inside which limit it exceeds; None where all are."""
+        """For each row outside the domain the limit that it exceeds; None if all are inside."""
         limits = self._by_paper(inside)
         return limits and [_OUTSIDE if words == NOT_FINITE else words for words in limits]
 
@@ -147,7 +147,7 @@ class RowsUnderModel:
 
 
 def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinColumns, count: int) -> RowsUnderModel:
-    """The rows of a request, so many, under an adopted model; raises InvalidInput."""
+    """The `count` rows of a request under an adopted model; raises InvalidInput."""
     given = {name: request.column(name) for name in FIELDS}
     transmitted = pressed(table, given, request.units_checked)  # which checks them
     model_in_force.model.require_skin(given)

@@ -1,4 +1,4 @@
-"""What a lab writes to a skin or a campaign, as it is kept: names, notes and tags."""
+"""Annotations of a skin or a campaign in stored form: names, notes and tags."""
 
 from collections.abc import Iterable
 
@@ -30,7 +30,7 @@ def tags(typed: Iterable[str] | None) -> str | None:
 
 
 def words(stored: str | None) -> list[str]:
-    """The tags that are kept, one by one."""
+    """The stored tags as a list."""
     return stored.split(", ") if stored else []
 
 

@@ -65,7 +65,7 @@ def of_array(estimate: "Estimate | None") -> dict[str, float | None] | None:
 
 
 def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
-    """The entries of `moduli`, and those of `excluded` for recordings that tell none."""
+    """The entries of `moduli`, and those of `left_out` for recordings without one."""
     moduli, excluded = [], []
     for recording in recordings:
         if isinstance(recording.result, InvalidInput):

@@ -1,4 +1,4 @@
-"""What was changed of a skin or a campaign, in words: who, when, why, and whether it can be undone."""
+"""Changes of a skin or a campaign in words: who, when, why, and whether they can be undone."""
 
 from collections.abc import Sequence
 
@@ -47,7 +47,7 @@ def _shown(connection: Connection, rows: Sequence[AnyRow], most: int = _MOST) ->
 
 
 def _withdrawn(row: AnyRow) -> Change:
-    """An adopted model withdrawn: it comes back by another adoption, and not by undoing that."""
+    """An adopted model withdrawn: it returns by another adoption, not by an undo."""
     return Change(
         id=row.model_id,
         action="withdraw",

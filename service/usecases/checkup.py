@@ -1,6 +1,6 @@
-"""What can keep a server from its work: store, disk, tables, keys, backups, clock and queue, each looked at once.
+"""Health checks of a server: store, disk, tables, keys, backups, clock and queue.
 
-A check answers with what it found and, where something is wrong, what to do; it changes nothing.
+A check returns its finding and, if something is wrong, what to do; it changes nothing.
 """
 
 import os
@@ -37,7 +37,7 @@ _WAITS_S = 300.0  # a diagnosis in the queue
 
 
 def examine(settings: Settings) -> Iterator[Observation]:
-    """One finding or more of every check; a check that cannot be carried out says so."""
+    """At least one finding per check, also from a check that fails."""
     yield from _of_settings()
     yield from carried_out("data folder", _of_folder(settings.data))
     yield from carried_out("disk", _of_disk(settings))
@@ -153,7 +153,7 @@ def _count_campaigns(connection: Connection) -> int:
 
 
 def _damage(store: Database) -> str:
-    """What SQLite finds wrong with its file; PostgreSQL looks after its own."""
+    """SQLite's integrity errors; PostgreSQL checks itself."""
     if not store.is_sqlite:
         return ""
     uri = Path(str(store.url.database)).absolute().as_uri() + "?mode=ro"

@@ -44,8 +44,8 @@ _NONE: dict[str, Any] = {
 def answer(
     store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None, *, soon: bool = True
 ) -> dict[str, Any]:
-    """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own; given `soon`,
-    or once what is computed could be kept."""
+    """The d33 of a campaign in its present state (fields of D33), over its flat zone or a given band; given `soon`,
+    or once the result could be stored."""
     cached = store.read(inversions.find, row, table.sha256) if band_hz is None else None
     return dict(cached) if cached is not None else _derived(store, table, row, band_hz, soon=soon)[0]
 
@@ -78,9 +78,9 @@ def adopted_answer(
     *,
     soon: bool = True,
 ) -> dict[str, Any]:
-    """As `answer`, under an adopted model: by the lines that the base model would have shown.
+    """As `answer`, under an adopted model: from the lines that the base model would have shown.
 
-    Raises InvalidInput where the campaign lacks what the model needs, or declares the skin otherwise.
+    Raises InvalidInput if the campaign lacks what the model needs, or declares the skin differently.
     """
     model, model_id = model_in_force.model, model_in_force.model_id
     cached = store.read(inversions.find_adopted, row, model_id, table.sha256) if band_hz is None else None
@@ -100,8 +100,8 @@ def adopted_answer(
 def derive(
     store: Database, table: SigmaTable, campaign_ids: Sequence[str], *, soon: bool = False
 ) -> dict[str, dict[str, Any]]:
-    """Compute and keep, by the paper's model and by the one in force; the paper's answers by the campaigns' ids. What
-    fails is logged, and tried again when it is asked for."""
+    """Compute and store d33 by the paper's model and by the one in force; returns the paper's answers by campaign
+    id. Failures are logged, and retried on request."""
     answers = {}
     for campaign_id in campaign_ids:
         try:
@@ -115,7 +115,7 @@ def derive(
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
-    """The findings of a campaign that is not kept yet, after what will give no d33 of its FRFs, and why."""
+    """The findings on a campaign before it is stored, after a note on FRFs that will give no d33, and why."""
     document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **_PAPER}
     fields = _computed(document, campaign, table, None, [])[0]
     findings: list[str] = fields["findings"]
@@ -123,7 +123,7 @@ def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
 
 
 def _without_d33(campaign: Campaign, fields: dict[str, Any], table: SigmaTable) -> list[str]:
-    """In a sentence, that a campaign with FRFs will give no d33, or which of it will not; and what L is."""
+    """A sentence if a campaign's FRFs, or some of them, will give no d33; and the load parameter L."""
     frfs = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings)
     reasons = [exclusion["reason"] for exclusion in fields["left_out"] if exclusion["recording"] is None]
     if not frfs or (fields["status"] == "ok" and not reasons):
@@ -146,8 +146,8 @@ def _without_d33(campaign: Campaign, fields: dict[str, Any], table: SigmaTable) 
 
 
 def complete(store: Database, table: SigmaTable, root: str) -> dict[str, dict[str, Any]]:
-    """Compute what is missing of a skin's current campaigns, and keep it where it can be kept soon; the answers by the
-    campaigns' ids."""
+    """Compute what is missing for a skin's current campaigns, and store it if that is possible soon; returns the
+    answers by campaign id."""
     missing = store.read(inversions.missing_of_skin, root, table.sha256)
     return derive(store, table, [row.id for row in missing], soon=True)
 
@@ -161,7 +161,7 @@ def _derived(
     *,
     soon: bool,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
+    """Answer and numbers, computed, and stored if they are of the flat zone; `spreads`: if known already."""
     campaign, excluded = store.read(_used, row)
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
     document, inversion, failed = _computed(document, campaign, table, band_hz, excluded)
@@ -183,7 +183,7 @@ def of_sensors(document: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
 
 
 def _used(connection: Connection, row: AnyRow) -> tuple[Campaign, list[tuple[str, str]]]:
-    """The campaign without what is excluded; and that, with the reasons."""
+    """The campaign without its excluded recordings; and these, with the reasons."""
     excluded = [(exclusion.recording, exclusion.reason) for exclusion in campaigns.excluded_of(connection, row.number)]
     return campaigns.load(connection, row, with_excluded=False), excluded
 
@@ -195,10 +195,10 @@ def _computed(
     band_hz: BandHz | None,
     excluded: Sequence[tuple[str, str]],
 ) -> "tuple[dict[str, Any], Inversion | None, bool]":
-    """The document with the campaign's figures, the inversion that they are of, where there is one, and whether they
-    failed to be computed; `excluded`: recordings, reasons.
+    """The document with the campaign's figures, its inversion if there is one, and whether the computation failed;
+    `excluded`: recordings with reasons.
 
-    Raises InvalidInput where the band is refused.
+    Raises InvalidInput for an invalid band.
     """
     entries = [{"recording": recording, "reason": reason} for recording, reason in excluded]
     try:
@@ -238,7 +238,7 @@ def _inverted(
 def _array_solved(
     campaign: Campaign, table: SigmaTable, band_hz: BandHz | None, inversion: "Inversion"
 ) -> dict[str, float | None] | None:
-    """The field of `D33`; null too where the contact table cannot be read, which the log says."""
+    """The field of `D33`; also null if the contact table cannot be read, which is logged."""
     from underskin.inversion.other_contact import array_d33_by_other
 
     try:
@@ -249,7 +249,7 @@ def _array_solved(
 
 
 def _keep(store: Database, row: AnyRow, soon: bool, change: Callable[..., None], *derived: Any) -> None:
-    """Where it cannot be kept, or not `soon`, the answer is given all the same."""
+    """Store the answer; if that fails, or is not possible `soon`, it is only returned."""
     try:
         store.require_hope(soon=soon)
         with store.writing(soon=soon) as connection:

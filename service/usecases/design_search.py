@@ -1,9 +1,9 @@
-"""Which skins resolve what is asked: thickness, sensor radius and pitch, searched over the domain of the table.
+"""Search for skins with a required resolution: thickness, sensor radius and pitch over the domain of the table.
 
-What is asked for is the two-point separation of `POST /v1/design`: from which distance on two equal contacts show as
-two wherever the row of sensors lies. The contacts are with the layer itself (`solved`). A thin layer spreads the stress
-less, and a fine pitch samples it more densely; a sensor cannot be wider than the pitch, and two contacts cannot be
-nearer than where they touch.
+The requirement is the two-point separation of `POST /v1/design`: the distance from which two equal contacts show as two
+for every position of the row of sensors. The contacts are with the layer itself (`solved`). A thin layer spreads the
+stress less and a fine pitch samples it more densely; a sensor cannot be wider than the pitch, and two contacts cannot
+be nearer than touching.
 """
 
 from collections.abc import Sequence
@@ -57,8 +57,8 @@ class Offer:
 
 @dataclass(frozen=True)
 class Searched:
-    """The region, which pairs of it meet all limits, what is offered (best first), and in sentences which limit keeps
-    everything out; none of these where something is offered."""
+    """The region, the mask of feasible pairs, the offers (best first) and, if there are none, sentences on the limit
+    that excludes all designs."""
 
     region: Region
     feasible: Mask
@@ -79,7 +79,7 @@ def search(table: SigmaTable, demand: DesignDemand) -> Searched:
 
 @lru_cache(maxsize=32)
 def _region(table: SigmaTable, demand: DesignDemand) -> Region:
-    """All pairs, whatever can be made."""
+    """All pairs, whether or not they can be made."""
     indenter = Indenter.from_lab(indenter_radius_mm=demand.indenter_radius_mm)
     force = float(checked("preload_n", demand.preload_n))
     d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
@@ -114,8 +114,8 @@ def _thinnest_mm(contact_model: ContactModel, skin: Skin, indenter: Indenter, fo
 def _largest_pitch_mm(
     offset: Floats, response: Floats, finest_mm: float, contact_mm: float, demand: DesignDemand
 ) -> float:
-    """From `finest_mm` on, in steps of 0.01 mm: what few placements and distances say, reduced until all those of
-    `POST /v1/design` say the same; NaN where nothing nearby does. `offset`: in m."""
+    """From `finest_mm` on, in steps of 0.01 mm: the pitch from few placements and distances, reduced until all of
+    `POST /v1/design` agree; NaN if none nearby does. `offset`: in m."""
     distance, finest, touching = (
         float(to_si("x_mm", value)) for value in (demand.resolution_mm, finest_mm, 2 * contact_mm)
     )
@@ -133,7 +133,7 @@ def _largest_pitch_mm(
 
 
 def _steps(low: float, high: float, most: float, count: int) -> Floats:
-    """Even in the logarithm, as numbers that one would write."""
+    """Geometric steps, as round numbers."""
     return np.array([float(f"{value:.3g}") for value in np.geomspace(low, min(high, most), count)])
 
 
@@ -147,7 +147,8 @@ def _rounded_up(value: float) -> float:
 
 @dataclass(frozen=True)
 class _Limit:
-    """Which pairs keep it, in words what would do without it, and the number of each pair of which that is the most."""
+    """The mask of pairs that satisfy a limit, the words for the value that would suffice, and the largest such value
+    for each pair."""
 
     satisfied: Mask
     words: str
@@ -179,7 +180,7 @@ def _limits(region: Region, demand: DesignDemand) -> list[_Limit]:
 def _binding(
     table: SigmaTable, demand: DesignDemand, region: Region, resolves: Mask, limits: Sequence[_Limit]
 ) -> list[str]:
-    """Which limit keeps everything out, each with the number that would do."""
+    """Which limit excludes all designs, each with the value that would suffice."""
     finest = float(region.thickness_mm[0]), RADIUS_MM[0], 2 * RADIUS_MM[0]
     if not np.isfinite(region.frf_pc_per_n).any():
         return [f"The table of σ: {_forward(table, demand, *finest)[1].limit}"]

@@ -1,4 +1,4 @@
-"""Diagnoses: asked for, of one campaign or of several together, and described."""
+"""Diagnoses of one campaign or of several together: requested and described."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -20,8 +20,8 @@ _FEWEST = 2  # campaigns of one skin
 def ask(
     connection: Connection, campaign_id: str, table: SigmaTable, sender: str | None, without: Sequence[str] = ()
 ) -> AnyRow:
-    """Queue the diagnosis of a campaign, with this table, version and catalogue; the one that it has already, where it
-    has one. Raises InvalidInput where `without` names a mechanism that is not in the catalogue."""
+    """Queue the diagnosis of a campaign with this table, version and catalogue, or return the existing one. Raises
+    InvalidInput if `without` names an unknown mechanism."""
     _require_listed(without)
     return diagnoses.ask(connection, campaign_id, basis(table.sha256), sender, without)
 
@@ -29,10 +29,10 @@ def ask(
 def ask_of_skin(
     connection: Connection, skin_id: str, table: SigmaTable, sender: str | None, request: AskForSkin
 ) -> AnyRow:
-    """As `ask`, of the campaigns of a skin together.
+    """As `ask`, for campaigns of a skin together.
 
-    Raises Missing where there is no such skin, InvalidInput that names the campaign that is not its own, and Conflict
-    where one is not in use, there are fewer than two, or none has FRFs.
+    Raises Missing for an unknown skin, InvalidInput naming a campaign of another skin, and Conflict if one is not in
+    use, if there are fewer than two, or if none has FRFs.
     """
     root = skins.require_root(connection, skin_id)
     _require_listed(request.without)
@@ -53,10 +53,9 @@ def ask_of_skin(
 
 
 def ask_of_fleet(connection: Connection, table: SigmaTable, sender: str | None, request: AskForFleet) -> AnyRow:
-    """As `ask`, of all campaigns of several skins together.
+    """As `ask`, for all campaigns of several skins together.
 
-    Raises InvalidInput that names the skin that is not there or was given before, and Conflict where one has no
-    campaign in use.
+    Raises InvalidInput naming a skin that is unknown or repeated, and Conflict for one without a campaign in use.
     """
     roots: list[str] = []
     for index, skin_id in enumerate(request.skins):
@@ -81,7 +80,7 @@ def ask_of_fleet(connection: Connection, table: SigmaTable, sender: str | None, 
 def ask_again(
     connection: Connection, diagnosis_id: str, table: SigmaTable, sender: str | None, without: Sequence[str]
 ) -> AnyRow:
-    """Ask for the same of the campaigns as they are now; a diagnosis of all campaigns is then of new ones too."""
+    """Request the same for the campaigns' present state; a diagnosis of all campaigns then includes new ones."""
     row = diagnoses.find(connection, diagnosis_id)
     if row.kind == "campaign":
         return ask(connection, row.campaign_id, table, sender, without)
@@ -104,7 +103,7 @@ def _together(
 
 
 def _chosen(connection: Connection, root: str, campaign_ids: Sequence[str], usable: Sequence[Member]) -> list[Member]:
-    """Those asked for of the campaigns that may be used, by arrival."""
+    """The requested ones of the usable campaigns, by arrival."""
     by_id = {member.campaign_id: member for member in usable}
     for index, campaign_id in enumerate(campaign_ids):
         if campaign_id in campaign_ids[:index]:
@@ -128,10 +127,10 @@ def _not_usable(connection: Connection, root: str, campaign_id: str, index: int)
 
 
 def _require_listed(without: Sequence[str]) -> None:
-    law_names = full_catalogue()
+    by_name = full_catalogue()
     for name in without:
-        if name not in law_names:
-            raise not_one_of("without", name, law_names)
+        if name not in by_name:
+            raise not_one_of("without", name, by_name)
 
 
 def entries(connection: Connection, rows: Sequence[AnyRow]) -> list[dict[str, Any]]:

@@ -1,4 +1,5 @@
-"""The catalogue as it is read: each mechanism with its parameters, what acts like it, where it was found, its file."""
+"""The catalogue for display: each mechanism with its parameters, similar mechanisms, the diagnoses that found it,
+and its file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,10 +32,10 @@ _OTHER_AXES = {  # those that no unnamed law follows
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """A mechanism: `twins` act alike on the reference recordings, the most alike first, or else `nearest` comes
-    closest; `found`: the diagnoses that hold it present with a probability that needs no rivals beside it, whatever
-    else they leave open, `possible`: how many more state it with less; `lacking`: why there is no picture of it;
-    `file` is the document of one of the lab's own."""
+    """A mechanism. `twins`: mechanisms with a similar effect on the reference recordings, the most similar first; if
+    there are none, `nearest` is the closest. `found`: diagnoses that state it with a probability that needs no
+    alternative, `possible`: the number of diagnoses with less. `lacking`: why there is no picture of it; `file`: the
+    document of a mechanism of the lab's own."""
 
     entry: MechanismEntry
     needs: str
@@ -50,14 +51,14 @@ class CatalogueEntry:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """All entries, and how many diagnoses there are in which one could have been found."""
+    """All entries, and the number of diagnoses that could have found one."""
 
     entries: Sequence[CatalogueEntry]
     diagnoses: int
 
 
 def catalogue(store: Database, table: SigmaTable) -> Catalogue:
-    """As it is now."""
+    """The present catalogue."""
     laws, listed = mechanisms.catalogue(), {listed_entry.name: listed_entry for listed_entry in mechanisms.entries()}
     alike, seen = _twins(table, digest()), findings(store)
     return Catalogue(
@@ -70,14 +71,15 @@ def catalogue(store: Database, table: SigmaTable) -> Catalogue:
 
 
 def read_ahead(store: Database, table: SigmaTable) -> None:
-    """Read what takes long at first, before somebody asks for it."""
+    """Load what is slow at first use."""
     mechanisms.catalogue()
     _twins(table, digest())
     findings(store)
 
 
 def effect(name: str, table: SigmaTable) -> LawEffect:
-    """What one does to the reference rig; raises Unsupported where that has not what it follows."""
+    """The effect of a mechanism on the reference rig; raises Unsupported if that lacks the quantity on which it
+    depends."""
     return _effect(name, table, digest())
 
 
@@ -120,7 +122,7 @@ def _axis(name: str) -> str:
 
 
 def _file(entry: MechanismEntry) -> str | None:
-    """The document that a lab's own mechanism was read from; None where it is gone since."""
+    """The document from which a lab's own mechanism was read; None if it is gone."""
     assert entry.package is not None
     path: Path = mechanism_files.folder_of_lab() / entry.package.rsplit(" ", 1)[0]
     try:

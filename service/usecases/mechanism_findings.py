@@ -1,7 +1,7 @@
-"""Where mechanisms were found in this lab: the diagnoses, of campaigns as they are now, whose reports state them.
+"""Diagnoses of this lab that found a mechanism: those of campaigns in their present state.
 
-Reports do not change once they are made, so that what each states is read once and kept by its id: after a restore a
-number may be that of another.
+Finished reports do not change, so the mechanisms of each are read once and cached by its id: after a restore a number
+may be that of another.
 """
 
 import threading
@@ -36,15 +36,15 @@ class FoundIn:
 
 @dataclass(frozen=True)
 class Findings:
-    """By the mechanism's name where it was found, the latest first; and how many diagnoses were looked at."""
+    """The occurrences of each mechanism by name, the latest first; and the number of diagnoses examined."""
 
     by_mechanism: Mapping[str, Sequence[FoundIn]]
     diagnoses: int
 
 
 def findings(store: Database) -> Findings:
-    """Of the latest diagnosis of each campaign in use, and of campaigns together, that left nothing out; one whose
-    campaigns are all in a later one is not counted again."""
+    """From the latest diagnosis of each campaign in use, and of campaigns together, that used all mechanisms; one
+    whose campaigns are all in a later one is skipped."""
     latest = store.read(_latest)
     stated = _stated(store, {row.number: row.id for row in latest})
     by_law: dict[str, list[FoundIn]] = {}
@@ -70,16 +70,16 @@ def _latest(connection: Connection) -> list[AnyRow]:
     ordered = connection.execute(query.order_by(rows_of_diagnoses.c.number.desc()))
     rows = [row for row in ordered if diagnoses.outdated(row) is None]
     members = diagnosed_together.members_of(connection, [row.number for row in rows if row.kind != "campaign"])
-    skins_seen, together = set(), list[tuple[str, frozenset[int]]]()
+    campaigns_seen, together = set(), list[tuple[str, frozenset[int]]]()
     latest: list[AnyRow] = []
     for row in rows:
-        skin_numbers = frozenset(member.number for member in members.get(row.number, ()))
+        campaign_numbers = frozenset(member.number for member in members.get(row.number, ()))
         if row.kind == "campaign":
-            covered = row.campaign in skins_seen
-            skins_seen.add(row.campaign)
+            covered = row.campaign in campaigns_seen
+            campaigns_seen.add(row.campaign)
         else:
-            covered = any(kind == row.kind and skin_numbers <= later for kind, later in together)
-            together.append((row.kind, skin_numbers))
+            covered = any(kind == row.kind and campaign_numbers <= later for kind, later in together)
+            together.append((row.kind, campaign_numbers))
         if not covered:
             latest.append(row)
     return latest

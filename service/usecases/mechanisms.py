@@ -1,4 +1,4 @@
-"""The catalogue of mechanisms, and the lab's own in it: files (`mechanism/1`) in the folder of UNDERSKIN_MECHANISMS."""
+"""The catalogue of mechanisms including the lab's own: files (`mechanism/1`) in the folder of UNDERSKIN_MECHANISMS."""
 
 import threading
 from collections.abc import Mapping
@@ -23,10 +23,8 @@ _loaded = {"digest": digest()}
 
 
 def catalogue() -> Mapping[str, Mechanism]:
-    """The mechanisms by name, with the lab's own as they are now: another server may have changed them.
-
-    Files of the lab's folder that cannot be used are left out (`unusable`).
-    """
+    """The mechanisms by name, with the lab's own as they are now: another server may have changed them. Invalid
+    files of the lab's folder are skipped (`unusable`)."""
     with _lock:
         files_digest = digest()
         if files_digest != _loaded["digest"]:
@@ -36,8 +34,8 @@ def catalogue() -> Mapping[str, Mechanism]:
 
 
 def full_catalogue() -> Mapping[str, Mechanism]:
-    """The same; raises Refusal 409 where a file of the lab's folder cannot be used: a diagnosis without it would be
-    another one."""
+    """The same; raises Refusal 409 if a file of the lab's folder is invalid: a diagnosis without it would be a
+    different one."""
     laws = catalogue()
     try:
         CATALOGUE.require_whole()
@@ -52,7 +50,7 @@ def entries() -> list[MechanismEntry]:
 
 
 def unusable() -> list[UnusableFile]:
-    """The files of the lab's folder that the catalogue lacks, and why."""
+    """The invalid files of the lab's folder, and why."""
     catalogue()
     return [
         UnusableFile(file=Path(error.file).name, reason=": ".join(filter(None, (error.place, error.reason))))
@@ -61,9 +59,9 @@ def unusable() -> list[UnusableFile]:
 
 
 def keep(content: bytes) -> MechanismEntry:
-    """Keep a document as one more of the lab's own; nothing is written before its entry is known.
+    """Store a document as a mechanism of the lab's own; its entry is made before anything is written.
 
-    Raises FileError where it cannot be used, and Refusal 409 where its name is taken.
+    Raises FileError for an invalid document, and Refusal 409 for a name in use.
     """
     folder = mechanism_files.folder_of_lab()
     mechanism = checked(content, "", apart=True)
@@ -94,9 +92,9 @@ def keep_found(connection: Connection, diagnosis_id: str, name: str, description
 
 
 def discard(connection: Connection, name: str) -> MechanismEntry:
-    """Take one of the lab's own out of the catalogue; its file is kept in a folder of discarded ones.
+    """Remove a mechanism of the lab's own from the catalogue; its file is moved to a folder of discarded ones.
 
-    Raises Refusal: 404 for an unknown name, 409 where it is not the lab's own or a model in force needs it.
+    Raises Refusal: 404 for an unknown name, 409 if it is not the lab's own or a model in force needs it.
     """
     mechanism = catalogue().get(name)
     if mechanism is None:

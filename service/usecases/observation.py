@@ -1,4 +1,4 @@
-"""What a check of a server found: in words, how bad it is, and what to do."""
+"""The finding of a server check: in words, its severity, and what to do."""
 
 import stat
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ FILES_OPEN = "see that the disk answers, and that this user is the one that runs
 
 
 class Level(IntEnum):
-    """As monitoring systems count: the exit status of the worst finding."""
+    """Severity as in monitoring systems: the exit status of the worst finding."""
 
     OK = 0
     WARNING = 1
@@ -30,7 +30,7 @@ class Observation:
 
 
 def carried_out(check: str, observations: Iterator[Observation]) -> Iterator[Observation]:
-    """What a check finds; and that, where a disk or a file lets it go no further."""
+    """The findings of a check, and one more if a disk or file error ends it early."""
     try:
         yield from observations
     except OSError as error:

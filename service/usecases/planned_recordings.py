@@ -1,4 +1,4 @@
-"""The recordings of a plan: which of them have arrived, and each one's rig description (`rig/1`)."""
+"""The recordings of a plan: how many have arrived, and each one's rig description (`rig/1`)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,8 +22,8 @@ _OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radiu
 
 
 def arrived(connection: Connection, diagnosis: AnyRow, planned: Sequence[Mapping[str, Any]]) -> list[int]:
-    """How many of each planned recording came for the skin since it was diagnosed, `repeats` at most; each recording in
-    use counts once."""
+    """How many of each planned recording arrived for the skin since it was diagnosed, at most `repeats`; each
+    recording in use counts once."""
     root = skins.require_root(connection, diagnosis.skin_id)
     since = campaigns.c.skin_id.in_(skins.members(root)) & CURRENT & (campaigns.c.received_at > diagnosis.asked_at)
     diagnosed = select(campaigns.c.about).where(campaigns.c.id == diagnosis.campaign_id)
@@ -53,7 +53,7 @@ def _places(about: Mapping[str, Any]) -> dict[str, list[float]]:
 
 
 def _off_centre_mm(conditions: Mapping[str, Any], places: Mapping[str, list[float]]) -> Floats:
-    """From the sensor's place to the sphere's, x and y; 0 where none is given, which means the sensor's own."""
+    """Offset of the sphere from the sensor's position, x and y [mm]; 0 if no position is given."""
     sensor_place = places[conditions["sensor"]]
     return np.subtract(conditions.get("position_mm") or sensor_place, sensor_place)
 
@@ -68,8 +68,8 @@ def _is_planned(recorded: Mapping[str, Any], planned: Mapping[str, Any]) -> bool
 
 
 def rig_description(connection: Connection, row: AnyRow, planned: Mapping[str, Any]) -> dict[str, Any]:
-    """How a file of one planned recording is read: the channels as the skin's own rig description of FRFs has them, or
-    else by the names of the fields. `row`: the campaign that was diagnosed."""
+    """The rig description for a file of one planned recording: channels as in the skin's own rig description of
+    FRFs, or else named as the fields. `row`: the diagnosed campaign."""
     stored = skins.rig_of(connection, row.skin_id)
     document: dict[str, Any] = {} if stored is None else orjson.loads(stored)
     if document.get("kind", "frf") != "frf":

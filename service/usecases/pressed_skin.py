@@ -47,7 +47,7 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
 
 @contextmanager
 def _all_refused(columns: Mapping[str, Floats], units_checked: bool) -> Iterator[None]:
-    """Raises SeveralInvalid with all that is wrong where one of the columns was refused."""
+    """Raises SeveralInvalid with all errors if one of the columns was rejected."""
     try:
         yield
     except InvalidInput as first:
@@ -158,7 +158,7 @@ def _require_lines(request: D33Columns) -> None:
 def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None = None) -> dict[str, Floats]:
     """Mean over the band of each row's lines, and its standard error unless an uncertainty was sent.
 
-    `factor`, of the frequencies, makes of each line what a plateau would show (rows, lines).
+    `factor` of the frequencies converts each line to its plateau value (rows, lines).
     """
     _require_lines(request)
     frequency = non_negative("frequency_hz", request.column("frequency_hz"))

@@ -1,10 +1,10 @@
-"""Backups on a schedule: written, read back, and the oldest ones deleted, while the server answers.
+"""Backups on a schedule, while the server answers: written, read back, and the oldest deleted.
 
-When the next one is due is read from the folder itself, so that a restart neither skips one nor makes one too many. Of
-several servers that share a database and a folder one makes it: it holds a lock on the folder meanwhile. A folder is
-for one store: a file in it says for which, and servers of others make none there. None is deleted while the newest is
-far smaller than the largest, as where a server was started on an empty data folder. Where a folder that held backups is
-empty or gone, its disk is away: none is made in its place, also after a restart, since the data folder notes it.
+The time of the next backup is read from the folder itself, so a restart neither skips nor repeats one. Of several
+servers that share a database and a folder one makes it, holding a lock on the folder. A folder belongs to one store,
+named by a file in it; servers of other stores make none there. Nothing is deleted while the newest backup is far
+smaller than the largest, as when a server was started on an empty data folder. If a folder that held backups is empty
+or gone, its disk is missing: none is made in its place, also after a restart, because the data folder notes it.
 """
 
 import fcntl
@@ -60,12 +60,12 @@ class StoredBackup:
 
     @property
     def age_s(self) -> float:
-        """Seconds since it was made, by this machine's clock; less than 0 where one of the two clocks was wrong."""
+        """Seconds since it was made, by this machine's clock; negative if one of the clocks was wrong."""
         return (datetime.now(UTC) - self.made_at).total_seconds()
 
 
 def stored_backups(folder: Path) -> list[StoredBackup]:
-    """The scheduled backups in a folder, the newest first; what bears another name is left alone."""
+    """The scheduled backups in a folder, the newest first; files with other names are ignored."""
     entries = []
     for path in folder.glob(f"{_PREFIX}*"):
         match = _NAME.fullmatch(path.name)
@@ -76,12 +76,12 @@ def stored_backups(folder: Path) -> list[StoredBackup]:
 
 
 def newest(folder: Path) -> StoredBackup | None:
-    """The newest one that is not of the future: what a wrong clock dated ahead makes none superfluous."""
+    """The newest one not in the future: a backup dated ahead by a wrong clock makes none superfluous."""
     return next((copy for copy in stored_backups(folder) if copy.age_s > -SKEW_S), None)
 
 
 def foreign(store: Database, folder: Path) -> str:
-    """In words, that a folder holds the backups of another store, or that it cannot be told whose; else empty."""
+    """In words, that a folder holds the backups of another store, or of an unknown one; else empty."""
     try:
         owner = (folder / OWNER).read_text().strip()
     except (FileNotFoundError, NotADirectoryError):
@@ -113,12 +113,12 @@ class ScheduledBackups:
 
     @property
     def last(self) -> StoredBackup | None:
-        """The newest of this store, as of the last look: this waits for no disk."""
+        """The newest of this store as of the last check, without waiting for a disk."""
         return self._seen
 
     @property
     def overdue(self) -> bool:
-        """Whether the newest is older than twice the time between two, or there is none of this store."""
+        """Whether the newest is older than two intervals, or there is none of this store."""
         return self._age_s() > 2 * self._every_s
 
     def start(self) -> None:
@@ -147,7 +147,7 @@ class ScheduledBackups:
                 wait = min(_RETRY_S, self._every_s / 10)
 
     def _see(self) -> None:
-        """Keep what `/metrics` says of the newest, which waits for no disk and no database."""
+        """Cache the values of `/metrics` on the newest, so that they wait for no disk or database."""
         last = self._newest()
         self._seen_bytes = 0 if last is None else last.path.stat().st_size
         self._seen = last
@@ -206,7 +206,7 @@ class ScheduledBackups:
         return None if foreign(self._store, self._folder) else newest(self._folder)
 
     def _rotate(self, size: int) -> None:
-        """Delete the oldest, but none while the one just made, of so many bytes, is far smaller than the largest."""
+        """Delete the oldest, unless the one just made, of so many bytes, is far smaller than the largest."""
         entries = [copy for copy in stored_backups(self._folder) if copy.age_s > -SKEW_S]
         largest = max(copy.path.stat().st_size for copy in entries)
         if size < _SMALLER * largest:

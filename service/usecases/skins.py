@@ -1,4 +1,4 @@
-"""Skins: described, joined where two ids mean one; d33 of their sensors over time, with trends and what they omit."""
+"""Skins: described, joined if two ids mean one; d33 of their sensors over time, with trends and exclusions."""
 
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
@@ -66,7 +66,7 @@ def detail(connection: Connection, skin_id: str) -> SkinDetail:
 
 
 def differences(connection: Connection, ids: Sequence[str]) -> list[str]:
-    """What the campaigns sent for several skins declare differently of them, in words."""
+    """Differences between the declarations of several skins by their campaigns, in words."""
     rows = {skin_id: campaigns.describing(connection, skin_id, alone=True) for skin_id in ids}
     declared = {skin_id: row.about["skin"] for skin_id, row in rows.items() if row is not None}
     messages = []
@@ -80,8 +80,8 @@ def differences(connection: Connection, ids: Sequence[str]) -> list[str]:
 
 
 def sensors(connection: Connection, root: str) -> list[Mapping[str, Any]]:
-    """All sensors of a skin, each once, where the latest campaign in use that has it says that it lies; first those
-    of the campaign that describes the skin, which is believed before the others."""
+    """All sensors of a skin, each once, at the position given by the latest campaign in use that has it; first those
+    of the campaign that describes the skin, which takes precedence."""
     describing = campaigns.describing(connection, root)
     if describing is None:
         return []
@@ -101,10 +101,8 @@ def history_by_model(
     model: Literal["paper", "adopted"],
     computed: Mapping[str, Mapping[str, Any]],
 ) -> models.History:
-    """The history of a skin and of those joined to it; `computed`: what `d33_cache.complete` had to compute for it.
-
-    Raises Refusal where there is no adopted model.
-    """
+    """The history of a skin and of those joined to it; `computed`: answers that `d33_cache.complete` had to compute.
+    Raises Refusal without an adopted model."""
     if model == "adopted":
         return _adopted_history(store, table, root)
     return store.read(_paper_history, root, table.sha256, computed)
@@ -113,7 +111,7 @@ def history_by_model(
 def _paper_history(
     connection: Connection, root: str, table_sha256: str, computed: Mapping[str, Mapping[str, Any]]
 ) -> models.History:
-    """From what is kept, and from what was computed and could not be kept."""
+    """From stored answers, and from computed ones that could not be stored."""
     rows = inversions.history(connection, root, table_sha256)
     points = [(row.sensor, _point(row, row.d33_pc_per_n, row.d33_uncertainty_pc_per_n, None)) for row in rows]
     for row in inversions.missing_of_skin(connection, root, table_sha256) if computed else []:
@@ -198,7 +196,7 @@ def _point(row: AnyRow, d33: float, uncertainty: float, model_id: str | None) ->
 def _of_array(
     by_sensor: Mapping[str, Sequence[models.Point]],
 ) -> tuple[models.ArrayTrend | None, dict[str, models.SensorDeparture]]:
-    """What the array did, by the campaigns that tell when they were recorded, and each sensor beside it."""
+    """The trend of the array, by the campaigns with a time of recording, and each sensor relative to it."""
     timed = [point for points in by_sensor.values() for point in points if point.time_is == "recorded"]
     campaigns_in = list({point.campaign_id: point.time for point in sorted(timed, key=_seconds)}.items())
     column = {campaign_id: number for number, (campaign_id, _) in enumerate(campaigns_in)}

@@ -1,4 +1,4 @@
-"""The tables in use: domain and origin of each; those beside σ's are read when a request first needs them."""
+"""The tables in use: domain and origin of each; those other than σ's are read when a request first needs them."""
 
 from collections.abc import Callable
 from functools import cache

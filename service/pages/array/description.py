@@ -1,4 +1,4 @@
-"""An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
+"""An array under loads: the fields of its forms, and the request of `POST /v1/stress` made from them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Described:
-    """What a form says of the array: as it was sent, or else as the skin's campaigns or the prototype have it."""
+    """The array in a form: values as sent, or else those of the skin's campaigns or of the prototype."""
 
     skin_id: str | None
     values: Mapping[str, str]
@@ -50,7 +50,7 @@ class Described:
 
     @property
     def fields(self) -> Sequence[tuple[str, str, str]]:
-        """Those that the form asks for."""
+        """The fields of the form."""
         return FIELDS if self.sensors is not None else (*FIELDS, *GRID)
 
     def document(self) -> dict[str, Any]:
@@ -69,7 +69,7 @@ class Described:
 
 
 def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
-    """The array of a form's fields; a grid of the form's where no campaign of the skin names sensors."""
+    """The array of a form's fields; a regular grid if no campaign of the skin names sensors."""
     sensors = None if skin_id is None else _sensors(store, skin_id)
     values, taken = shown(store, table, given, skin_id)
     if skin_id is not None and sensors is None:
@@ -79,15 +79,14 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
 
 
 def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tuple[str, str]]:
-    """What looks wrong, each with what it is about in the words of these forms; `lines`: of the loads in their
-    text."""
+    """Implausible values, each with the label of its field in these forms; `lines`: the line numbers of the loads."""
     stated = [] if answer is None else answer.findings
     return [(label_of(finding.field, _LABELS, lines), finding.statement) for finding in stated]
 
 
 def finite_strain(answer: ArrayStress | None) -> str | None:
-    """That finite strain, which is in neither charge nor error, adds more than is known; None where no load is so
-    large."""
+    """A warning that finite strain, which neither charge nor error includes, adds more than is known; None for
+    smaller loads."""
     for finding in [] if answer is None else answer.findings:
         load = finding.arguments.get("load_parameter", 0.0)
         if finding.reason is Reason.LOAD_NOT_LINEAR and load > _KNOWN_UP_TO_L:
@@ -102,7 +101,7 @@ def finite_strain(answer: ArrayStress | None) -> str | None:
 def tried(
     request: Request, make: Callable[[], dict[str, Any]], lines: Sequence[int] = ()
 ) -> tuple[dict[str, Any], ArrayStress | None, WrongFields]:
-    """The request that `make` makes, with its answer or what is wrong; `lines` as for `findings`."""
+    """The request made by `make`, with its answer or its errors; `lines` as for `findings`."""
     document: dict[str, Any] = {}
     try:
         document = make()
@@ -113,13 +112,13 @@ def tried(
 
 
 def _form_field(error: InvalidInput) -> str:
-    """The field of the form that holds what is wrong."""
+    """The form's field of an error."""
     loads = error.field.startswith(("contacts", LOAD))
     return "loads" if loads else "map" if error.field.startswith("pressure_map") else error.field
 
 
 def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
-    """What `POST /v1/stress` answers; raises UnderskinError."""
+    """The answer of `POST /v1/stress`; raises UnderskinError."""
     table = influence_table(request.app.state.settings.tables)
     with np.errstate(all="ignore"):  # what overflows is out of reach
         return answer(table, read_request(document))
@@ -133,7 +132,7 @@ def charge_columns(answer: ArrayStress) -> dict[str, list[Any]]:
 def charge_figure(
     answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], radius_mm: float, numbers: str
 ) -> Drawn:
-    """Each sensor coloured by its charge, with the loads where they have positions; `radius_mm`: the sensors'."""
+    """The sensors coloured by charge, with the loads if they have positions; `radius_mm`: sensor radius."""
     from underskin.figures.array_discs import disc_size
     from underskin.figures.loads import loaded_array
 
@@ -168,7 +167,7 @@ def _count(name: str, typed: str) -> float:
 
 
 def _sensors(store: Database, skin_id: str) -> Sequence[Mapping[str, Any]] | None:
-    """Those of the campaign that describes the skin; None where there are none."""
+    """The sensors of the campaign that describes the skin; None if there are none."""
     with store.reading() as connection:
         row = campaigns.describing(connection, skins.require_root(connection, skin_id))
     return None if row is None else row.about["skin"]["sensors"] or None

@@ -49,7 +49,7 @@ Loads = Annotated[str, Query(max_length=_LONGEST)]
 
 @router.get("")
 def view(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
-    """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
+    """The skin and the loads of the address, or else the paper's prototype under two spheres."""
     array = described(store, table, request.query_params, skin)
     lines = [number for number, line in enumerate(loads.splitlines(), 1) if line.strip()]
     document, answer, wrong = tried(request, lambda: _document(array, loads), lines)
@@ -80,7 +80,7 @@ def charge_csv(
 @router.get("/base.csv")
 @each_in_turn
 def base_csv(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
-    """The normal stress on the base, a row for each point of its grid."""
+    """The normal stress on the base, a row for each grid point."""
     document = _document(described(store, table, request.query_params, skin), loads)
     transmitted = _transmitted_contacts(document, answered(request, document))
     stress = _base_stress(request, {**document, "contacts": transmitted or document["contacts"]})
@@ -90,7 +90,7 @@ def base_csv(request: Request, store: Store, table: Table, skin: str | None = No
 
 
 def _figures(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
-    """Charge and stress under the loads that a sensor feels: others would make a map of nothing wide."""
+    """Charge and stress under the loads within reach of a sensor: others would make a wide, empty map."""
     transmitted = _transmitted_contacts(document, answer)
     places = [(load["x_mm"], load["y_mm"]) for load in transmitted]
     charge = charge_figure(answer, places, document["sensor_radius_mm"], f"/loads/charge.csv{_query(request)}")
@@ -102,7 +102,7 @@ def _query(request: Request) -> str:
 
 
 def _on_base(request: Request, document: Mapping[str, Any]) -> list[Drawn]:
-    """The stress on the base; none where there is more than a page should wait for, or show."""
+    """The stress on the base; none if it would take too long for a page or be too large."""
     from underskin.figures.loads import stress_on_base
 
     contacts, sensors = document["contacts"], document["sensors"]
@@ -128,13 +128,13 @@ def _base_stress(request: Request, document: Mapping[str, Any]) -> BaseStress:
 
 
 def _grid(places: Sequence[float], document: Mapping[str, Any]) -> Floats:
-    """Places along an axis, from a margin before the first to one behind the last."""
+    """Coordinates along an axis, from a margin before the first to one behind the last."""
     margin = document["sensor_radius_mm"] + document["thickness_mm"]
     return np.linspace(min(places) - margin, max(places) + margin, _POINTS)
 
 
 def _beyond_reach(document: Mapping[str, Any], answer: ArrayStress, lines: Sequence[int]) -> list[tuple[str, str]]:
-    """Of each load that no sensor feels where it is, and how far off the nearest one lies."""
+    """Messages for the loads that no sensor transmits: where each lies and how far the nearest sensor is."""
     further = f"sensors feel no further than {answer.reach_mm:.3g} mm. It is not drawn."
     return [
         (f"load in line {line}", f"it lies {away:.4g} mm from the nearest sensor and adds nothing: {further}")
@@ -146,7 +146,7 @@ def _beyond_reach(document: Mapping[str, Any], answer: ArrayStress, lines: Seque
 
 
 def _away_mm(document: Mapping[str, Any]) -> list[float]:
-    """How far from each load the nearest sensor lies."""
+    """Distance from each load to the nearest sensor [mm]."""
     sensors = np.array([(sensor["x_mm"], sensor["y_mm"]) for sensor in document["sensors"]])
     return [
         float(np.hypot(*(sensors - (contact["x_mm"], contact["y_mm"])).T).min()) for contact in document["contacts"]
@@ -154,13 +154,13 @@ def _away_mm(document: Mapping[str, Any]) -> list[float]:
 
 
 def _are_transmitted(document: Mapping[str, Any], answer: ArrayStress) -> list[bool]:
-    """Of each load whether a part of its contact lies within the reach of a sensor."""
+    """Whether a part of each load's contact lies within the reach of a sensor."""
     edges = np.array(_away_mm(document)) - answer.contact_radius_mm
     return [bool(edge <= answer.reach_mm) for edge in edges]
 
 
 def _transmitted_contacts(document: Mapping[str, Any], answer: ArrayStress) -> list[Mapping[str, Any]]:
-    """The loads that a sensor feels."""
+    """The loads that a sensor transmits."""
     return [
         contact
         for contact, is_transmitted in zip(document["contacts"], _are_transmitted(document, answer), strict=True)
@@ -169,7 +169,7 @@ def _transmitted_contacts(document: Mapping[str, Any], answer: ArrayStress) -> l
 
 
 def _spheres(document: Mapping[str, Any], lines: Sequence[int]) -> list[tuple[int, str]]:
-    """Of each load its line and the page of the stress under its sphere alone."""
+    """For each load its line and the page of the stress under its sphere alone."""
     skin = {name: document[name] for name in _OF_SKIN if name in document}
     return [
         (
@@ -200,7 +200,7 @@ def _document(array: Described, loads: str) -> dict[str, Any]:
 
 
 def _load(line_number: int, line: str) -> dict[str, Any]:
-    """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
+    """A line of numbers: x, y, radius and force, optionally the tangential force along x and y."""
     parts = numbers(f"{LOAD} {line_number}", line, _PARTS)
     if len(parts) not in (4, 6):
         raise wrong_type(f"{LOAD} {line_number}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")

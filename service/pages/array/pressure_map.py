@@ -1,6 +1,6 @@
-"""A measured map of pressure on an array, and the charge on each of its sensors.
+"""A measured pressure map on an array, and the charge on each of its sensors.
 
-Nothing of it is kept: the map stays in the page's form, and what the page saves is in the page.
+Nothing is stored: the map stays in the page's form.
 """
 
 import base64
@@ -41,14 +41,14 @@ _MAP, _FILE, _SKIN = "map", "file", "skin"
 
 @router.get("")
 def view(request: Request, store: Store, skin: str | None = None) -> Response:
-    """With an example map, which presses one finger on the skin, or on the paper's prototype."""
+    """An example map, a finger pressing on the skin or on the paper's prototype."""
     example = (Path(__file__).parents[1] / "static" / _EXAMPLE).read_bytes()
     return _shown(request, store, {} if skin is None else {_SKIN: skin}, example, "the map")
 
 
 @router.post("")
 async def send(request: Request, store: Store) -> Response:
-    """With the map that was sent as a file, or else as text."""
+    """The map sent as a file, or else as text."""
     folder: UploadFolder = request.app.state.uploads
     async with received(request, folder, _LARGEST_BODY_BYTES) as sent:
         fields = [part for part in sent if part.field not in (_MAP, _FILE)]
@@ -113,12 +113,12 @@ def _csv(columns: Mapping[str, Any]) -> str:
 
 
 def _inside(media_type: str, content: bytes) -> str:
-    """An address that holds what it leads to."""
+    """An address (data URL) that contains the file itself."""
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
 
 def _text(content: bytes) -> str:
-    """The map as the form has it: what is no text, a spreadsheet's own file for one, is not put there."""
+    """The map for the form's text field; empty if it is not text, such as a spreadsheet file."""
     try:
         return text.decode(content, "")
     except UnderskinError:

@@ -23,8 +23,8 @@ _keeping = Lock()
 def figures(
     store: Database, row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str, *, curves: bool
 ) -> list[Drawn]:
-    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it, with its `numbers`. `show`
-    as `measured` has it; `curves`: whether it has recordings of other kinds. What was drawn lately is kept."""
+    """All figures of a campaign in its present state. `answer`: its d33 as in `/d33`, with its `numbers`; `show` as
+    in `measured`; `curves`: whether it has recordings other than FRFs. Recent figures are cached."""
     basis = (row.id, row.revision, answer["table_sha256"], _chosen(answer))
     loaded = cache(lambda: store.read(campaigns.load, row, with_excluded=False))
 
@@ -57,13 +57,14 @@ def band_query(band_hz: tuple[float, float]) -> str:
 
 
 def _chosen(answer: Mapping[str, Any]) -> str:
-    """The band in an address, where the reader chose it."""
+    """The band of the address if the reader chose it."""
     band = answer["band"]
     return band_query((band["low_hz"], band["high_hz"])) if band is not None and band["chosen_by_user"] else ""
 
 
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
-    """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
+    """d33 against preload, per sensor and as a map; if `show` is a sensor, only its points against preload, and it
+    is marked."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
     from underskin.figures.array_discs import disc_size
     from underskin.figures.array_map import Quantity, array_map, told_apart

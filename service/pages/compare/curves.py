@@ -1,4 +1,4 @@
-"""Two campaigns of curves side by side: their curves, and Young's modulus as each campaign has it."""
+"""Two campaigns of curves side by side: the curves, and Young's modulus of each campaign."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _MODULUS = "youngs_modulus_mpa"
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean of moduli [MPa], or the difference of two, with its 95 % interval from how far the curves scatter; a
+    """A mean of moduli [MPa], or the difference of two, with its 95 % interval from the scatter of the curves; a
     single curve has none."""
 
     curves: int
@@ -29,7 +29,7 @@ class Mean:
 
 
 def rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Young's modulus of each curve of a kind, of the first campaign and then of the second."""
+    """Young's modulus of each curve of a kind, first campaign first."""
     return [
         {"which": name, "campaign": row.id, **modulus}
         for name, row, answer in zip(_NAMES, both, answers, strict=True)
@@ -39,8 +39,8 @@ def rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]]
 
 
 def means(of_curves: Sequence[Mapping[str, Any]]) -> list[Mean]:
-    """The mean of the first campaign and of the second, and the second less the first (Welch's interval: the campaigns
-    may scatter differently); none where one has no modulus."""
+    """The mean of each campaign, and the difference second − first (Welch's interval: the variances may differ);
+    empty if one campaign has no modulus."""
     from scipy import stats
 
     first, second = (np.array([row[_MODULUS] for row in of_curves if row["which"] == name]) for name in _NAMES)

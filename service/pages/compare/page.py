@@ -1,5 +1,5 @@
-"""Two campaigns side by side, of one skin or of two: their maps in the same colours, and the map of the difference; of
-curves, these and Young's modulus."""
+"""Two campaigns side by side, of one skin or of two: maps with a common colour scale and the map of the difference;
+for curves, the curves and Young's modulus."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -46,9 +46,9 @@ def compare(
     skin: Chosen = "",
     kind: ChosenKind = None,
 ) -> Response:
-    """Of the campaigns `first` and `second`; where one is not named, of those with recordings of a `kind` in use: of
-    `skin` the one that was recorded first or last, of all the last two of one skin. Without a kind, the first of
-    `KINDS` that the first campaign has, or any."""
+    """Compares the campaigns `first` and `second`. A missing one is chosen from those with recordings of a `kind` in
+    use: of `skin` the one recorded first or last, otherwise the last two of one skin. The default kind is the first
+    of `KINDS` that the first campaign, or any, has."""
     kind = kind or _kind(store, table, skin, first)
     with store.reading() as connection:
         offered = [
@@ -92,7 +92,7 @@ def compare(
 def _pair(
     connection: Connection, skin: str, kind: Kind, listed: Sequence[AnyRow], first: str, second: str
 ) -> tuple[str, str]:
-    """The campaigns that are compared where one is not named; `listed`: those to choose from, the latest first."""
+    """The campaigns to compare if one is not named; `listed`: the candidates, the latest first."""
     if not (skin or first or second):
         for skin_id in dict.fromkeys(row.skin_id for row in listed):
             last = campaigns.current_by_time(connection, skin_id, 2, kind=kind)
@@ -106,13 +106,13 @@ def _pair(
 
 
 def without_common(answers: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """The ids of the sensors of both campaigns, where both have some and none is in both; else empty."""
+    """The ids of the sensors of both campaigns, if both have some and none in common; else empty."""
     ids = [[sensor["sensor"] for sensor in answer["sensors"]] for answer in answers]
     return ids if len(ids) == 2 and all(ids) and set(ids[0]).isdisjoint(ids[1]) else []
 
 
 def moved(both: Sequence[AnyRow], rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, float]]:
-    """Of each sensor with a difference that lies elsewhere in the two campaigns its id and how far off [mm]."""
+    """Of each compared sensor whose position differs between the campaigns its id and the distance [mm]."""
     if len(both) < 2:
         return []
     first, second = (
@@ -166,7 +166,7 @@ def _answer(store: Database, table: SigmaTable, campaign_id: str) -> dict[str, A
 
 
 def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Of each sensor of two campaigns; those of one alone have no difference."""
+    """The rows of the sensors of two campaigns; a sensor of only one has no difference."""
     if len(answers) < 2:
         return []
     of_sensor: dict[str, dict[str, Any]] = {}
@@ -187,7 +187,7 @@ def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
-    """The maps of both in the same colours, and that of the difference; none where no sensor's d33 is known."""
+    """The maps of both with a common colour scale, and that of the difference; none if no d33 is known."""
     from underskin.figures.array_discs import disc_size
     from underskin.figures.array_map import Quantity, array_map, told_apart
 

@@ -1,4 +1,4 @@
-"""The design view: sliders, and at once what the skin would tell."""
+"""The design view: sliders, and the properties of the designed skin, updated at once."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -89,14 +89,14 @@ def sweeps_csv(table: Table, sliders: SlidersOfQuery) -> Response:
 
 @router.get("/response.csv")
 def response_csv(table: Table, sliders: SlidersOfQuery) -> Response:
-    """A sensor's response against the place of the load."""
+    """A sensor's response against the position of the load."""
     return csv_answer("response", _computed(table, sliders).response.model_dump())
 
 
 @dataclass(frozen=True)
 class ShownDesign:
-    """What a design tells, in numbers and figures; the limit of the table that it exceeds; what is wrong with it; its
-    numbers beside those of the pinned one."""
+    """A design's results in numbers and figures; the limit of the table that it exceeds; its errors; its numbers
+    compared with the pinned design's."""
 
     results: Sequence[DesignResult]
     figures: Sequence[Drawn]

@@ -1,4 +1,4 @@
-"""The design the other way round: what is to be resolved, and which skins do."""
+"""The inverse design problem: which skins achieve a required resolution."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _LABELS = {name: f"{words} [{unit}]" for name, words, unit, _ in FIELDS}
 
 @dataclass(frozen=True)
 class Typed:
-    """The skin from which it starts, what stands in the form, and in sentences what nobody declared."""
+    """The skin whose values are the defaults, the values of the form, and sentences on undeclared ones."""
 
     skin_id: str | None
     fields: Mapping[str, str]
@@ -48,7 +48,7 @@ class Typed:
 
     @property
     def demand(self) -> DesignDemand:
-        """What is asked; raises SeveralInvalid."""
+        """The requirement; raises SeveralInvalid."""
         values: dict[str, float] = {}
         with errors_together(list(_LABELS)) as wrong:
             for name, text in self.fields.items():
@@ -97,7 +97,7 @@ def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
 @router.get("/region.csv")
 @each_in_turn
 def region_csv(table: Table, typed: TypedInQuery) -> Response:
-    """Every pair of thickness and sensor radius that was looked at."""
+    """Every examined pair of thickness and sensor radius."""
     with np.errstate(all="ignore"):
         searched = search(table, typed.demand)
     region = searched.region

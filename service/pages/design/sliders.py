@@ -1,4 +1,4 @@
-"""The numbers of a design: where they start and stand, and those of another that is pinned beside it."""
+"""The values of a design: defaults, present values, and those of a pinned design."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,9 +35,9 @@ PIN, ACTION, MATERIAL = "pin", "do", "material"
 
 @dataclass(frozen=True)
 class Sliders:
-    """Where they start and stand, as they were `typed` and as numbers; the `pinned` design, where there is one, which
-    `pin` has as text; what is wrong with what was typed, and with what is pinned; `taken`: in sentences what of it,
-    beyond what the address gives, nobody declared."""
+    """Defaults (`own`) and present values of the sliders, as text (`typed`) and as numbers; the `pinned` design if
+    there is one, as text `pin`; errors of both; `taken`: sentences on values that neither the address nor the skin
+    declares."""
 
     skin_id: str | None
     own: Mapping[str, float]
@@ -51,7 +51,7 @@ class Sliders:
 
 
 def _sliders(request: Request, store: Store, table: Table, skin: str | None = None) -> Sliders:
-    """With the values of the address, or else those of the skin, or of the paper's prototype."""
+    """With the values of the address, or else those of the skin or of the paper's prototype."""
     given = {name: request.query_params[name] for name, *_ in SLIDERS if name in request.query_params}
     start_values, taken = start(store, table, skin, {name: words for name, words in WORDS.items() if name not in given})
     start_values = {name: start_values[name] for name, *_ in SLIDERS}
@@ -66,7 +66,7 @@ SlidersOfQuery = Annotated[Sliders, Depends(_sliders)]
 
 
 def _numbers(own: Mapping[str, float], given: Mapping[str, str]) -> tuple[dict[str, float], InvalidInput | None]:
-    """Those given, or else one's own, and all that is wrong with them."""
+    """The given values, or else the defaults, and all errors."""
     values = dict(own)
     try:
         with errors_together(list(LABELS)) as wrong:
@@ -83,8 +83,8 @@ def _numbers(own: Mapping[str, float], given: Mapping[str, str]) -> tuple[dict[s
 
 
 def after_action(request: Request, sliders: Sliders) -> str | None:
-    """Where a button of the form leads: what stands pinned, or no more, or the value of a material taken; None where
-    none was pressed. Raises InvalidInput for an unknown material."""
+    """The address to which a button of the form leads: design pinned or unpinned, or a material's value used; None
+    if no button was pressed. Raises InvalidInput for an unknown material."""
     action, material = (request.query_params.get(name) for name in (ACTION, MATERIAL))
     if action is None and material is None:
         return None

@@ -14,7 +14,7 @@ FigureColumns = dict[str, list[Any]]
 
 
 def columns(name: str, report: Mapping[str, Any], figures: Mapping[str, str]) -> FigureColumns:
-    """Of the figure `name`; raises KeyError where it has none."""
+    """The columns of the figure `name`; raises KeyError if it has none."""
     return _OF_REPORT[name](report) if name in _OF_REPORT else _OF_FIGURE[name](orjson.loads(figures[name]))
 
 
@@ -88,7 +88,7 @@ def _curve(figure: Mapping[str, Any]) -> FigureColumns:
 
 
 def _frf(figure: Mapping[str, Any]) -> FigureColumns:
-    """Every recording's lines, what models predict of them and leave, and the band of the noise."""
+    """Lines, model predictions, residuals and noise band of every recording."""
     layout, meta = figure["layout"], figure["layout"]["meta"]
     first = {axis: [trace[axis] for trace in figure["data"]] for axis in ("x", "y")}
     buttons = [button for menu in layout.get("updatemenus", []) for button in menu["buttons"]]
@@ -115,7 +115,7 @@ def _by_name(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> FigureColum
 
 
 def _numbers(column: Any) -> list[float]:
-    """A column as plotly writes it: a list, or the bytes of an array; one of two axes row by row."""
+    """A column as plotly writes it: a list, or the bytes of an array; a two-dimensional one row by row."""
     if isinstance(column, Mapping):
         values: list[float] = np.frombuffer(base64.b64decode(column["bdata"]), dtype=column["dtype"]).tolist()
         return values

@@ -1,4 +1,4 @@
-"""A diagnosis: asked for, watched while it runs, read, saved, adopted."""
+"""A diagnosis: requested, monitored while it runs, read, saved, adopted."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -59,7 +59,7 @@ _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # o
 
 @router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, FORM_OF_SESSION])
 def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Puts it into the queue; one that was diagnosed as it is now is shown."""
+    """Queue it; an existing diagnosis of the campaign's present state is shown."""
     row = store.write(usecase.ask, campaign_id, table, sender(request))
     runner.stir()
     return see(f"/diagnoses/{row.id}")
@@ -69,7 +69,7 @@ def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: S
 def ask_again(
     request: Request, diagnosis_id: DiagnosisId, sent: Form, runner: RunnerInUse, store: Store, table: Table
 ) -> Response:
-    """Puts the same into the queue, of the campaigns as they are now, without the mechanisms that the form names."""
+    """Queue the same for the campaigns' present state, without the mechanisms that the form names."""
     row = store.write(usecase.ask_again, diagnosis_id, table, sender(request), sent.get("without", "").split())
     runner.stir()
     return see(f"/diagnoses/{row.id}")
@@ -79,7 +79,7 @@ def ask_again(
 def diagnosis(
     request: Request, diagnosis_id: DiagnosisId, store: Store, table: Table, sensor: str | None = None
 ) -> Response:
-    """How far it is, or what it found; `sensor` picks the one whose recordings and history are shown."""
+    """Its progress or its result; `sensor`: the one whose recordings and history are shown."""
     with store.reading() as connection:
         row, report, figures = _stored(connection, diagnosis_id)
         of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
@@ -120,7 +120,7 @@ def diagnosis(
 
 
 def _outdated(connection: Connection, row: AnyRow) -> str | None:
-    """Why it is not of its campaigns as they are now, with names for the ids of campaigns."""
+    """Why it is outdated, with the names of the campaigns in place of their ids."""
 
     def named(match: re.Match[str]) -> str:
         try:
@@ -134,7 +134,7 @@ def _outdated(connection: Connection, row: AnyRow) -> str | None:
 
 @router.get("/diagnoses/{diagnosis_id}/report.html")
 def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
-    """The whole as one file that needs nothing else, to be kept or sent."""
+    """The report as a single self-contained file."""
     import plotly.io
 
     from underskin.diagnosis.reporting import html_report as file
@@ -151,7 +151,7 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
 
 @router.get("/diagnoses/{diagnosis_id}/planned.csv")
 def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
-    """The recordings that the report plans, a row each."""
+    """The recordings that the report plans, one per row."""
     row, report, _ = _done(store, diagnosis_id)
     planned = (report["next_experiment"] or {}).get("recordings", [])
     if not planned:
@@ -161,7 +161,7 @@ def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
 
 @router.get("/diagnoses/{diagnosis_id}/planned/{number}/rig.yaml")
 def planned_rig(diagnosis_id: DiagnosisId, number: Annotated[int, Path(ge=1)], store: Store) -> Response:
-    """The rig description of one of them, with which its file can be sent."""
+    """The rig description of a planned recording, for sending its file."""
     row, report, _ = _done(store, diagnosis_id)
     return rig_answer(store, row, _planned(store, row, report), number)
 
@@ -180,7 +180,7 @@ def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Respons
 
 @router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[*WRITE, FORM_OF_SESSION])
 def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Response:
-    """Ends it."""
+    """Cancel it."""
     store.write(diagnoses.cancel, diagnosis_id)
     runner.stir()
     return see(f"/diagnoses/{quote(diagnosis_id, safe='')}")
@@ -188,7 +188,7 @@ def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Resp
 
 @router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=[*WRITE, FORM_OF_SESSION])
 def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
-    """Makes it the model of its skin."""
+    """Make it the model of its skin."""
     with store.writing() as connection:
         skin = diagnoses.find(connection, diagnosis_id).skin_id
         model = adopt_model(connection, skin, diagnosis_id, sender(request))
@@ -203,14 +203,14 @@ def _planned(store: Database, row: AnyRow, report: Mapping[str, Any]) -> list[Pl
 
 
 def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[str, str]]:
-    """Mechanisms of the catalogue that the campaign might be diagnosed without, in words, and what would be left out in
-    all."""
+    """Catalogue mechanisms that could be excluded from another diagnosis, in words, and the complete list of those
+    excluded then."""
     named = [name for name in verdicts.mechanisms_of(report) if name in CATALOGUE]
     return [(in_words([name]), " ".join([*without, name])) for name in dict.fromkeys(named)]
 
 
 def _why_not_adopted(report: Mapping[str, Any]) -> str | None:
-    """Why the law that a report holds cannot become a mechanism of the lab's own; None where it can."""
+    """Why the law of a report cannot become a mechanism of the lab's own; None if it can."""
     from underskin.mechanisms.declared.saving import document  # the models, which few pages need
 
     try:
@@ -221,7 +221,7 @@ def _why_not_adopted(report: Mapping[str, Any]) -> str | None:
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
-    """Why a report cannot become a model, and what to do; None where it can."""
+    """Why a report cannot become a model, and what to do; None if it can."""
     from underskin.prediction.adopted_model import implausible_d33, not_adopted
 
     why_not = not_adopted(report)
@@ -235,7 +235,7 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
 
 
 def _settled(report: Mapping[str, Any]) -> bool:
-    """Whether one answer holds four fifths of the probability: an explanation, or one form of an unlisted law."""
+    """Whether one answer has 80 % of the probability: an explanation, or one form of an unlisted law."""
     law = report.get("unnamed")
     share = 1.0 if law is None else law["probability"]
     return report["verdict"] in ("explained", "unexplained") and report["probability"] * share >= EXPLAINED
@@ -254,7 +254,7 @@ def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], d
 
 
 def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> tuple[Markup, Markup]:
-    """The report, worded as the file has it, with the figures of a page; and with what it was made."""
+    """The report in the words of the file, with the page's figures, and its origin."""
     from underskin.diagnosis.reporting import html_report as file
 
     try:
@@ -283,7 +283,7 @@ def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
 
 
 def _about(name: str, text: str) -> str:
-    """What is to be seen in a figure; of the map of the misfit, of what it draws."""
+    """The description of a figure; for the map of the misfit also of the quantity drawn."""
     if name != "where":
         return _ABOUT[name]
     layout = orjson.loads(text)["layout"]

@@ -1,4 +1,4 @@
-"""What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
+"""The next measurement within the limits of the reader's rig; planned in a worker process, and not stored."""
 
 import re
 from collections.abc import Mapping
@@ -47,7 +47,7 @@ _SURVIVES = 0.02  # less probable ones are not weighed
 
 
 def left_open(report: Mapping[str, Any]) -> bool:
-    """Whether a report leaves more than one explanation that recordings could tell apart."""
+    """Whether a report leaves several explanations that further recordings could separate."""
     if report["verdict"] == "unexplained":
         return False
     surviving = sum(alternative["probability"] > _SURVIVES for alternative in report["alternatives"])
@@ -92,7 +92,7 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
 
 @router.get("/recordings.csv")
 def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
-    """The planned recordings, a row each, and how many of each have arrived."""
+    """The planned recordings, one per row, and how many of each have arrived."""
     rows = _rows_of_address(request, diagnosis_id, planner, store)
     names = list(dict.fromkeys(name for planned in rows for name in planned.values))
     cells = [{name: in_a_cell(value) for name, value in planned.values.items()} for planned in rows]
@@ -106,7 +106,7 @@ def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: Planner
 def rig_yaml(
     request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store, number: Annotated[int, Path(ge=1)]
 ) -> Response:
-    """The rig description of one planned recording, with which its file can be sent."""
+    """The rig description of a planned recording, for sending its file."""
     rows = _rows_of_address(request, diagnosis_id, planner, store)
     return rig_answer(store, _diagnosed(store, diagnosis_id)[0], rows, number)
 
@@ -122,7 +122,7 @@ def _rows_of_address(request: Request, diagnosis_id: str, planner: Planner, stor
 
 @router.get("/progress")
 def progress(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
-    """How far it is."""
+    """Its progress."""
     row, _ = _diagnosed(store, diagnosis_id)
     planned = planner.plan(row, _checked(_limits(request.query_params)))
     return JSONResponse({"state": planned.state, "progress": planned.progress})

@@ -1,4 +1,4 @@
-"""The stress under a sphere: section and top view, and the contact as it grows with the load."""
+"""The stress under a sphere: section and top view, and the contact's growth with the load."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ FRAMES = 20  # of the load as it grows to the one that is asked for
 
 @dataclass(frozen=True)
 class ShownField:
-    """The field of a form, its numbers, and the limit of the table that it exceeds; or what is wrong with it."""
+    """The field of a form, its numbers, and the limit of the table that it exceeds; or its errors."""
 
     field: StressField | None
     given: Mapping[str, float]
@@ -54,7 +54,7 @@ class ShownField:
 
 @router.get("")
 def view(request: Request, store: Store, table: Table, skin: str | None = None) -> Response:
-    """With the numbers of the address, or else those of the skin, or of the paper's prototype."""
+    """With the values of the address, or else those of the skin or of the paper's prototype."""
     values, taken = shown(store, table, request.query_params, skin, FIELDS)
     tried = _tried(request, table, values)
     ok = tried.field is not None and tried.outside is None
@@ -122,8 +122,8 @@ def _tried(request: Request, table: SigmaTable, values: Mapping[str, str]) -> Sh
 
 
 def _by_solved_contact(table: SigmaTable, tried: ShownField) -> float | None:
-    """The sensor's mean stress [MPa] where it differs by more than 1 %; None elsewhere, and where it is not known, as
-    without the contact table, of which /tables tells."""
+    """The sensor's mean stress [MPa] with the finite-strain contact if it differs by more than 1 %; None otherwise,
+    or without the contact table, about which /tables informs."""
     given = {name: np.array(value) for name, value in tried.given.items()}
     assert tried.field is not None
     paper = float(tried.field.contact.mean_stress[0])
@@ -135,7 +135,7 @@ def _by_solved_contact(table: SigmaTable, tried: ShownField) -> float | None:
 
 
 def _computed(table: SigmaTable, given: Mapping[str, float], count: int, units_checked: bool) -> StressField:
-    """At so many forces in equal steps up to the one given; raises InvalidInput."""
+    """For `count` forces in equal steps up to the given one; raises InvalidInput."""
     skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
     force = checked("preload_n", given["preload_n"], units_checked=units_checked)
@@ -144,7 +144,7 @@ def _computed(table: SigmaTable, given: Mapping[str, float], count: int, units_c
 
 
 def _sentences(field: StressField, row: int) -> list[str]:
-    """What the load makes, in the order in which the page says it."""
+    """The results for a load, in the order of the page."""
     contact, force = field.contact, float(field.preload[row])
     a = float(contact.contact_radius[row])
     mean = float(to_lab("mean_stress_mpa", contact.mean_stress[row]))

@@ -1,4 +1,4 @@
-"""The glossary: docs/glossary.md as a page, since a lab's server may have no network to read it elsewhere."""
+"""The glossary: docs/glossary.md as a page, because a lab's server may have no network."""
 
 import re
 from functools import cache

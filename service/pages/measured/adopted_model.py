@@ -1,4 +1,4 @@
-"""d33 by a skin's adopted model, beside the paper's, on the page of a few measured values."""
+"""d33 by a skin's adopted model, next to the paper's, on the page of a few measured values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,10 +31,10 @@ _LABELS = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) 
 
 @dataclass(frozen=True)
 class ByModel:
-    """What the model in force says of the same measurements.
+    """The result of the model in force for the same measurements.
 
-    `fields`: what the form asks for besides (name, words, unit, value); `document`: the request of `POST /v1/d33` and
-    `answer`: its answer, both None where `unavailable` says why.
+    `fields`: additional fields of the form (name, words, unit, value); `document`: the request of `POST /v1/d33` and
+    `answer`: its answer, both None if `unavailable` gives a reason.
     """
 
     fields: Sequence[tuple[str, str, str, str]] = ()

@@ -1,4 +1,4 @@
-"""d33 from single measured values of the FRF, for whom a file of recordings would be too much."""
+"""d33 from single measured values of the FRF, without a file of recordings."""
 
 import math
 from collections.abc import Mapping
@@ -131,8 +131,8 @@ def _columns(
 
 
 def _by_solved_contact(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> dict[str, list[float]]:
-    """d33 by it, a row a measurement, where any differs from the paper's by more than 1 %; none without the contact
-    table, of which /tables tells."""
+    """d33 with the finite-strain contact, a row a measurement, if any differs from the paper's by more than 1 %;
+    none without the contact table, about which /tables informs."""
     given = {name: np.asarray(value, dtype=float) for name, value in document.items() if name != UNITS}
     try:
         other = other_contact(table, "paper", given, answer.full("d33_pc_per_n"), units_checked=UNITS in document)
@@ -185,7 +185,7 @@ def _row(line_number: int, line: str, *, units_checked: bool) -> list[float]:
 
 
 def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> list[str]:
-    """Of each row outside the table, which value is and what is allowed; `document`: the request of the answer."""
+    """For each row outside the table the value and the allowed range; `document`: the request of the answer."""
     numbers = [answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
     status = answer.status()
     skin = document["youngs_modulus_mpa"], document["poisson_ratio"]

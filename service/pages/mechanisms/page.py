@@ -1,6 +1,5 @@
-"""The catalogue of mechanisms: what each does to an FRF, in a picture and a formula, what acts like it, where it was
-found; and the lab's own, which are kept from a diagnosis and can be discarded.
-"""
+"""The catalogue of mechanisms: the effect of each on an FRF as picture and formula, similar mechanisms, and
+diagnoses that found it; also the lab's own mechanisms, stored from diagnoses, which can be discarded."""
 
 import base64
 import hashlib
@@ -49,7 +48,7 @@ def mechanisms(request: Request, store: Store, table: Table) -> Response:
 
 @router.get("/{name}/picture.svg")
 def drawn(name: str, request: Request, table: Table) -> Response:
-    """What it does to the FRF of the reference rig, or to its force curve."""
+    """Its effect on the FRF of the reference rig, or on its force curve."""
     content = picture(name, _effect(name, table))
     tag = f'"{hashlib.sha256(content.encode()).hexdigest()[:16]}"'
     headers = {
@@ -94,7 +93,7 @@ def found_csv(name: str, store: Store) -> Response:
 
 @router.post("", dependencies=WRITE)
 def keep_found(sent: Form, store: Store) -> Response:
-    """Keep the law that a diagnosis found."""
+    """Store the law that a diagnosis found as a mechanism."""
     description = sent.get("description", "").strip()[:500] or None
     store.read(usecase.keep_found, sent.get("diagnosis_id", ""), sent.get("name", "").strip(), description)
     return see("/mechanisms")
@@ -102,13 +101,13 @@ def keep_found(sent: Form, store: Store) -> Response:
 
 @router.post("/{name}/discard", dependencies=[*WRITE, FORM_OF_SESSION])
 def discard(name: str, store: Store) -> Response:
-    """Take it out of the catalogue."""
+    """Remove it from the catalogue."""
     store.read(usecase.discard, name)
     return see("/mechanisms")
 
 
 def _effect(name: str, table: SigmaTable) -> LawEffect:
-    """Raises Refusal 404, also where the reference rig has not what the mechanism follows."""
+    """Raises Refusal 404, also if the reference rig lacks the quantity on which the mechanism depends."""
     _require_listed(name)
     try:
         return effect(name, table)

@@ -1,6 +1,5 @@
-"""The picture of a mechanism as SVG: what it does to the FRF of the reference rig, or to a force curve; in the reader's
-colours.
-"""
+"""The picture of a mechanism as SVG: its effect on the FRF of the reference rig or on a force curve, in light or
+dark colours."""
 
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
@@ -101,7 +100,8 @@ def _scaled(values: Floats, low: float, high: float) -> Floats:
 
 
 def _range(curves: Sequence[Floats]) -> tuple[float, float]:
-    """What all curves fill, with an edge; no less than a hundredth of their size, or 1, so that nothing looks so."""
+    """The range of all curves with a margin; at least a hundredth of their magnitude, or 1, so that zero does not
+    look like noise."""
     low, high = float(np.min(curves)), float(np.max(curves))
     half = max((high - low) / 2 * 1.08, 0.01 * max(abs(low), abs(high)), 1e-6)
     half = max(half, 1.0) if max(abs(low), abs(high)) < 1e-6 else half

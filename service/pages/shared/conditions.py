@@ -1,4 +1,4 @@
-"""What a lab noted of its recordings by names of its own, as columns of a table."""
+"""Conditions that a lab noted under names of its own, as columns of a table."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class ConditionColumn:
 
 @dataclass(frozen=True)
 class ConditionColumns:
-    """The columns that are shown, and the names of those for which there is no room."""
+    """The shown columns, and the names of those without room."""
 
     shown: Sequence[ConditionColumn]
     others: Sequence[str]

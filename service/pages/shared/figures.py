@@ -1,4 +1,4 @@
-"""A plotly figure in a page: its JSON, its words, and where its numbers are."""
+"""A plotly figure in a page: its JSON, its description, and the address of its numbers."""
 
 import re
 import unicodedata
@@ -49,7 +49,7 @@ def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None
 
 @cache
 def prepare() -> None:
-    """Load what draws and what it needs, before somebody asks for the first figure: it takes half a second."""
+    """Load the plotting code before the first request for a figure: it takes half a second."""
     import underskin.figures.campaign_figures
     from underskin.figures.frf import frf_overview
 
@@ -66,8 +66,8 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
 
 
 def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:
-    """The first recordings of curves in one figure, of a single one its loading and its way back; none where there are
-    none. `noun`: what they are called."""
+    """The first curve recordings in one figure, for a single one its loading and unloading; empty if there are none.
+    `noun`: their name."""
     from underskin.figures.curves import ForceCurve, force_curves
 
     chosen = [recording for recording in recordings if not isinstance(recording, FrfRecording)]
@@ -85,7 +85,7 @@ def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", num
 
 
 def _there_and_back(curve: CurveRecording) -> list[tuple[str, Floats, Floats]]:
-    """A curve's loading and its way back from the deepest sample, by name; none where it has not both."""
+    """Loading and unloading of a curve, split at the deepest sample, by name; empty if it lacks one."""
     depth, force = np.asarray(curve.displacement_mm), np.asarray(curve.force_n)
     turn = int(np.argmax(depth))
     if not 0 < turn < len(depth) - 1:
@@ -112,7 +112,7 @@ def attachment(file: str, content: str | bytes, media_type: str, **headers: str)
 
 
 def file_name(*parts: str) -> str:
-    """Of what a file is about, such as a skin, a campaign and what of them: without what a file system minds."""
+    """A file name made of skin, campaign and so on, without characters that file systems reject."""
     plain = (_NOT_IN_NAMES.sub("-", part)[:_LONGEST_PART].strip("-.") for part in parts)
     return "-".join(part for part in plain if part)
 
@@ -135,7 +135,7 @@ def columns_of(rows: Sequence[Mapping[str, Any]], *names: str) -> list[list[Any]
 
 
 def sensors_of(row: AnyRow, answer: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Each sensor of the d33 of a campaign, with its place and in words why it stands out (`reasons`)."""
+    """Each sensor of the d33 of a campaign, with its position and in words why it is an outlier (`reasons`)."""
     places = {sensor["id"]: sensor for sensor in row.about["skin"]["sensors"]}
     return [
         {

@@ -1,6 +1,5 @@
-"""Forms: read, and refused unless they were made for this session; what was typed into them, and errors in their own
-words: the labels that the reader sees, not the fields of the request behind them.
-"""
+"""Forms: read, rejected unless made for this session, and errors in the labels that the reader sees instead of the
+request's field names."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -52,7 +51,7 @@ _LABELS = {
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """The fields of a form, the first of each name; raises Refusal where another site may have made it."""
+    """The fields of a form, the first of each name; raises Refusal if another site may have made it."""
     body = b""
     async for chunk in request.stream():
         body += chunk
@@ -68,7 +67,7 @@ async def _fields(request: Request) -> dict[str, str]:
 
 
 def require_form_token(request: Request, token: str) -> None:
-    """Refuses what was not sent from a page of this session."""
+    """Rejects a form that was not sent from a page of this session."""
     if not session.is_form_token(session.cookie_in(dict(request.scope["headers"])), token):
         raise Refusal(403, "This form was not made for your session, or the session has ended: go back and reload it.")
 
@@ -78,7 +77,7 @@ FORM_OF_SESSION = Depends(_fields)  # of a route that needs no field, only that 
 
 
 def reason(sent: dict[str, str]) -> str:
-    """Why, as somebody wrote it; raises InvalidInput."""
+    """The reason typed in a form; raises InvalidInput."""
     why = sent.get("reason", "").strip()
     if not 0 < len(why) <= 1000:
         raise out_of_range("reason", why[:80], "must say why in 1 to 1000 characters")
@@ -108,7 +107,7 @@ def see(path: str) -> RedirectResponse:
 
 @dataclass(frozen=True)
 class RefusedForm:
-    """A form that was refused: which one of its page, why, what was typed into it, and the status of the answer."""
+    """A rejected form: which one of its page, the reason, the typed values, and the status of the answer."""
 
     form: str
     why: str
@@ -117,7 +116,7 @@ class RefusedForm:
 
 
 def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> RefusedForm | None:
-    """Do what a form was sent for; where it cannot be done, the form with the reason."""
+    """Do the action of a form; if it fails, the form with the reason."""
     try:
         do()
     except InvalidInput as error:
@@ -130,8 +129,7 @@ def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> R
 
 
 def number(name: str, typed: str) -> float:
-    """A number that somebody typed, with a decimal point or a decimal comma; raises InvalidInput, also where it is
-    empty."""
+    """A typed number with decimal point or comma; raises InvalidInput, also if it is empty."""
     if not typed.strip():
         raise required(name, "fill it in")
     value = _value(typed)
@@ -142,7 +140,7 @@ def number(name: str, typed: str) -> float:
 
 
 def number_or_text(typed: str) -> float | str | None:
-    """The same; what is no number is left to later checks, which name it. None: nothing was typed."""
+    """The same; text that is not a number is left to later checks, which name it. None if empty."""
     value = _value(typed)
     return typed.strip() or None if value is None else value
 

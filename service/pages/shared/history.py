@@ -37,7 +37,7 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
 
 
 def _trend_in_words(sensor: SensorHistory) -> str:
-    """What the sensor's d33 does over time: beside the array's, where there are enough sensors."""
+    """The trend of the sensor's d33, relative to the array's if there are enough sensors."""
     if sensor.departure is not None:
         return with_minus(_besides(sensor.departure))
     line = sensor.trend

@@ -1,4 +1,4 @@
-"""Templates into answers: every page goes through here, one that shows an error too, and gets its policy here."""
+"""Renders templates as answers: every page, also an error page, gets its content security policy here."""
 
 import gzip
 from functools import cache
@@ -27,7 +27,7 @@ _COMPRESSION = 5  # of 9: the rest takes longer than it saves
 
 @cache
 def _policy() -> str:
-    """Nothing from outside, no script or style of a page's own; plotly sets style attributes, reaching no network."""
+    """Nothing from outside, no inline script or style; plotly sets style attributes, which reach no network."""
     styles = f"'self' {_EMPTY_STYLE} {library_style_hash()}"
     return (
         f"default-src 'none'; script-src 'self'; style-src {styles}; style-src-elem {styles}; "
@@ -98,8 +98,8 @@ def problem_page(refusal: Refusal, request_id: str) -> Response:
 
 
 def compress(request: Request, answer: Response) -> None:
-    """Gzip an answer where the browser reads that. What it holds of secrets is the session's own token, and another
-    site's requests carry no session, so that lengths tell nobody anything."""
+    """Gzip an answer if the browser accepts that. Its only secret is the session's own token, and requests from
+    other sites carry no session, so lengths reveal nothing."""
     if "gzip" in request.headers.get("accept-encoding", ""):
         answer.body = gzip.compress(bytes(answer.body), _COMPRESSION)
         answer.headers.update({"Content-Encoding": "gzip", "Content-Length": str(len(answer.body))})

@@ -1,4 +1,4 @@
-"""Which request would return what a page shows, to copy: for a shell and for Python."""
+"""The request that returns what a page shows, to copy: for a shell and for Python."""
 
 import json
 import shlex

@@ -1,7 +1,5 @@
-"""What a diagnosis came to, in the few words that a list has room for: what it says, how sure it is, what rivals it.
-
-And the model adopted from one, as pages head it: what it adds, since when and until when, d33 by it beside the paper's.
-"""
+"""The result of a diagnosis in the few words of a list: verdict, probability, alternatives. Also the adopted model
+in page headers: what it adds, since when, and d33 by it next to the paper's."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,7 +31,7 @@ _BY_A_LAW = "mismatch by a law that nobody listed"
 
 @dataclass(frozen=True)
 class VerdictSummary:
-    """The diagnosis, the words of its tag, what they mean for the reader, and what stands beside the tag."""
+    """The diagnosis, the words and the mood of its tag, and the text next to the tag."""
 
     id: str
     tag: str
@@ -89,8 +87,8 @@ def _modulus(report: Mapping[str, Any]) -> str | None:
 
 
 def _addition(report: Mapping[str, Any]) -> str:
-    """What the model lacks, each mechanism with its own probability; of several answers each with its probability; or
-    the law; of no mismatch, what is not ruled out."""
+    """The mechanisms that the model lacks with their probabilities; for several answers each with its probability;
+    or the unlisted law; without mismatch, what is not ruled out."""
     verdict, probability = report["verdict"], report["probability"]
     law = report.get("unnamed")
     if verdict == "unexplained" and law:
@@ -140,7 +138,7 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 
 
 def _quoted(report: Mapping[str, Any]) -> str:
-    """Of a report with a d33; why it may not be quoted is what the report states."""
+    """The d33 of a report in words; if it may not be quoted, with the report's reason."""
     from underskin.diagnosis.reporting.wording import as_stated, not_quoted  # with what draws, which takes long
 
     d33 = report["d33"]

@@ -33,8 +33,8 @@ _ENDS: dict[Shown, tuple[str, str]] = {
 def map_rows(
     row: AnyRow, answer: Mapping[str, Any] | None, history: History, places: Sequence[Mapping[str, Any]]
 ) -> list[dict[str, Any]]:
-    """Each sensor of the skin, which has `places`, with its trend, where it has one: as a campaign's answer tells it,
-    else with its last value in `history` and in words since when that stands (`absent`), else without a value."""
+    """A row per sensor in `places`, with its trend if known: from the answer of a campaign, or else its last value
+    in `history` with the date (`absent`), or else without a value."""
     answered = {} if answer is None else {sensor["sensor"]: sensor for sensor in sensors_of(row, answer)}
     histories = {sensor_history.sensor: sensor_history for sensor_history in history.sensors}
     rows = []
@@ -80,7 +80,7 @@ def _trend(line: TrendAnswer, count: int) -> dict[str, Any]:
 def drawn_map(
     root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By, sensor: str | None
 ) -> Drawn:
-    """The sensors of `map_rows` where they lie, one of them chosen; `row` is the campaign that answered."""
+    """The sensors of `map_rows` at their positions, one of them chosen; `row`: the campaign of the answer."""
     from underskin.figures.array_discs import disc_size
     from underskin.figures.array_map import Quantity, array_map, told_apart
 
@@ -109,7 +109,7 @@ def drawn_map(
 
 
 def _without_trend(rows: Sequence[Mapping[str, Any]]) -> str:
-    """How many sensors have no trend, and the reason that most of them have."""
+    """How many sensors have no trend, and the most frequent reason."""
     reasons = Counter(row["no_trend"] for row in rows if row.get("no_trend"))
     if not reasons:
         return ""
@@ -119,8 +119,8 @@ def _without_trend(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _trends_of_single_sensors(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Which sensors have a trend by their own interval that is not told over the whole array: few campaigns of many
-    sensors tell hardly any."""
+    """Which sensors have a trend by their own interval but not by the test over the whole array: few campaigns of
+    many sensors hardly show any."""
     low, high = _ENDS["trend"]
     names = [
         row["sensor"] for row in rows if not row.get("significant", False) and row.get(low, 0) * row.get(high, 0) > 0

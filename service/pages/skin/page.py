@@ -1,4 +1,4 @@
-"""A skin: its array as a map, its sensors over time, its campaigns; of a sensor that is chosen its FRFs too."""
+"""A skin: its array as a map, its sensors over time, its campaigns; for a chosen sensor also its FRFs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -67,8 +67,8 @@ def skin(
     before: str | None = None,
     by: Annotated[By | None, Query(alias="model")] = None,
 ) -> Response:
-    """All at a glance; `sensor` picks the one whose FRFs and history are drawn, `by` the model that d33 rests on: the
-    one in force where none is given, or the paper's where that tells nothing of the latest campaign with FRFs."""
+    """The page of a skin. `sensor`: the one whose FRFs and history are drawn; `by`: the model of d33, by default the
+    one in force, or the paper's if that has no d33 of the latest campaign with FRFs."""
     return shown(request, skin_id, store, table, show, sensor, before, by)
 
 
@@ -176,7 +176,7 @@ def shown(
 def _measured_last(
     store: Database, last: AnyRow, answer: Mapping[str, Any] | None, history: History, sensor: str
 ) -> AnyRow:
-    """The campaign that describes the skin, where it tells of the sensor, else the last one that does."""
+    """The campaign that describes the skin if it measured the sensor, else the last one that did."""
     measured_sensors = [] if answer is None else [measured["sensor"] for measured in answer["sensors"]]
     points = [
         point
@@ -209,7 +209,7 @@ def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[
 
 @router.get("/mark")
 def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
-    """Another one whenever anything has changed that the page shows."""
+    """A text that changes whenever anything on the page has changed."""
     with store.reading() as connection:
         return {"mark": skin_changes.mark(connection, skins.require_root(connection, skin_id), table.sha256)}
 
@@ -241,8 +241,8 @@ def history_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "pape
 
 
 def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int, dict[str, dict[str, Any]]]:
-    """The skin's own id, of how many campaigns d33 is still to be computed, and what was computed, by the campaigns'
-    ids: a few are at once."""
+    """The skin's root id, the number of campaigns whose d33 is still to be computed, and the answers computed now (a
+    few at a time), by campaign id."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
         missing = len(inversions.missing_of_skin(connection, root, table.sha256))

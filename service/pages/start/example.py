@@ -22,7 +22,7 @@ _FOLDER = Path(__file__).parent / "example"
 
 @router.post("/example", dependencies=[*WRITE, FORM_OF_SESSION])
 async def load(request: Request, store: Store, table: Table) -> Response:
-    """Keeps the example's campaigns, once however often it is asked for; afresh where all were withdrawn."""
+    """Store the example's campaigns once; again if all were withdrawn."""
     withdrawn = await run_in_threadpool(store.read, _withdrawn)
     if withdrawn is None:
         return see(f"/skins/{SKIN}")

@@ -63,6 +63,6 @@ def logout(request: Request) -> Response:
 
 
 def _local_path(path: str) -> str:
-    """An address of this server, its parts quoted already, whatever the form said."""
+    """An address of this server, already quoted, whatever the form contains."""
     plain = path.startswith("/") and not path.startswith("//") and "\\" not in path and path.isprintable()
     return quote(path, safe="/?=&%+,;:@!$'()*") if plain else "/"

@@ -32,7 +32,7 @@ def start(
     find: Annotated[str, Query(max_length=200)] = "",
     before: str | None = None,
 ) -> Response:
-    """The skins whose latest campaigns were recorded last, first."""
+    """The skins, most recently recorded first."""
     with store.reading() as connection:
         glances = overview.glances(connection, find or None, number_of_cursor(before), _ON_A_PAGE + 1, table.sha256)
         shown = glances[:_ON_A_PAGE]
@@ -69,7 +69,7 @@ def _d33(array: Mapping[str, Any] | None) -> float | None:
 
 @cache
 def _ahead(store: Database, table: SigmaTable) -> None:
-    """What takes long at first on pages to which this one leads; once."""
+    """Load what is slow at first use on the pages linked from here; once."""
     prepare()
     with suppress(Refusal):  # which the page of mechanisms says
         mechanism_catalogue.read_ahead(store, table)

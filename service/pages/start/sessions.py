@@ -1,4 +1,4 @@
-"""The sessions of one's own key: where somebody is logged in with it, and the way to end each."""
+"""The open sessions of the reader's own key, each of which can be ended."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The tables that ship: what each holds, over which range, how wrong it may be, and how it was made."""
+"""The tables in use: content, range, error and origin of each."""
 
 from functools import cache
 from pathlib import Path

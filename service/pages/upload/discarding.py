@@ -1,4 +1,4 @@
-"""An upload that is put aside, and taken back."""
+"""Discarding an upload, and restoring it."""
 
 from fastapi import APIRouter, Response
 

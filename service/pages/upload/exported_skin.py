@@ -1,4 +1,4 @@
-"""An uploaded file that is an exported skin: what is in it, what of it is here already, and its coming in."""
+"""An uploaded file that is an exported skin: its content, what of it is stored already, and its import."""
 
 from urllib.parse import quote
 
@@ -19,7 +19,7 @@ KIND = "exported skin"
 
 
 def holds_skin(pending: PendingUpload) -> bool:
-    """Whether an upload is an exported skin: one comes alone."""
+    """Whether an upload is an exported skin, which must be the only file."""
     first, *others = pending.files
     if others:
         return False

@@ -1,4 +1,4 @@
-"""The figures of an uploaded file: its channels as they came, its FRFs, its curves."""
+"""The figures of an uploaded file: its raw channels, its FRFs, its curves."""
 
 from typing import Any
 
@@ -16,8 +16,8 @@ _MOST_CURVES = 12
 
 
 def figures(look: InspectedFile, page: str, mapped: MappedFile | None) -> list[Drawn]:
-    """What there is to see; `page`: the address of the upload's file, under which its numbers are; `mapped`: what a
-    mapping makes of the file, whatever that still lacks."""
+    """The figures of a file; `page`: the address of the upload's file, for its numbers; `mapped`: the document that
+    a mapping makes of the file, however incomplete."""
     campaigns = _campaigns(look)
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
     return [
@@ -28,7 +28,7 @@ def figures(look: InspectedFile, page: str, mapped: MappedFile | None) -> list[D
 
 
 def _mapped_curves(mapped: MappedFile | None) -> list[Drawn]:
-    """Force against displacement as soon as a mapping has both, be the sphere's radius known or not."""
+    """Force against displacement as soon as a mapping has both, even without the sphere's radius."""
     from underskin.figures.curves import ForceCurve, force_curves
 
     recordings = (

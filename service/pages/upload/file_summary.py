@@ -1,4 +1,4 @@
-"""What was understood of an uploaded file: its channels, its recordings, what is wrong."""
+"""Summary of an uploaded file: channels, recordings, errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,7 +39,7 @@ class ChannelSummary:
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """A recording that can be kept; `frf_pc_per_n` is the median magnitude over lines at which charge follows force."""
+    """A valid recording; `frf_pc_per_n` is the median magnitude over the lines where charge follows force."""
 
     id: str
     kind: str
@@ -78,8 +78,8 @@ class FileSummary:
 
 
 def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSummary:
-    """A summary that is small however large the file; `known`: what to know before it is kept. It does not say yet what
-    was taken for what."""
+    """A summary of bounded size; `known`: warnings to be shown before it is stored. It does not contain yet how
+    columns were interpreted."""
     arrived = [checked(campaign) for campaign in look.campaigns]
     campaigns = [checked_campaign.campaign for checked_campaign in arrived if checked_campaign.campaign is not None]
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
@@ -112,13 +112,13 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
 
 
 def may_state(files: Sequence[FileSummary], name: str) -> bool:
-    """Whether one of the files has a property of this name, as far as their summaries tell: one that was read by its
-    mapping has what that needs, and of many properties not all are listed."""
+    """Whether one of the files may have a property of this name: a file already read by its mapping has what that
+    needs, and long lists of properties are truncated."""
     return any(file.recordings or name in file.properties or len(file.properties) >= _MOST_PROPERTIES for file in files)
 
 
 def listed(look: InspectedFile, first: int) -> list[RecordingSummary]:
-    """The recordings of a page of the list, from the one of that number on."""
+    """One page of the list of recordings, from this number on."""
     campaigns = [
         checked_campaign.campaign
         for checked_campaign in map(checked, look.campaigns)
@@ -129,7 +129,7 @@ def listed(look: InspectedFile, first: int) -> list[RecordingSummary]:
 
 
 def _described(campaigns: Sequence[Campaign]) -> list[SkinDescription]:
-    """The first of the skins that campaigns describe, each once, whatever it is called."""
+    """The first of the distinct skins that campaigns describe, ignoring their ids."""
     different: list[SkinDescription] = []
     for campaign in campaigns:
         skin = replace(campaign.skin, id=None, sensors=campaign.skin.sensors[:MOST_SENSORS])
@@ -175,7 +175,8 @@ def _channel(parts: Sequence[Channel]) -> ChannelSummary:
 
 
 def _properties(contents: Contents) -> dict[str, str | float]:
-    """What the file, and its first part, says about itself: a part's own by their own names, as mappings know them."""
+    """The properties of the file and of its first part, those of the part under their own names, as mappings know
+    them."""
     first = contents.blocks[0].name if contents.blocks else ""
     prefixes = tuple(f"{block.name}." for block in contents.blocks if block.name)
     prefix = f"{first}."

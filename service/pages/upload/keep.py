@@ -1,7 +1,5 @@
-"""Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with.
-
-And what its reader should know before it is kept: nothing kept is ever deleted, so that afterwards is late.
-"""
+"""Storing a previewed upload, or its errors; the rig description with which it is read; and warnings before it is
+stored, because stored data are never deleted."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -29,7 +27,8 @@ SKIN_FIELD, CORRECTS = "skin", "corrects"
 
 
 def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
-    """The ids of what was kept; errors are shown on the upload's page. A second request stores nothing again."""
+    """Store the valid campaigns; returns their ids. Errors are shown on the upload's page. A second request stores
+    nothing again."""
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending.lock:
         if pending.kept_at is not None or pending.is_stale:  # of which the page shows no button to keep it
@@ -69,7 +68,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
 
 
 def _rig_upload(pending: PendingUpload) -> list[Upload]:
-    """The rig description that was looked with, as a part of the upload."""
+    """The rig description in use, as a part of the upload."""
     if pending.rig is None:
         return []
     path = pending.folder / RIG
@@ -78,7 +77,7 @@ def _rig_upload(pending: PendingUpload) -> list[Upload]:
 
 
 def field_errors(error: Exception) -> list[dict[str, Any]]:
-    """What is wrong, field by field."""
+    """Errors field by field."""
     if isinstance(error, InvalidInput):
         return [
             field_error(invalid.field, invalid.value, invalid.allowed, invalid.code) for invalid in errors_of(error)
@@ -92,15 +91,15 @@ def field_errors(error: Exception) -> list[dict[str, Any]]:
 
 
 def skin_of(store: Database, corrects: str | None) -> str | None:
-    """The skin of the campaign that is corrected, on which its correction stays; raises Missing."""
+    """The skin of the corrected campaign, on which its correction stays; raises Missing."""
     if corrects is None:
         return None
     return str(store.read(campaigns.find, corrects).skin_id)
 
 
 def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> None:
-    """Read the upload by the rig description that was sent, or that is kept with its skin; what is wrong with the one
-    sent is said."""
+    """Read the upload by the rig description that was sent or that is stored with its skin; errors of a sent one are
+    shown."""
     if sent is not None:
         try:
             pending.rig, pending.rig_label = sent_rig(sent), sent.label
@@ -115,8 +114,8 @@ def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> No
 
 
 def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, corrects: str | None) -> list[str]:
-    """In sentences, of the campaigns of one file, sent for the skin `skin_id` where that is said; `corrects`: the
-    campaign whose place they take."""
+    """Warnings in sentences on the campaigns of one file; `skin_id`: the skin it is sent for, if stated; `corrects`:
+    the campaign that they replace."""
     store, table = request.app.state.store, request.app.state.table
     sentences: list[str] = []
     for in_file in map(checked, look.campaigns):
@@ -141,7 +140,7 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
 
 
 def counts_pressing_negative(looked: InspectedFile) -> bool:
-    """Whether curves of a file do."""
+    """Whether curves of a file count pressing negative."""
     held = [
         checked_campaign.campaign
         for checked_campaign in map(checked, looked.campaigns)

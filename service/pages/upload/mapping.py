@@ -1,4 +1,4 @@
-"""A rig description as a form: what each channel of a file is, and what the file does not say."""
+"""A rig description as a form: the meaning of each channel of a file, and values that the file does not contain."""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -52,8 +52,8 @@ _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press
 def guessed(
     channels: Sequence[ChannelSummary], properties: Mapping[str, Any], skin: Mapping[str, Any], *, dated: bool = False
 ) -> dict[str, Any]:
-    """A first rig description by units and names of channels and properties; `skin`: what is known of it; `dated`:
-    whether each part of the file says itself when it was recorded."""
+    """A first rig description from units and names of channels and properties; `skin`: its known values; `dated`:
+    whether each part of the file has its own time of recording."""
     kind, fields = _likely(channels)
     channels_by_field: dict[str, Any] = {}
     for channel, field in zip(channels, fields, strict=True):
@@ -72,7 +72,7 @@ def guessed(
 
 
 def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any]) -> list[str]:
-    """In words, which channels a guessed rig description leaves unused, and what they may be instead of those used."""
+    """In words, which channels a guessed rig description does not use, and what they could replace."""
     by_field: dict[str, list[str]] = {}
     for channel, field in zip(channels, _likely(channels)[1], strict=True):
         if spring_mapping.shown_as(document, channel.name)[0] in ("", field):
@@ -86,7 +86,7 @@ def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any])
 
 
 def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
-    """The kind of recording, and of each channel the field that it may be; empty where nothing speaks for one."""
+    """The kind of recording, and the likely field of each channel; empty if there is no indication."""
     dimensions = [channel_unit.dimension if (channel_unit := unit(channel.unit)) else "" for channel in channels]
     kind = "frf"
     charged = "charge" in dimensions or any("charge" in channel.name.lower() for channel in channels)
@@ -124,10 +124,9 @@ def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[st
 
 
 def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
-    """The rig description that a form says, and what in it cannot be: a value, a line of the layout, two channels for
-    one field.
+    """The rig description of a form and its errors: invalid values, layout lines, two channels for one field.
 
-    What no field of the form is about stays as in `base`; what was typed and cannot be is kept, to be put right.
+    Everything outside the form stays as in `base`; invalid text is kept for correction.
     """
     kind = form.get("kind", "frf")
     sensors, strange = _sensors(form.get("sensors", ""))
@@ -159,7 +158,7 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:
-    """The layout, a line a sensor."""
+    """The layout, one sensor per line."""
     sensors = document.get("skin", {}).get("sensors") or []
     rows = [[sensor[name] for name in ("id", "x_mm", "y_mm") if name in sensor] for sensor in sensors]
     return "\n".join(
@@ -173,7 +172,7 @@ def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, A
 
 
 def _typed_value(form: Mapping[str, str], name: str) -> Any:
-    """A value that was typed, or else the property of the file that holds it."""
+    """A typed value, or else the property of the file that holds it."""
     text = form.get(name, "").strip()
     if not text and form.get(f"{name}-from"):
         return {"property": form[f"{name}-from"]}
@@ -181,7 +180,7 @@ def _typed_value(form: Mapping[str, str], name: str) -> Any:
 
 
 def _in_zone(values: dict[str, Any]) -> list[InvalidInput]:
-    """Puts a time that was typed into the lab's time zone; what is wrong with it, which is kept to be put right."""
+    """Converts a typed time to the lab's time zone; returns the errors, and keeps invalid text."""
     typed = values[recorded_time.FIELD]
     if not isinstance(typed, str):
         return []
@@ -193,7 +192,7 @@ def _in_zone(values: dict[str, Any]) -> list[InvalidInput]:
 
 
 def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInput]]:
-    """The sensors, and the lines that are none: these are kept as names without a place."""
+    """The sensors, and the invalid lines, which are kept as names without a position."""
     sensors: list[dict[str, Any]] = []
     strange = []
     for number, line in enumerate(layout.splitlines(), start=1):
@@ -230,7 +229,7 @@ def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[st
 
 
 def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> dict[str, Any]:
-    """One channel; a unit that differs from the file's label says that the label is wrong."""
+    """One channel; a unit that differs from the file's label overrides the label."""
     name, label = form[f"channel-{number}"], form.get(f"label-{number}", "")
     true_unit = form.get(f"unit-{number}", "").strip()
     wrong = bool(label and true_unit and unit(true_unit) != unit(label))
@@ -248,7 +247,7 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
 
 
 def rig_of(summary: FileSummary, rig: RigDescription | None) -> RigDescription | None:
-    """The rig description in use or, without one, as the form guesses it; None where that cannot be."""
+    """The rig description in use or, without one, the guessed one; None if it is invalid."""
     try:
         guess = guessed(summary.channels, summary.properties, {}, dated=summary.began is not None)
         return rig or rig_description.from_dict(guess)
@@ -257,8 +256,8 @@ def rig_of(summary: FileSummary, rig: RigDescription | None) -> RigDescription |
 
 
 def mapped_file(look: InspectedFile, summary: FileSummary, rig: RigDescription | None) -> MappedFile | None:
-    """The campaign document of a file and what was taken for what, by the rig description or, without one, as the form
-    guesses it; None where that cannot be."""
+    """The campaign document of a file and how its columns were read, by the rig description in use or, without one,
+    the guessed one; None if it is invalid."""
     used = rig_of(summary, rig)
     if look.contents is None or used is None:
         return None

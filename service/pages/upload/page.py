@@ -57,7 +57,7 @@ def form(
     skin: Annotated[str, Query(max_length=200)] = "",
     corrects: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
-    """Asks for files; `corrects`: the campaign whose place they take."""
+    """Asks for files; `corrects`: the campaign that they replace."""
     return _form(request, store, skin, corrects)
 
 
@@ -84,7 +84,7 @@ def _form(request: Request, store: Database, skin: str, corrects: str, error: st
 
 @router.post("", dependencies=WRITE)
 async def send(request: Request, store: Store) -> Response:
-    """Takes files to be looked at; none is kept."""
+    """Receives files for preview; nothing is stored."""
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     cookie = session.cookie_in(dict(request.scope["headers"]))
     folder: UploadFolder = request.app.state.uploads
@@ -126,7 +126,7 @@ async def understood(
     file: Annotated[int, Query(ge=0)] = 0,
     first: Annotated[int, Query(ge=0, le=MOST_RECORDINGS)] = 0,
 ) -> Response:
-    """What was understood, file by file; `first`: the number of the first recording that is listed."""
+    """The preview, file by file; `first`: number of the first listed recording."""
     if pending.kept_at is not None:
         return see(pending.kept_at)
     if pending.skin_summary is not None:
@@ -211,7 +211,7 @@ def _understood(
 
 @router.post("/{upload_id}/mapping", dependencies=WRITE)
 async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
-    """Reads the files again, as a form says what they are."""
+    """Reads the files again with the values of the form."""
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
     document, wrong = mappings.document_of(sent, base)
@@ -242,7 +242,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
 
 @router.post("/{upload_id}/template", dependencies=[*WRITE, FORM_OF_SESSION])
 async def use_template(request: Request, pending: Pending, store: Store) -> Response:
-    """Reads the files as those of the same instrument were read before."""
+    """Reads the files as earlier files of the same instrument."""
     await run_in_threadpool(use_template_of, store, pending)
     await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
@@ -250,7 +250,7 @@ async def use_template(request: Request, pending: Pending, store: Store) -> Resp
 
 @router.post("/{upload_id}/afresh", dependencies=[*WRITE, FORM_OF_SESSION])
 async def start_afresh(request: Request, pending: Pending) -> Response:
-    """Reads the files without what was said of earlier ones."""
+    """Reads the files without values remembered from earlier ones."""
     pending.start_afresh()
     await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
@@ -264,7 +264,7 @@ def use_template_of(store: Database, pending: PendingUpload) -> None:
 
 @router.post("/{upload_id}/signs", dependencies=WRITE)
 async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
-    """Reads the files again, curves that count pressing negative turned, or as they came."""
+    """Reads the files again with curves that count pressing negative inverted, or unchanged."""
     pending.turned = sent.get("turned") == "yes" and not pending.is_depth_composed
     await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
@@ -272,7 +272,7 @@ async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response
 
 @router.post("/{upload_id}/keep", dependencies=WRITE)
 async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
-    """Keeps what is good of it."""
+    """Stores the valid part."""
     async with keeping(store):
         campaign_ids = await run_in_threadpool(keep_good, request, pending, sent, store)
         await run_in_threadpool(d33_cache.derive, store, table, campaign_ids)
@@ -281,7 +281,7 @@ async def keep(request: Request, sent: Form, pending: Pending, store: Store, tab
 
 @router.post("/{upload_id}/skin", dependencies=[*WRITE, FORM_OF_SESSION])
 async def bring_in(request: Request, pending: Pending, store: Store) -> Response:
-    """Brings in an exported skin."""
+    """Imports an exported skin."""
     if pending.skin_summary is None:
         raise Missing("There is no exported skin in this upload.")
     async with skin_imports.one_at_a_time:

@@ -1,7 +1,7 @@
-"""Uploads that were read and not stored yet: each in a folder of its own, of one session, for an hour.
+"""Uploads that were read but not stored: each in a folder of its own, of one session, for an hour.
 
 They lie in the server's folder of uploads, which is removed with the server. A session has a few at a time, and all
-together take at most the room of one upload; those that were discarded are removed first, then the oldest.
+together take at most the room of one upload; discarded ones are removed first, then the oldest.
 """
 
 import hashlib
@@ -36,8 +36,8 @@ _GONE = (
 
 @dataclass(frozen=True)
 class Remembered:
-    """Where a rig description comes from that was said of earlier files: the instrument's name, when it was kept and by
-    whom, the skin that it is kept with, and the file that it came with; None where that is not known."""
+    """The origin of a rig description taken from earlier files: the instrument's name, when and by whom it was
+    stored, its skin, and its file; None if unknown."""
 
     instrument: str | None
     kept_at: str
@@ -48,7 +48,7 @@ class Remembered:
 
 @dataclass
 class PendingUpload:
-    """One upload, and what was understood of it so far."""
+    """One upload, and what was read of it so far."""
 
     id: str
     session: str  # digest of the cookie
@@ -83,12 +83,12 @@ class PendingUpload:
 
     @property
     def is_stale(self) -> bool:
-        """Whether the form holds what cannot be used, so that what was read is not what it says."""
+        """Whether the form has invalid values, so that the reading does not correspond to it."""
         return self.draft is not None
 
     @property
     def is_depth_composed(self) -> bool:
-        """Whether the displacement is made of several channels: turned as a whole, its terms would be wrong."""
+        """Whether the displacement is computed from several channels: inverting the sum would invert each term."""
         mapping = None if self.rig is None else self.rig.channels.get("displacement_mm")
         if self.rig is None or mapping is None:
             return False
@@ -96,7 +96,7 @@ class PendingUpload:
         return mapping.deflection is not None or (formula is not None and formula.is_sum)
 
     def start_afresh(self) -> None:
-        """Forget what was said of channels, here or of earlier files."""
+        """Forget the assignment of channels, also of earlier files."""
         self.rig = self.rig_label = self.draft = self.remembered = None
         self.turned, self.refused = False, []
         self.state_of_files({}, {})
@@ -124,7 +124,7 @@ class PendingUploads:
         self._remover = ThreadPoolExecutor(1, "removes-uploads")
 
     def put(self, cookie: str, sent: Sequence[Upload]) -> PendingUpload:
-        """Take over the files of an upload; of a session that has too many the oldest goes, a discarded one first."""
+        """Add the files of an upload; a session with too many loses the oldest, discarded ones first."""
         name = secrets.token_urlsafe(16)
         folder = self._folder / f"shelf-{name}"
         folder.mkdir()
@@ -141,7 +141,7 @@ class PendingUploads:
         return added
 
     def find(self, cookie: str, name: str) -> PendingUpload:
-        """The session's own; raises Missing where it is gone or another's."""
+        """The session's own upload; raises Missing if it is gone or another's."""
         self._sweep()
         with self._lock:
             upload = self._held.get(name)
@@ -151,7 +151,7 @@ class PendingUploads:
             return upload
 
     def waiting(self, cookie: str) -> list[PendingUpload]:
-        """The session's own that were neither kept nor discarded, the one used last first."""
+        """The session's own uploads that were neither stored nor discarded, the last used first."""
         return [held for held in self._not_stored(cookie) if not held.discarded]
 
     def discarded(self, cookie: str) -> list[PendingUpload]:
@@ -165,8 +165,7 @@ class PendingUploads:
 
     @contextmanager
     def in_use(self, pending: PendingUpload) -> Iterator[None]:
-        """While its files are read: until then they stay, also where it is removed meanwhile. Raises Missing where they
-        are gone."""
+        """While its files are read they stay, even if it is removed meanwhile. Raises Missing if they are gone."""
         with self._lock:
             if pending.given_up and not pending.users:
                 raise Missing(_GONE if pending.kept_at is None else "There is no such file in this upload.")
@@ -201,8 +200,8 @@ class PendingUploads:
         self._remove_files(gone)
 
     def _swept(self, coming: int) -> list[PendingUpload]:
-        """What is too old, and what was discarded, then the oldest, until there is room: held no more, with its files
-        still there."""
+        """Expired uploads and discarded ones, then the oldest, until there is room: dropped here, with their files
+        still on disk."""
         gone = []
         by_age = sorted(self._held.values(), key=_worth)
         total = coming + sum(held.size for held in by_age)
@@ -214,7 +213,7 @@ class PendingUploads:
         return gone
 
     def _remove_files(self, gone: Sequence[PendingUpload]) -> list[Future[None]]:
-        """Each as soon as the disk does it, beside whoever asked, or when nobody reads it any more."""
+        """Remove each as soon as nobody reads it, in the background."""
         with self._lock:
             for upload in gone:
                 upload.given_up = True
@@ -223,7 +222,7 @@ class PendingUploads:
 
 
 def _worth(held: PendingUpload) -> tuple[bool, float]:
-    """In this order uploads make room for others."""
+    """The order in which uploads are removed."""
     return not held.discarded, held.used
 
 

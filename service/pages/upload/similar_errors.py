@@ -1,4 +1,4 @@
-"""Refusals that differ in numbers and names alone: listed once, with how many there are and which."""
+"""Errors that differ only in numbers and names: listed once, with their number and the entries."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ Errors = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class SimilarErrors:
-    """Entries, as (place in the list, name), and the errors of the first: of the others the numbers may differ."""
+    """Entries, as (index in the list, name), and the errors of the first; the numbers of the others may differ."""
 
     entries: Sequence[tuple[int, str]]
     errors: Errors
@@ -31,7 +31,7 @@ class SimilarErrors:
 
 
 def of_files(files: Sequence[FileSummary]) -> list[SimilarErrors]:
-    """Groups of files; those of which nothing was understood for the same reasons are one group."""
+    """Groups of files; files that were rejected for the same reasons are one group."""
     return _together([(file.label, [] if file.recordings else _reasons(file)) for file in files])
 
 
@@ -62,6 +62,6 @@ def _together(entries: Sequence[tuple[str, Errors]]) -> list[SimilarErrors]:
 
 
 def _what(name: str, error: Mapping[str, Any]) -> tuple[str, str]:
-    """What is wrong, without the numbers and the name of the one it is wrong with."""
+    """An error without its numbers and names."""
     field, allowed = (_NUMBER.sub("#", str(error[part]).replace(name, "")) for part in ("field", "allowed"))
     return field, allowed

@@ -1,4 +1,4 @@
-"""What is said of single files of an upload: their sensor, preload or time, where those differ from file to file."""
+"""Values of single files of an upload: sensor, preload or time, if they differ from file to file."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

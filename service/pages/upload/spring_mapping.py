@@ -1,4 +1,4 @@
-"""The part of a mapping form that is about a spring: its deflection, its constant, and what a curve is in a file."""
+"""The part of a mapping form on springs: deflection, spring constant, and the definition of a curve in a file."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -24,9 +24,10 @@ _DIGITS = 12  # that the conversion between N/m and N/mm leaves
 def guessed(
     fields: dict[str, Any], channels: Sequence[ChannelSummary], properties: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """The channels by field, and where none is a force, a deflection instead.
+    """The channels by field, with a deflection if no channel is a force.
 
-    It makes the force, and the stage's travel a depth; the constant is a property of the file in N/m, if there is one.
+    Deflection gives the force, and the stage's travel the depth; the constant is a property of the file in N/m, if
+    there is one.
     """
     lengths = [
         channel for channel in channels if (channel_unit := unit(channel.unit)) and channel_unit.dimension == "length"
@@ -73,10 +74,8 @@ def is_travel(document: Mapping[str, Any]) -> bool:
 def with_spring(
     channels: dict[str, Any], form: Mapping[str, str], constant: Any, base: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[InvalidInput]]:
-    """The channels with the deflection where it belongs, and what cannot be; `constant` is as the form says it.
-
-    A form that does not say what the displacement is leaves that as in `base`.
-    """
+    """The channels with the deflection inserted, and errors; `constant` as in the form. A form that does not define
+    the displacement leaves it as in `base`."""
     channels = {field: dict(how) for field, how in channels.items()}
     deflection = channels.pop(DEFLECTION, None)
     displacement = channels.get("displacement_mm")

@@ -1,4 +1,4 @@
-"""The preload that is stated of a recording beside the one that its own force channel measured."""
+"""The stated preload of a recording compared with the one measured by its own force channel."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ _PARTS, _STEADY = 4, 0.2  # of a recording, in which the means of a static force
 
 
 def measured_otherwise(recording: FrfRecording) -> float | None:
-    """The static force [N] that the recording holds, where the stated preload is another one; None where they agree,
-    or where its force holds none: that of a piezo sensor goes to 0."""
+    """The static force [N] of the recording if it differs from the stated preload; None if they agree, or if the
+    channel has no static force: that of a piezo sensor decays to 0."""
     force = recording.force_n
     mean = None if force is None or len(force) < _PARTS else mean_of(force)
     if force is None or mean is None:
@@ -31,7 +31,7 @@ def in_words(force_n: float) -> str:
 
 
 def doubts(campaign: Campaign) -> list[str]:
-    """In a sentence, the first recording of a campaign whose stated preload is not the one that it measured, and how
+    """A sentence on the first recording of a campaign whose stated preload differs from the measured one, and how
     many more there are."""
     frfs = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     measured = [(recording, mean) for recording in frfs if (mean := measured_otherwise(recording)) is not None]

@@ -1,5 +1,5 @@
-"""What is wrong with values that were typed into the form of an upload, by the checks of a campaign, before any file is
-read. What is empty, or is a property of a file, is nothing wrong here."""
+"""Errors of typed values in the form of an upload, by the checks of a campaign, before any file is read. Empty
+fields and properties of a file are no errors here."""
 
 from collections.abc import Mapping
 from typing import Any

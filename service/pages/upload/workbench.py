@@ -1,4 +1,4 @@
-"""The part of a mapping form that makes curves of raw channels: derived channels, the zero of a field, the trim."""
+"""The part of a mapping form that makes curves of raw channels: derived channels, zeroing, trim."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -112,9 +112,8 @@ def derived_fields(form: Mapping[str, str]) -> set[str]:
 
 
 def with_tare(channels: Mapping[str, Any], form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
-    """The channels with the part of the curve over which each is 0; as in the rig description `base` where the form
-    does not say. What was said of curves is not carried over to FRFs, of which it would take the preload, nor back.
-    """
+    """The channels with the part of the curve over which each is zeroed; as in the rig description `base` if the
+    form does not say. The values of curves are not carried over to FRFs, whose preload they would remove, nor back."""
     before = base.get("channels", {})
     other_kind = "kind" in base and (base["kind"] == "frf") != (form.get("kind", "frf") == "frf")
     result = {}
