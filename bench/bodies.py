@@ -1,4 +1,4 @@
-"""Bodies of JSON as large as they may be: how long `/health` takes meanwhile, and the memory that they take."""
+"""JSON bodies of the largest allowed size: the response time of `/health` meanwhile, and the memory that they take."""
 
 import http.client
 import json
@@ -20,7 +20,7 @@ _P = 0.99
 
 
 def _filled(start: str, element: str, end: str) -> bytes:
-    """A body whose middle is one entry again and again."""
+    """A body made of one repeated element."""
     return f"{start}{element * ((_BYTES - len(start) - len(end)) // len(element))}{end}".encode()
 
 

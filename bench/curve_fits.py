@@ -1,4 +1,4 @@
-"""How far the diagnosis' plain least squares of one curve lie beside those of others."""
+"""Residuals of the diagnosis' plain least squares of one curve compared with those of other programs."""
 
 import json
 import os
@@ -23,14 +23,14 @@ _LARGEST, _SMALLEST = 1.02, 0.98
 
 @dataclass(frozen=True)
 class Fitted:
-    """What our least squares leave of one curve."""
+    """The residual of our least squares of one curve."""
 
     percent: float  # root mean square over all raw samples, of the force's
     raw: Curve
     size: float  # [N²], the sum of squares of the raw force about its zero
 
     def over(self, squares: float) -> float:
-        """Ours over what another fit leaves, a sum of squares over the raw samples [N²]."""
+        """Our residual over that of another fit, a sum of squares over the raw samples [N²]."""
         return self.percent / (100 * float(np.sqrt(squares / self.size)))
 
 
@@ -42,7 +42,7 @@ def real_campaigns() -> dict[str, dict[str, Any]]:
 
 
 def accuracy() -> list[Figure]:
-    """Ratios of what is left, over the curves of all campaigns that are there."""
+    """Ratios of residuals over the curves of all available campaigns."""
     table = load_table()
     return [*_of_hertz(table), *_of_jkr(table)]
 
@@ -114,7 +114,7 @@ def _sticking() -> list[dict[str, Any]]:
 
 
 def _way_in(document: dict[str, Any]) -> dict[str, Any]:
-    """With the samples up to the deepest one alone."""
+    """With only the samples up to the deepest one."""
     (recording,) = document["recordings"]
     last = int(np.argmax(recording["displacement_mm"])) + 1
     columns = {name: values[:last] for name, values in recording.items() if isinstance(values, list)}

@@ -56,7 +56,7 @@ def jkr(curve: Curve, contact_point: float, modulus: float, work: float) -> Floa
 
 
 def hertz_residual(curve: Curve) -> float:
-    """The sum of squares [N²] that SciPy's least squares of Hertz' law leave."""
+    """The residual sum of squares [N²] of SciPy's least squares of Hertz' law."""
     modulus = 1 / _reference(curve)
     return _least(
         curve,
@@ -66,7 +66,7 @@ def hertz_residual(curve: Curve) -> float:
 
 
 def jkr_residual(curve: Curve) -> float:
-    """The sum of squares [N²] that SciPy's least squares of JKR's law and a steady drift leave, on a way in."""
+    """The residual sum of squares [N²] of SciPy's least squares of JKR's law with a linear drift, for loading."""
     modulus = 1 / _reference(curve)
     jump = int(curve.force.argmin())
     gaps = np.arange(max(jump - _GAPS, 0), min(jump + _GAPS, len(curve.depth) - 1))
@@ -126,7 +126,7 @@ def _starts(curve: Curve) -> list[tuple[float, float, float]]:
 
 
 def _least(curve: Curve, law: Callable[[Floats], Floats], starts: Sequence[Sequence[float]]) -> float:
-    """Of several starts (contact point [m], logarithm of a factor on the modulus, zero [N], …) the least."""
+    """The least residual over several starts (contact point [m], logarithm of a factor on the modulus, zero [N], …)."""
     unit, travel = float(np.ptp(curve.force)), float(np.ptp(curve.depth))
     size = np.array([travel, 1.0, unit, *np.ones(len(starts[0]) - 3)])
 

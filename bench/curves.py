@@ -1,4 +1,5 @@
-"""Curves of spheres: what plain least squares leave beside others' fits, and the processor time of a diagnosis."""
+"""Curves of spheres: residuals of plain least squares compared with other fits, and the processor time of a
+diagnosis."""
 
 import json
 import os

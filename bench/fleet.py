@@ -1,4 +1,4 @@
-"""Ten skins of one make diagnosed as a fleet, from their campaigns' thousand recordings."""
+"""Ten skins of one batch diagnosed as a fleet, from their campaigns' thousand recordings."""
 
 import time
 

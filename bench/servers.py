@@ -63,7 +63,7 @@ def processor_s(pid: int) -> float:
 
 @contextmanager
 def underskin(data: Path | None = None) -> Iterator[Server]:
-    """Our service as `make serve` starts it; what it keeps is in `data`, or gone at the end."""
+    """Our service as `make serve` starts it; its data are in `data`, or deleted at the end."""
     port = _free_port()
     command = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(port)]
     with (

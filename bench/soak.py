@@ -1,7 +1,7 @@
-"""The soak: what `make soak` has done already, and what it measured; an interrupted run goes on where it was.
+"""The soak test: what `make soak` has done already, and its measurements; an interrupted run is continued.
 
-Under `build/soak/`, in a folder for each state of the code: `passed`, a test a line, which is not run again; and
-`figures.jsonl`, which `python -m bench soak` writes into docs/validation.md, beside those of earlier commits.
+Under `build/soak/`, in a folder for each state of the code: `passed`, one test per line, which is not run again; and
+`figures.jsonl`, which `python -m bench soak` writes into docs/validation.md, together with those of earlier commits.
 """
 
 import functools
@@ -47,14 +47,14 @@ def passed(test: str) -> bool:
 
 
 def keep_passed(test: str) -> None:
-    """Keep that it has."""
+    """Record that it has passed."""
     _append("passed", test)
 
 
 def record(figure: Figure) -> None:
-    """Keep a figure of a soak, for the test under way; runs at reduced counts keep none.
+    """Record a figure of a soak for the current test; runs at reduced counts record none.
 
-    Figures of one name are of parts of one test: those to be `higher` are added up, of the others the largest counts.
+    Figures of one name are of parts of one test: those to be `higher` are summed, of the others the largest counts.
     """
     if SOAK:
         test = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0]

@@ -1,4 +1,4 @@
-"""What a reader waits for: from the click on a campaign's page to the verdict, and for the reports of many files."""
+"""Waiting times of a reader: from the click on a campaign's page to the verdict, and for the reports of many files."""
 
 import json
 import subprocess

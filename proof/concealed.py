@@ -1,7 +1,7 @@
-"""Campaigns of a rig that this project has never seen, in the folder that UNDERSKIN_CAMPAIGNS names.
+"""Campaigns of a rig unknown to this project, in the folder of UNDERSKIN_CAMPAIGNS.
 
-`open` comes with its truth and is judged here. Of `sealed` reports are written for others to judge; nothing here, and
-nothing in the diagnosis, is fitted to them.
+`open` comes with its truth and is judged here. For `sealed` only reports are written, for others to judge; nothing here
+or in the diagnosis is fitted to them.
 """
 
 import json
@@ -18,7 +18,7 @@ from underskin.cli.diagnose import write_report
 
 
 def judge_open(work: Work, campaigns: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Every open campaign beside its truth."""
+    """Every open campaign with its truth."""
     truths = json.loads((campaigns / "open-truth.json").read_text(encoding="utf-8"))
     cases = _cases(campaigns / "open", work)
     judged = [

@@ -23,7 +23,7 @@ _SDS_OF_95 = 1.96
 
 
 def judge_coverage(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """What each campaign's report states of d33."""
+    """The statement on d33 of each campaign's report."""
     return _judge(work, SEED, min(work.count or COUNT, COUNT), progress)
 
 
@@ -41,8 +41,8 @@ def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], Non
 
 
 def held(case: DrawnCase, report: Mapping[str, Any]) -> dict[str, Any]:
-    """Whether the interval holds the true d33; `off` is by how many of its standard deviations the value is off. None
-    where no d33 is stated."""
+    """Whether the interval contains the true d33; `off`: deviation of the value in its standard deviations. None
+    without a stated d33."""
     description = case.description
     stated, skin = report.get("d33"), description["skin"]
     true, array = skin["d33_pc_per_n"], skin["array"]

@@ -25,7 +25,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def calibration_and_size(judged: Sequence[Judged], path: Path) -> Path:
-    """Stated probability against how often it was right, and accuracy against the effect's size."""
+    """Stated probability against frequency of right answers, and accuracy against the effect's size."""
     with mpl.rc_context(fname=_STYLE):
         figure = Figure(figsize=(7.6, 3.4), layout="constrained")
         left, right = figure.subplots(1, 2)
@@ -75,7 +75,7 @@ def _sizes(axes: Axes, judged: Sequence[Judged]) -> None:
 
 
 def confusion(judged: Sequence[Judged], path: Path) -> Path:
-    """What was hidden against what was named, of all but pairs; what no report named has no column."""
+    """Hidden against named effects, without pairs; what no report named has no column."""
     with mpl.rc_context({"axes.grid": False, "font.size": 6.5}, fname=_STYLE):
         rows = [judgement for judgement in judged if len(judgement.truth) < 2]
         truths = sorted({judgement.truth for judgement in rows}, key=lambda names: (len(names), names))

@@ -43,7 +43,8 @@ _PICKUP_WIDTH_HZ = 1.5
 
 @dataclass(frozen=True)
 class _Amplitudes:
-    """The amplitude of each recording given the shape: estimate and variance (rows,), and the remainder of ln p."""
+    """The amplitude of each recording given the shape: estimate and variance (rows,), and the remaining part of ln
+    p."""
 
     estimate: Floats
     variance: Floats
@@ -58,7 +59,7 @@ class Likelihood:
         self.noise = recorded.response.experiment.noise
 
     def __call__(self, effects: dict[str, Values]) -> float:
-        """The logarithm, −∞ where the rig cannot carry the effects out."""
+        """The log-likelihood, −∞ if the rig cannot carry the effects out."""
         try:
             return self._log(effects)
         except (RigError, ValueError, FloatingPointError):
@@ -190,7 +191,7 @@ def _over_rivals(tried: list[Tried], truth: tuple[str, ...]) -> float:
 
 
 def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:
-    """The sets that are supposed, sorted, with the logarithm of their priors: the shares that the rig draws."""
+    """The hypotheses (sorted sets) with the logarithm of their priors: the shares that the rig draws."""
     singles, pairs = len(CATALOGUED), len(CATALOGUED) * (len(CATALOGUED) - 1) / 2
     sets: dict[tuple[str, ...], float] = {(): np.log(SHARES["none"])}
     sets |= {(name,): np.log(SHARES["single"] / singles) for name in CATALOGUED}
@@ -205,7 +206,7 @@ def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:
 
 
 def _best_of(supposed: Supposition, likelihood: Likelihood, truth: Mapping[str, Values]) -> tuple[Floats, float]:
-    """The best of evenly spread places (Halton), effects that are true held at their true values, and ln p there."""
+    """The best of evenly spread points (Halton), with true effects held at their true values, and ln p there."""
     shared_known = supposed.positions_of_shared(truth)
     free = np.isnan(shared_known)
     if not free.any():
@@ -250,7 +251,7 @@ def _integrated(supposed: Supposition, likelihood: Likelihood, start: Floats) ->
 
 
 def _step(loss: Any, best: Floats, least: float, axis: Floats) -> float:
-    """How far the loss takes to grow by a half, into the cube."""
+    """The distance into the cube over which the loss grows by one half."""
     sign = -1.0 if float(best @ axis) > 0.5 else 1.0
     step = 1e-4
     while step < 0.4 and loss(best + sign * step * axis) - least < 0.5:

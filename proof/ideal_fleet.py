@@ -1,8 +1,8 @@
-"""How well an ideal diagnosis could tell which skin of a fleet departs.
+"""How well an ideal diagnosis could find the departing skin of a fleet.
 
-It owns the rig's equations and noise, and knows that no mechanism acts: what the recordings of a skin say of ln E, ln h
-and ln d33 is normal about the truth, with the covariance of Fisher's information there. What it does not know is what
-no recording of one skin tells: the make's mean and spread. For these it has the priors of the diagnosis.
+It owns the rig's equations and noise, and knows that no mechanism acts: the likelihood of ln E, ln h and ln d33 of a
+skin is normal about the truth, with the covariance of Fisher's information there. Mean and spread of the batch, which
+recordings of one skin do not determine, have the priors of the diagnosis.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ _DECLARED = (0.02, 0.01, 1.5)  # deviations of the make's logarithms about what 
 
 
 def departures(joint: Joint) -> dict[str, float]:
-    """Of each skin the probability that it departs, at what its recordings are expected to say."""
+    """The probability that each skin departs, at the expected values of its recordings."""
     skins = [_states(document) for document in joint.documents]
     experiment = joint.documents[0].experiment
     declared = [experiment.skin.youngs_modulus_mpa, experiment.skin.thickness_mm, experiment.skin.d33_pc_per_n]

@@ -25,7 +25,7 @@ class Coordinate:
     sign: int = 1
 
     def value(self, position: float) -> float:
-        """The parameter's value at a place from 0 to 1."""
+        """The parameter's value at a coordinate from 0 to 1."""
         if self.parameter == "angle":
             return 2 * math.pi * position
         size = math.exp(math.log(self.low) + position * math.log(self.high / self.low))
@@ -34,7 +34,7 @@ class Coordinate:
         return self.sign * size
 
     def position_of(self, value: float) -> float:
-        """The place of a value, outside 0 to 1 or nan where this coordinate does not reach it."""
+        """The coordinate of a value; outside 0 to 1 or nan if this coordinate does not reach it."""
         if self.parameter == "angle":
             return value / (2 * math.pi) % 1
         size = value**self.sign if self.effect in INVERTED else self.sign * value
@@ -54,7 +54,7 @@ class Supposition:
         return tuple(sorted(self.fixed))
 
     def effects(self, positions: Floats) -> dict[str, Values]:
-        """The effects at a place."""
+        """The effects at these coordinates."""
         result: dict[str, Values] = {name: dict(values) for name, values in self.fixed.items()}
         for coordinate, at in zip(self.coordinates, positions, strict=True):
             result[coordinate.effect][coordinate.parameter] = coordinate.value(float(at))
@@ -69,7 +69,7 @@ class Supposition:
         return positions if set(effects) == set(self.fixed) and not np.isnan(positions).any() else None
 
     def positions_of_shared(self, effects: Mapping[str, Values]) -> Floats:
-        """The coordinates of those effects that this hypothesis shares with the given ones; nan elsewhere."""
+        """The coordinates of those effects that this hypothesis shares with the given ones; nan for the others."""
         values_of_effects = {name: dict(values) for name, values in effects.items()}
         if "misalignment" in values_of_effects:
             x, y = (float(values_of_effects["misalignment"][name]) for name in ("x_mm", "y_mm"))

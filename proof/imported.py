@@ -10,7 +10,7 @@ _UNUSED = ("underskin.cli.", "underskin.client.", "underskin.figures.", "undersk
 
 
 def of_a_diagnosis(texts: Mapping[str, str]) -> dict[str, str]:
-    """Those of the texts of modules by their dotted names, packages as `package.__init__`."""
+    """The subset of modules that a diagnosis needs, from texts by dotted name; packages as `package.__init__`."""
     file_of_module = {name.removesuffix(".__init__"): name for name in texts}
     to_read = [name for name in file_of_module if name in _ROOTS or name.startswith(_BY_NAME)]
     modules: set[str] = set()

@@ -1,7 +1,7 @@
-"""Several kinds of recordings, several dates, several skins: what is told together, and what from the parts alone.
+"""Several kinds of recordings, several dates, several skins: results from all data together and from the parts.
 
-Joint campaigns of the virtual rig (`rig.joint`), each diagnosed together and from its parts: FRFs without the curves
-beside them, the last date alone, each skin alone.
+Joint campaigns of the virtual rig (`rig.joint`), each diagnosed together and from its parts: FRFs without the curves,
+the last date only, each skin by itself.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +24,7 @@ Report = Mapping[str, Any]
 
 
 def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each joint campaign what was hidden, and what is told together and apart."""
+    """For each joint campaign what was hidden, and the results from all data and from the parts."""
     cases = [(number, WHAT[number % len(WHAT)]) for number in range(min(work.count or COUNT, COUNT))]
     version = f"{diagnosing()} {sources('rig')}"
     return {"seed": SEED, "judged": of_each(work, cases, partial(_judged, work, version), progress)}
@@ -82,7 +82,7 @@ def _kinds(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[
 
 
 def _present(report: Report) -> set[str]:
-    """What is in every surviving set."""
+    """The mechanisms that are in every surviving set."""
     return {group["mechanisms"][0] for group in report.get("presence", ())
             if len(group["mechanisms"]) == 1 and group["probability"] >= _SURE}  # fmt: skip
 
@@ -118,7 +118,8 @@ def _dates(documents: Sequence[dict[str, Any]], _truth: Report, hidden: Sequence
 
 
 def _dates_of(effect: str, together: Report) -> set[str | None]:
-    """The dates since which it is said to be there, by itself or as one of the group that a change of level may be."""
+    """The dates from which the effect is stated to act, by itself or as one of a group that may explain a change of
+    level."""
     groups = [set(surviving_group["mechanisms"]) for surviving_group in together["presence"]]
     dates = set()
     for mechanism in together["mechanisms"]:
@@ -150,7 +151,8 @@ def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[
 
 
 def departing(fleet: Report) -> set[str]:
-    """Skins, of one campaign each, that depart by the report: in a quantity, or by a mechanism that others lack."""
+    """Skins, of one campaign each, that depart according to the report: in a quantity, or by a mechanism that others
+    lack."""
     stated = {
         departure["skin"] for population in fleet.get("population") or () for departure in population["departures"]
     }

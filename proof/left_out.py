@@ -1,8 +1,9 @@
-"""Every mechanism left out of the catalogue in turn: what the grammar of unnamed laws makes of campaigns that hide it.
+"""Every mechanism excluded from the catalogue in turn: what the grammar of unlisted laws finds in campaigns that
+hide it.
 
-Campaigns of the virtual rig with one effect are diagnosed twice, with the whole catalogue and without the mechanism
-that is hidden in them. The axes are those on which the mechanism says that its effect shows, the entries those of its
-stage.
+Campaigns of the virtual rig with one effect are diagnosed twice, with the complete catalogue and without the hidden
+mechanism. A law has the right axis if the mechanism's effect depends on it, and the right quantity if it is one of the
+mechanism's stage.
 """
 
 from collections.abc import Callable, Mapping
@@ -37,7 +38,7 @@ _AXES: Mapping[str, tuple[str, ...]] = {  # of the grammar, that say the same as
 
 
 def judge_left_out(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each campaign what was hidden, whether it shows, and both diagnoses."""
+    """For each campaign what was hidden, whether it is visible, and both diagnoses."""
     cases = [DrawnCase(SEED, number, "single") for number in range(min(work.count or COUNT, COUNT))]
     truths = of_each(work, cases, partial(truth, work, sources("rig")), _silent)
     shown = [
@@ -69,7 +70,7 @@ def _without(work: Work, version: str, case: tuple[DrawnCase, str]) -> dict[str,
 
 
 def compared(hidden: str, named: Mapping[str, Any], unnamed: Mapping[str, Any]) -> dict[str, Any]:
-    """Where the law enters and what it follows; and errors held out, over the noise of what was held out.
+    """The quantity and the axis of the law; and held-out errors over the noise of the held-out data.
 
     Laws are held out in thirds along their axis, mechanisms by the largest groups, so only multiples of the noise can
     be compared.

@@ -1,4 +1,4 @@
-"""The diagnosis under other priors than its own, while a context lasts: for tests of what depends on them."""
+"""The diagnosis under other priors than its own, within a context: for tests of what depends on them."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ class Priors:
 
 @contextmanager
 def other_priors(priors: Priors) -> Iterator[None]:
-    """Diagnose under these priors; the diagnosis's own are put back afterwards, whatever happens."""
+    """Diagnose under these priors; the diagnosis's own are always restored."""
     scatter = {id(plateau): dict(vars(plateau)) for plateau in (GAIN_PRIOR, POSITION_PRIOR)}
     sets = dict(PRIORS)
     try:
@@ -53,7 +53,7 @@ def _wider(plateau: Plateau, factor: float) -> Plateau:
 
 
 def _parameters(mechanism: Mechanism, factor: float, *arguments: Any) -> tuple[Parameter, ...]:
-    """A mechanism's parameters, with so many times as wide priors of strengths."""
+    """A mechanism's parameters, with priors of strengths wider by this factor."""
     parameters = type(mechanism).parameters_beside(mechanism, *arguments)
     return tuple(
         replace(parameter, prior=HeavyTailed(parameter.prior.mean, factor * parameter.prior.sd))

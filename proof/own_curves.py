@@ -34,12 +34,12 @@ def quiet(count: int | None = None) -> list[DrawnCurves]:
 
 
 def judge_curves(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """The mixture's campaigns beside their truth."""
+    """The mixture's campaigns with their truth."""
     return _judge(work, mixture(work.count), progress)
 
 
 def judge_quiet_curves(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """The quiet campaigns beside their truth."""
+    """The quiet campaigns with their truth."""
     return _judge(work, quiet(work.count), progress)
 
 

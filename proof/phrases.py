@@ -1,4 +1,4 @@
-"""Phrases that several sections of the page share: shares with their intervals, medians, and lists of misses."""
+"""Phrases shared by several sections of the page: shares with intervals, medians, and lists of misses."""
 
 from collections.abc import Collection, Sequence
 

@@ -1,4 +1,4 @@
-"""Progress of long runs: a bar for each part, or lines where there is no terminal."""
+"""Progress of long runs: a bar for each part, or lines without a terminal."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,7 +21,7 @@ OnProgress = Callable[[int, int], None]
 
 @contextmanager
 def progress_bars() -> Iterator[Callable[[str], OnProgress]]:
-    """Makes a bar of a name; the bar is told how many are done, of how many."""
+    """A function that makes a named bar; the bar is called with the number done and the total."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True)) as bars:
         yield lambda name: partial(_update, bars, bars.add_task(name, total=None))

@@ -1,4 +1,4 @@
-"""The parts of the proof: each is made by itself and stored as one document, from which the page is written."""
+"""The parts of the proof: each is made separately and stored as one document, from which the page is written."""
 
 import json
 import os

@@ -24,7 +24,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Case:
-    """A campaign of the rig, what is known of it, and the scatter of each recording's level (recordings,)."""
+    """A campaign of the rig, its known properties, and the scatter of each recording's level (recordings,)."""
 
     campaign: Campaign
     recorded: RecordedLines
@@ -32,7 +32,7 @@ class Case:
 
     @cached_property
     def rivals(self) -> LevelRivals:
-        """What else may move the levels."""
+        """Other causes that can change the levels."""
         return LevelRivals(self.recorded, self.scatter)
 
     @property
@@ -47,7 +47,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Slip:
-    """The campaign with a slip, the χ² that it adds, and how much of it no other cause explains (None: all)."""
+    """The campaign with a slip, the χ² that it adds, and the part of it that no other cause explains (None: all)."""
 
     campaign: Campaign
     chi2: float
@@ -84,7 +84,7 @@ def _sensors(case: Case) -> list[str]:
 
 
 def labels(case: Case, random: np.random.Generator) -> Slip | None:
-    """Two sensors' labels exchanged in all recordings; the places stay."""
+    """Two sensors' labels exchanged in all recordings; the positions stay."""
     return _exchanged(case, random, 0.0)
 
 
@@ -114,7 +114,7 @@ def _exchanged(case: Case, random: np.random.Generator, since: float) -> Slip | 
 
 
 def _of_places(case: Case, turned: Mask) -> float:
-    """Σ |FRF|² over its scatter: the wrong sensor would show next to nothing."""
+    """Σ |FRF|² over its variance: the wrong sensor would show almost nothing."""
     return float((np.minimum(case.scatter, 1.0)[turned] ** -2.0).sum())
 
 
@@ -204,7 +204,7 @@ def warm_up(amplitude: float) -> MakeSlip:
 
 
 def factor(value: float) -> MakeSlip:
-    """A third of the recordings at a factor: peak-to-peak or rms for peak."""
+    """A third of the recordings multiplied by a factor: peak-to-peak or rms instead of peak."""
 
     def make_slip(case: Case, random: np.random.Generator) -> Slip | None:
         off = _some(case, random, 1 / 3)

@@ -44,7 +44,8 @@ _TURNING: tuple[tuple[str, tuple[str, ...], Values], ...] = (
 
 
 class LevelRivals:
-    """The changes of the recordings' ln level that other causes can make, and how much of a slip's they leave."""
+    """The changes of the recordings' ln level that other causes can make, and how much of a slip's changes they
+    leave unexplained."""
 
     def __init__(self, recorded: RecordedLines, scatter: Floats) -> None:
         response = recorded.response
@@ -56,7 +57,7 @@ class LevelRivals:
         self.rivals = list(_rivals(response))
 
     def left_of(self, logarithm: Floats) -> float:
-        """χ² that the best of them leaves of changes of ln level (recordings,)."""
+        """The least χ² that they leave of changes of ln level (recordings,)."""
         projector = self._projector(self.free)
         spread = self._projector(np.column_stack([self.free, self.spread]))
         residuals = [float(logarithm @ projector @ logarithm), float(logarithm @ spread @ logarithm)]
@@ -67,7 +68,7 @@ class LevelRivals:
         return min(residuals)
 
     def _projector(self, columns: Floats) -> Floats:
-        """The matrix of the χ² that columns of normal coefficients leave; the first's is free."""
+        """The matrix of the χ² left by columns with normal coefficients; the first column's is free."""
         weighted = self.weight[:, None] * columns
         penalty = np.diag([0.0, *np.ones(columns.shape[1] - 1)])
         inner = np.linalg.solve(columns.T @ weighted + penalty, weighted.T)
@@ -102,7 +103,7 @@ def _rivals(response: TrueResponse) -> Iterator[Floats]:
 
 
 def left_of_conjugated(recorded: RecordedLines) -> float:
-    """χ² that the best unconjugated phase leaves of the conjugated FRFs."""
+    """The least χ² that an unconjugated phase leaves of the conjugated FRFs."""
     ranges = of_frf(dict(recorded.response.experiment.document))
     of_filters = _OfFilters(recorded)
     chi2 = [of_filters.least((), {}, ranges[_DELAY]["delay_us"], [])]

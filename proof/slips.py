@@ -36,7 +36,7 @@ _SLIPS = {reason for _, reasons in SLIPS.values() for reason in reasons}
 
 
 def judge_slips(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each campaign what is named without a slip, and with each."""
+    """For each campaign what is named without a slip, and with each."""
     numbers = list(range(min(work.count or COUNT, COUNT)))
     return {"seed": SEED, "judged": _judge(work, SEED, numbers, progress)}
 
@@ -62,7 +62,7 @@ def document(seed: int, number: int) -> dict[str, Any]:
 
 
 def of_one(seed: int, number: int) -> dict[str, Any]:
-    """One campaign: what is named in it without a slip, and of each visible or committed slip what is named."""
+    """One campaign: what is named in it without a slip, and with each visible or committed slip."""
     sigma = load_table()
     description = _description(seed, number)
     recorded = record(description)

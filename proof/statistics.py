@@ -94,7 +94,7 @@ def calibration(probabilities: Sequence[float], right: Sequence[bool], draws: in
 
 
 def chance_of_so_few(probabilities: Sequence[float], hits: int) -> float:
-    """P(X ≤ hits) of the number X of right answers where each is right with its stated probability."""
+    """P(X ≤ hits) of the number X of right answers if each is right with its stated probability."""
     count = np.ones(1)  # the distribution of X
     for probability in probabilities:
         count = np.convolve(count, [1 - probability, probability])

@@ -12,7 +12,7 @@ Result = Mapping[str, Any]
 
 
 def slips(result: Result) -> str:
-    """How many of each slip are named, and what is named where there is none."""
+    """How many of each slip are named, and what is named without a slip."""
     judged = result["judged"]
     by_slip: dict[str, list[Result]] = {}
     for judgement in judged:

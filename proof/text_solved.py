@@ -13,7 +13,7 @@ from rig.solved.worlds import PLAIN
 
 
 def solved_contact(result: Mapping[str, Any]) -> str:
-    """What is named and what is quoted where finite elements made the campaigns."""
+    """What is named and what is quoted for campaigns made by finite elements."""
     judged = result["judged"]
     confident = [judgement for judgement in judged if judgement["class"] != HONEST]
     visible = [judgement["class"] != HONEST for judgement in judged if judgement["visible"]]

@@ -1,4 +1,4 @@
-"""What a reader takes home from docs/proof.md, in a few lines: every number is computed from the parts."""
+"""The summary of docs/proof.md in a few lines: every number is computed from the parts."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The page's sections on laws that nobody listed: of a rig of their own, and of the catalogue with one left out."""
+"""The page's sections on unlisted laws: of a separate rig, and of the catalogue with one mechanism excluded."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ _UNLISTED_LIMIT, _EXCLUDED_LIMIT = 1.5, 1.3  # times the noise, and the error wi
 
 
 def hidden(result: Result, quiet: Result | None = None) -> str:
-    """Of campaigns that hide a law."""
+    """The section on campaigns that hide a law."""
     identifiable = [judgement for judgement in result["judged"] if judgement["identifiable"]]
     visible = [judgement for judgement in result["judged"] if judgement["visible"]]
     missed = [[judgement["name"], judgement["law"], judgement["verdict"], f"{judgement['probability']:.2f}",
@@ -39,7 +39,7 @@ be told that the law is unlisted. An equivalent counts as right that the rig its
 
 
 def _shares(identifiable: Sequence[Result], visible: Sequence[Result]) -> list[list[str]]:
-    """Of each kind of success that of the identifiable, and that of all that are visible."""
+    """The share of each kind of success among the identifiable, and among all visible campaigns."""
     both = (identifiable, visible)
     labels = {"recognised": "recognised as not in the catalogue", "placed": "where it enters and what it follows",
             "shaped": "and its form"}  # fmt: skip
@@ -57,7 +57,7 @@ def _shares(identifiable: Sequence[Result], visible: Sequence[Result]) -> list[l
 
 
 def alarms(result: Result) -> str:
-    """Of campaigns that hide nothing."""
+    """The section on campaigns that hide nothing."""
     judged = result["judged"]
     false = [judgement for judgement in judged if judgement["verdict"] not in _QUIET]
     rows = [
@@ -76,7 +76,7 @@ def alarms(result: Result) -> str:
 
 
 def _trade_off(identifiable: Sequence[Result], quiet: Sequence[Result]) -> str:
-    """What a threshold on the probability that something is missing would find, and what it would raise."""
+    """Detections and false alarms for a threshold on the probability that something is missing."""
     rows = [
         [
             f"{limit:g}",
@@ -92,7 +92,7 @@ The probability that anything is missing, by whatever set or law, against a thre
 
 
 def left_out(result: Result) -> str:
-    """Of the catalogue with one mechanism left out."""
+    """The section on the catalogue with one mechanism excluded."""
     judged = result["judged"]
     rows = []
     for name in sorted({judgement["hidden"] for judgement in judged}):
@@ -152,7 +152,7 @@ def _share(entries: Sequence[Result], key: str) -> str:
 
 
 def _placed(judgement: Result) -> bool:
-    """Whether a law stands for the mechanism that was left out."""
+    """Whether a law stands for the excluded mechanism."""
     ratio = _ratio(judgement)
     return bool(
         judgement["axis_right"] and (judgement["entry_right"] or (ratio is not None and ratio <= _EXCLUDED_LIMIT))

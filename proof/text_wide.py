@@ -33,7 +33,8 @@ rig's equations, with d33 free.
 
 
 def that_show(entries: Sequence[Result]) -> list[Result]:
-    """All but those that hide physics outside the catalogue which no recording of theirs can tell from another d33."""
+    """All campaigns except those that hide physics outside the catalogue which none of their recordings can
+    distinguish from another d33."""
     return [judgement for judgement in entries if judgement["shows"] or not set(judgement["hidden"]) & set(UNKNOWN)]
 
 
@@ -97,7 +98,7 @@ def is_miss(judgement: Result) -> bool:
 
 
 def sensitivity(result: Result) -> str:
-    """What other priors make of the same campaigns."""
+    """The results for the same campaigns under other priors."""
     return f"""\
 ## Other priors
 

@@ -1,4 +1,4 @@
-"""Where fits of the diagnosis begin if they know what the virtual rig hides: its parameters in the catalogue's terms.
+"""Starting points of fits that know what the virtual rig hides: its parameters in the catalogue's terms.
 
 The rig's laws are not the catalogue's, so these are starts and not answers.
 """

@@ -27,7 +27,7 @@ Report = Mapping[str, Any]
 
 
 def judge_wrong_modulus(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each campaign what was declared, what is answered, and how far it is off."""
+    """For each campaign the declared modulus, the answer, and its error."""
     numbers = range(min(work.count or COUNT, COUNT))
     version = f"{diagnosing()} {sources('rig')}"
     return {"seed": SEED, "judged": of_each(work, list(numbers), partial(_judged, work, version), progress)}
@@ -76,8 +76,8 @@ def compared(report: Report, truth: Report) -> dict[str, Any]:
 
 
 def _contacts_excluded(report: Report, beyond: int) -> int:
-    """How many of the contacts `beyond` the tables as declared were left out: all, where the report tells of none kept;
-    else those that it names."""
+    """How many of the contacts `beyond` the tables as declared were excluded: all, if the report does not say that
+    some were kept; else those that it names."""
     findings = report["findings"]
     named = sum(finding["code"] == _OUT_OF_DOMAIN and "left out" in finding["statement"] for finding in findings)
     return min(beyond, named) if any(finding["code"] == _CONTACTS_KEPT for finding in findings) else beyond

@@ -1,4 +1,5 @@
-"""Checks of an experiment's description: each returns the value or raises RigError with field, value and allowed."""
+"""Checks of an experiment's description: each returns the value or raises RigError with field, value and allowed
+values."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,7 @@ _UNITS = {
 
 
 def in_unit(field: str) -> str:
-    """The unit that a field's name ends with, after a space; nothing where it has none."""
+    """The unit at the end of a field's name, after a space; empty if it has none."""
     name = field.split("[")[0].rsplit(".", 1)[-1]
     return next((f" {unit}" for ending, unit in _UNITS.items() if f"_{name}".endswith(ending)), "")
 

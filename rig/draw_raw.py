@@ -22,7 +22,8 @@ _SIGNED = {"force_drift": "n_per_root_s", "thermal_drift": "drift_mm", "nonlinea
 
 
 def effect_names(random: np.random.Generator, what: str) -> list[str]:
-    """What an experiment hides: none, single, pair or unknown; ν < 1/2 shows on a layer alone, so it comes with one."""
+    """The hidden effects of an experiment: none, single, pair or unknown; ν < 1/2 is visible only on a layer, so it
+    comes with one."""
     if what == "none":
         return []
     if what == "unknown":

@@ -87,7 +87,7 @@ def pressed_body(
 
 
 def frame_compliance(on: Mapping[str, Values]) -> float:
-    """Compliance [mm/N] behind the sphere that nobody subtracts: the effect instrument_compliance."""
+    """Uncorrected compliance [mm/N] behind the sphere: the effect instrument_compliance."""
     frame = effects.of(on, "instrument_compliance", "stiffness_n_per_mm")
     return 1 / frame if frame else 0.0
 
@@ -142,7 +142,8 @@ def _indented(
 
 
 def _compressed(curves: CurveDesign, shape: Mapping[str, float], speed: float) -> tuple[Floats, Floats]:
-    """Times and shortenings of a cylinder: loading, hold, unloading; in tension then the same to the other side."""
+    """Times and shortenings of a cylinder: loading, hold, unloading; for tension then the same with the opposite
+    sign."""
     largest = curves.largest_displacement_mm
     _check_depth(largest, 0.9 * shape["sample_height_mm"])
     corners = [0.0, largest, largest, 0.0] + ([-largest, 0.0] if curves.tension else [])

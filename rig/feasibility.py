@@ -1,4 +1,4 @@
-"""Rejects experiments that no rig can carry out: overlapping sensors, loads beside the skin, spheres that lift off."""
+"""Rejects impossible experiments: overlapping sensors, loads outside the skin, spheres that lift off."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ def check_skin(skin: DeclaredSkin) -> None:
 
 
 def check_presses(design: RecordingDesign, skin: DeclaredSkin) -> None:
-    """Raise RigError for spheres that lift off, that are beside the skin, or out of range of the sensor."""
+    """Raise RigError for spheres that lift off, lie outside the skin, or are out of range of the sensor."""
     lowest = min(design.preloads_n)
     for index, force in enumerate(design.dynamic_forces_n):
         if force >= lowest:
@@ -44,7 +44,7 @@ def check_presses(design: RecordingDesign, skin: DeclaredSkin) -> None:
 
 
 def _check_on_skin(field: str, offset: Sequence[float], skin: DeclaredSkin, sensors: Sequence[str]) -> None:
-    """Raise RigError for a load beside the skin; the array is in its middle, its length along x."""
+    """Raise RigError for a load outside the skin; the array is in its middle, its length along x."""
     for axis, extent, name in ((0, skin.length_mm, "length_mm"), (1, skin.width_mm, "width_mm")):
         if extent is None:
             continue

@@ -1,7 +1,7 @@
-"""The instrument: what it writes of a curve's exact displacement and force.
+"""The instrument: the written displacement and force of a curve from the exact ones.
 
 Frame, spindle, guide and cell distort first (effects); then each curve gets the cell's gain, its zeros and its drift,
-and last noise and the steps of the converters.
+and finally noise and the converters' quantisation.
 """
 
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ def shown(experiment: Experiment, number: int, time: Floats, displacement: Float
 
 
 def noisy(experiment: Experiment, number: int, reading: Reading) -> tuple[Floats, Floats]:
-    """Displacement [mm] and force [N] as written, with noise and in the converters' steps."""
+    """Displacement [mm] and force [N] as written, with noise and quantisation."""
     curves = experiment.curves
     assert curves is not None
     random, size = np.random.default_rng([experiment.seed, 5, number]), len(reading.force_n)
@@ -57,7 +57,7 @@ def _stepped(values: Floats, step: float) -> Floats:
 
 
 def _distorted(on: Mapping[str, Values], time: Floats, displacement: Floats, force: Floats) -> tuple[Floats, Floats]:
-    """Displacement and force as frame, spindle, guide and cell pass them on."""
+    """Displacement and force after frame, spindle, guide and cell."""
 
     def value(name: str, parameter: str) -> float:
         return effects.of(on, name, parameter)
@@ -86,7 +86,7 @@ def _distorted(on: Mapping[str, Values], time: Floats, displacement: Floats, for
 
 
 def _presliding(displacement: Floats, slip: float) -> Floats:
-    """Friction over its limit, −1 to 1, that turns round within the slip after each reversal (Dahl 1968)."""
+    """Friction over its limit, −1 to 1, which reverses within the slip after each reversal of motion (Dahl 1968)."""
     steps, state = np.diff(displacement), 1.0
     result = [state]
     for step, remaining in zip(np.sign(steps), np.exp(-np.abs(steps) / slip), strict=True):

@@ -1,4 +1,4 @@
-"""Models of joint campaigns: everything that is hidden, or all but one thing; their parts and priors."""
+"""Models of joint campaigns with all hidden effects, or with all but one; their parts and priors."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -20,7 +20,8 @@ Hypothesis = tuple[list[Part], dict[str, Prior]]
 
 @dataclass(frozen=True)
 class Tied:
-    """Skins of one make: ln of a parameter over that of the population's unknown median, over its deviation."""
+    """Skins of one batch: ln of a parameter over that of the population's unknown median, over its standard
+    deviation."""
 
     names: tuple[str, ...]
     median: str
@@ -126,7 +127,7 @@ def _priors(document: JointDocument, without: Hidden | None, *, declared: bool, 
 
 
 def _ties(joint: Joint, population: Population, without: Hidden | None) -> list[Part]:
-    """E and d33 of the skins, each tied to its population, but for a skin that is known to depart in it."""
+    """E and d33 of the skins, each tied to its population, except for a skin that is known to depart in it."""
 
     def tied(name: str, departure: str, sd: float, of: Callable[[JointDocument], float]) -> Tied:
         departing = {hidden.documents[0] for hidden in joint.hidden if hidden.effect == departure and hidden != without}

@@ -30,7 +30,7 @@ def scaled(experiment: Experiment, skin: str, values: Mapping[str, float]) -> Ex
 
 
 def parameters_of_effects(experiment: Experiment, skin: str) -> tuple[str, ...]:
-    """Names of the numbers that the effects have; errors of E and h and the spread have parameters of their own."""
+    """Names of the effects' numbers; errors of E and h and the sensor spread have parameters of their own."""
     of_effects = {"modulus_error", "thickness_error", "sensor_spread"}
     return tuple(
         f"{skin}/{name}.{parameter}"

@@ -1,11 +1,11 @@
-"""The truth about joint campaigns (`joint_truth/1`): what each hides, what changed or departs, and what shows.
+"""The truth about joint campaigns (`joint_truth/1`): what each hides, what changed or departs, and what is visible.
 
-`chi2_gain_alone` is what a hidden thing gains in χ² over a model without it on the FRFs of the last campaign that it
-acts on, `chi2_gain_joint` on everything together; both are expected values. d33 is free there; E is known within 2 % of
-the declared one, h within 1 %, unless their error is hidden besides; E and d33 of skins of one make are tied to their
-population. `chi2_gain_modulus_free` is the joint gain where E is free in any case: whether the thing can be told from
-an error of E. `sd_ln_modulus_frf` and `sd_ln_modulus_joint` are standard deviations of ln E by Fisher's information,
-with the parameters of what is hidden free, and E too.
+`chi2_gain_alone` is the gain in χ² of a hidden effect over a model without it on the FRFs of the last campaign on which
+it acts, `chi2_gain_joint` that on all data; both are expected values. d33 is free; E is known within 2 % of the
+declared value, h within 1 %, unless their error is hidden too; E and d33 of skins of one batch are tied to their
+population. `chi2_gain_modulus_free` is the joint gain with E free in any case: whether the effect can be distinguished
+from an error of E. `sd_ln_modulus_frf` and `sd_ln_modulus_joint` are standard deviations of ln E by Fisher's
+information, with the parameters of hidden effects and E free.
 """
 
 import math
@@ -35,7 +35,7 @@ def joint_truth(joint: Joint) -> dict[str, Any]:
 
 
 def that_show(joint: Joint) -> list[Hidden]:
-    """What of the hidden shows in all campaigns together: the `identifiable` of the truth, without the rest of it."""
+    """The hidden effects that are visible in all campaigns together: the `identifiable` of the truth."""
     everything = tuple(range(len(joint.documents)))
     return [hidden for hidden in joint.hidden if _gain(joint, hidden, everything, curves=True) > SHOWS]
 
@@ -122,5 +122,5 @@ def _population(joint: Joint) -> list[dict[str, Any]] | None:
 
 
 def _rounded(value: float) -> float | None:
-    """To four significant digits; None where there is no bound, which JSON cannot hold."""
+    """To four significant digits; None without a bound, which JSON cannot hold."""
     return float(f"{value:.4g}") if math.isfinite(value) else None

@@ -114,7 +114,7 @@ class LayerContacts:
 
     @property
     def _relaxed(self) -> Floats:
-        """1/J(t) of the standard linear solid that relaxes as E (1 − g (1 − e^(−t/τ)))."""
+        """1/J(t) of the standard linear solid with relaxation E (1 − g (1 − e^(−t/τ)))."""
         if "contact_creep" not in self.on:
             return np.full(self.force.shape, self.modulus)
         g, tau = (effects.of(self.on, "contact_creep", name) for name in ("fraction", "time_s"))

@@ -1,7 +1,7 @@
-"""An experiment's folder: campaign.json, truth.json and, where asked for, the raw recordings with their description.
+"""An experiment's folder: campaign.json, truth.json and optionally the raw recordings with their description.
 
-`recordings.tdms` has a group a recording: load cell and charge amplifier in volts, as LabVIEW writes them; `rig.yaml`
-(`rig/1`) says what the channels are. The amplifier inverts the sign of the charge, as charge amplifiers do.
+`recordings.tdms` has one group per recording: load cell and charge amplifier in volts, as LabVIEW writes them;
+`rig.yaml` (`rig/1`) describes the channels. The amplifier inverts the sign of the charge, as charge amplifiers do.
 """
 
 import json
@@ -37,7 +37,7 @@ _PROPERTIES = {
 def carry_out(experiment: Experiment, folder: Path, *, tdms: bool = False) -> list[Path]:
     """Record the experiment and write its folder; returns the files.
 
-    Raises RigError where an effect or the raw files need what the experiment does not have.
+    Raises RigError if an effect or the raw files need what the experiment lacks.
     """
     if tdms and experiment.drive is None:
         raise RigError("drive", None, "required for raw recordings: lines and curves have no time series")

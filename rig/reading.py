@@ -1,4 +1,4 @@
-"""Reading a description: JSON, or YAML in which dates stay text and 1e-3 is a number, as in JSON."""
+"""Reads a description: JSON, or YAML in which dates stay text and 1e-3 is a number, as in JSON."""
 
 import json
 import re
@@ -23,7 +23,7 @@ _PlainLoader.add_implicit_resolver(
 
 
 def document(path: Path) -> Any:
-    """The file's content; raises ValueError or yaml.YAMLError where it is neither."""
+    """The file's content; raises ValueError or yaml.YAMLError if it is neither."""
     text = path.read_text(encoding="utf-8")
     if text.lstrip().startswith("{"):
         return json.loads(text)

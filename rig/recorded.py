@@ -90,7 +90,7 @@ def mains_pickup(
 
 
 def campaign(recorded: RecordedLines) -> dict[str, Any]:
-    """The campaign (`campaign/1`) of recorded lines, with what the lab knows."""
+    """The campaign (`campaign/1`) of recorded lines, with what the lab knows of them."""
     entries = recording_headers(recorded.response)
     for row, header in enumerate(entries):
         header["frequency_hz"] = recorded.frequency_hz.tolist()

@@ -51,7 +51,8 @@ def truth_of_solved(campaign: SolvedCampaign, fineness: float = FINENESS) -> dic
 
 
 def base_levels(design: Design, modulus: float = 0.0, thickness: float = 0.0, position: float = 0.0) -> Floats:
-    """Levels of the base model (rows,) [pC/N] as declared, or with ln E, ln h or the distance over h so much larger."""
+    """Levels of the base model (rows,) [pC/N] as declared, or with ln E, ln h or the distance over h increased by
+    these amounts."""
     declared = design.declared
     h = declared.thickness * np.exp(thickness)
     contacts = LayerContacts(

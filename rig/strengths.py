@@ -1,4 +1,4 @@
-"""Strengths of drawn effects: parameters uniform in their logarithm, from subtle to strong for the experiment."""
+"""Strengths of drawn effects: log-uniform parameters, from subtle to strong for the experiment."""
 
 import math
 from collections.abc import Mapping

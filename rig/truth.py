@@ -1,4 +1,5 @@
-"""The truth about a campaign (`truth/1`), in a file of its own: effects, parameters, gains, and whether they show."""
+"""The truth about a campaign (`truth/1`), in a separate file: effects, parameters, gains, and whether they are
+visible."""
 
 import math
 from typing import Any

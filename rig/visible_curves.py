@@ -4,7 +4,7 @@ Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compress
 Plain weighted least squares with the rig's own noise refit the modulus, which is free, and what every curve has: its
 zero of displacement z and, of an indentation, its zero of force, a linear drift (in travel where the rig drifts so,
 else in time) and the gain of the cell within its scatter. The truth is refitted alike, but for z. Effects that are
-`known` act in the base model at their true strength, along the recorded displacement.
+`effects_in_model` act in the base model at their true strength, along the recorded displacement.
 
 A factor on E shows as a departure from the declared modulus alone: under modulus_error and compressible_layer, and in
 compression, a declared modulus is known within 2 %.
@@ -149,10 +149,8 @@ class _Base:
         return self.bodies[radius]
 
     def _course(self, number: int, log_modulus: float, shift: float) -> Floats:
-        """Force of the known effects, calculated at some samples and at those beside a jump.
-
-        Infinite beyond the rig's laws.
-        """
+        """Force of the effects in the model, calculated at some samples and at those next to a jump. Infinite beyond
+        the rig's laws."""
         displacement, curve = self._displacement(number, shift), self.recorded[number]
         radius = curve.entry["indenter_radius_mm"]
         body = replace(self._body(radius), modulus=self._modulus(log_modulus))

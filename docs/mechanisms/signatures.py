@@ -1,7 +1,7 @@
-"""What each mechanism does to the recordings, over the axes on which it shows: the panels of its figure.
+"""The effect of each mechanism on the recordings, over the axes on which it is visible: the panels of its figure.
 
-A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; each parameter at the value that it says is
-shown, or at a typical strength. The mechanism says over which axes its figure is drawn.
+A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; each parameter at its stated value, or at a
+typical strength. The mechanism names the axes of its figure.
 """
 
 from collections.abc import Callable, Sequence

@@ -127,7 +127,7 @@ def _numbers(path: Path, delimiter: str, columns: int) -> Floats:
 
 
 def main(results: Path = RESULTS) -> None:
-    """Fit everything in the folder that `UNDERSKIN_RECORDINGS` names and keep the numbers for the page."""
+    """Fit everything in the folder of `UNDERSKIN_RECORDINGS` and store the numbers for the page."""
     folder = Path(os.environ["UNDERSKIN_RECORDINGS"])
     rows = []
     for kind, samples in (("compression", compression_samples(folder)), ("tension", tension_samples(folder))):

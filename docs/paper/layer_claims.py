@@ -1,4 +1,4 @@
-"""The paper's statements about the layer's surface and about tension beside the contact."""
+"""The paper's statements about the layer's surface and about tension next to the contact."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ _PRELOAD_N = 1.0
 
 @dataclass(frozen=True)
 class Claim:
-    """One row: what the paper says, what is found here, and the verdict."""
+    """One row: the paper's statement, the finding here, and the verdict."""
 
     claim: str
     found: str

@@ -1,4 +1,4 @@
-"""The paper's prototype, and what each model of the skin says that its sensors feel."""
+"""The paper's prototype, and the predictions of each model of the skin for its sensors."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,5 @@
-"""What the paper's cylinder leaves open: if it stuck to the platens, 16 MPa is not E; what a diagnosis says."""
+"""An open question of the paper's cylinder: if it stuck to the platens, 16 MPa is not E; and the diagnosis of that
+case."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -64,7 +65,7 @@ One cylinder cannot tell friction from modulus, and the interval of E says so; t
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """What a report says of cylinders of some heights beside the FRFs."""
+    """The report on cylinders of some heights together with the FRFs."""
 
     heights_mm: tuple[float, ...]
     report: dict[str, Any]

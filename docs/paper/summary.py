@@ -1,4 +1,4 @@
-"""What a reader takes home from docs/paper.md: every number is computed."""
+"""The summary of docs/paper.md: every number is computed."""
 
 from collections import Counter
 

@@ -1,4 +1,4 @@
-"""docs/paper.md as text: everything that has a number in it is computed by the modules beside this one."""
+"""docs/paper.md as text: every number is computed by the other modules of this package."""
 
 from collections.abc import Sequence
 

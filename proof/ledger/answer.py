@@ -1,4 +1,4 @@
-"""The answer of a report, as the ledger keeps it, and its grade: `right`, `open` or `wrong`."""
+"""The answer of a report in the ledger's form, and its grade: `right`, `open` or `wrong`."""
 
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -47,14 +47,14 @@ def answer(report: Report) -> dict[str, Any]:
 
 
 def slips_told(report: Report) -> list[int]:
-    """How many of the slips that can be told from other causes are named, and how many there are."""
+    """Of the slips that can be distinguished from other causes, how many are named, and how many there are."""
     identifiable = [of_slip["named"] for of_slip in report["slips"].values() if of_slip["over_rivals"] > THRESHOLD]
     return [sum(identifiable), len(identifiable)]
 
 
 def graded(report: Report, effects: Collection[str], shows: Collection[str]) -> str:
-    """A set is right that holds all that shows and nothing that is not hidden; open is an `ambiguous` answer with a
-    right set among its alternatives, and no conclusion where something shows."""
+    """Right: a set with all visible effects and none that is not hidden. Open: an `ambiguous` answer with a right
+    set among its alternatives, or no conclusion although something is visible."""
     hidden, seen = _merged(effects), _merged(shows)
 
     def is_right(names: Collection[str]) -> bool:

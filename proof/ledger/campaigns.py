@@ -1,6 +1,6 @@
-"""The ledger's campaigns, part by part: what is diagnosed, what is true, and what a right answer is.
+"""The ledger's campaigns by part: what is diagnosed, what is true, and what a right answer is.
 
-Drawn campaigns have seeds that no part of the proof uses, since the ledger is looked at every day.
+Drawn campaigns have seeds that no part of the proof uses, because the ledger is looked at daily.
 """
 
 import importlib.util
@@ -51,7 +51,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Item:
-    """One campaign of the ledger, or some to be judged together; small, so that any process can get it."""
+    """One campaign of the ledger, or several to be judged together; small, so that it can be sent to any process."""
 
     name: str
     needs: ClassVar[str] = ""  # the setting that names the folder of its data
@@ -118,7 +118,7 @@ class DrawnRawCurves(Item):
 
 @dataclass(frozen=True)
 class DrawnJoint(Item):
-    """FRFs beside curves, dates of a skin, or skins of one make, judged together."""
+    """FRFs with curves, dates of a skin, or skins of one batch, judged together."""
 
     number: int
 
@@ -158,7 +158,7 @@ class DrawnJoint(Item):
 
 @dataclass(frozen=True)
 class Slips(Item):
-    """A campaign of the virtual rig as it is, and with each slip of a lab in it."""
+    """A campaign of the virtual rig without slips, and with each slip of a lab."""
 
     number: int
 
@@ -327,9 +327,9 @@ NEEDS = {name: _CAMPAIGNS for name in PARTS if name.endswith("-open") or name.st
 
 
 def _identifiable_effects(facts: Mapping[str, Any], threshold: float) -> Truth:
-    """The effects, and those that show: all together gain in χ² over the base model, and each over the others.
+    """The effects, and the visible ones: all together gain in χ² over the base model, and each over the others.
 
-    As a whole, where the gain of each is unknown; two effects that cancel each other do not show.
+    All of them if the single gains are unknown; two effects that cancel each other are not visible.
     """
     effects = list(facts["effects"])
     if not effects or not facts["identifiable"]:

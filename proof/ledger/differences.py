@@ -1,4 +1,4 @@
-"""What changed between the kept answers and new ones, and whether right answers were won or lost beyond chance."""
+"""Differences between stored and new answers, and whether right answers were won or lost beyond chance."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ SIGNIFICANT = 0.05
 
 @dataclass(frozen=True)
 class Compared:
-    """A part's kept lines and its new ones, in pairs of one campaign."""
+    """A part's stored and new lines, in pairs of one campaign."""
 
     part: str
     pairs: Sequence[tuple[Line, Line]]
@@ -54,8 +54,8 @@ class Compared:
 
 
 def differences(stored: Line, new: Line) -> Iterator[str]:
-    """What differs in one answer, in words: set, verdict, probability by more than 0.05, a number or its interval by
-    more than a tenth of the kept interval (also of each parameter of a set that stayed)."""
+    """The differences of one answer in words: set, verdict, probability by more than 0.05, a number or its interval
+    by more than a tenth of the stored interval (also of each parameter of an unchanged set)."""
     if stored["documents"] != new["documents"]:
         yield "the campaign itself"
     before, after = stored["answer"], new["answer"]
@@ -98,7 +98,7 @@ def _in_words(value: Any) -> str:
 
 
 def text(compared: Sequence[Compared]) -> str:
-    """All that changed, by part, and a table of the parts in Markdown."""
+    """All changes by part, and a table of the parts in Markdown."""
     lines: list[str] = []
     for part in compared:
         changed = part.changed()
@@ -118,7 +118,7 @@ def text(compared: Sequence[Compared]) -> str:
 
 
 def _slips(part: Compared) -> str:
-    """Of the slips that can be told, how many are named; and campaigns in which one is named without a slip."""
+    """The share of distinguishable slips that are named; and campaigns in which one is named without a slip."""
     stored, new = ([pair[index] for pair in part.pairs] for index in (0, 1))
     slip_counts = [
         [sum(line["answer"]["slips"][index] for line in lines) for index in (0, 1)] for lines in (stored, new)
@@ -129,7 +129,7 @@ def _slips(part: Compared) -> str:
 
 
 def _by_effect(changed: Sequence[tuple[Line, Line]]) -> str:
-    """How many changed of each hidden effect, the most first: where to look."""
+    """Number of changes by hidden effect, the most frequent first."""
     counts = Counter(effect for stored, _ in changed for effect in stored["truth"].get("effects", ()))
     return f", by what is hidden: {', '.join(f'{name} {count}' for name, count in counts.most_common(6))}" * bool(
         counts

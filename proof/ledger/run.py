@@ -1,4 +1,4 @@
-"""Run the ledger: diagnose its campaigns, compare with the kept answers, keep the new ones where that is asked for."""
+"""Run the ledger: diagnose its campaigns, compare with the stored answers, and optionally store the new ones."""
 
 import json
 import math
@@ -47,12 +47,12 @@ def _stored_lines(path: Path) -> dict[str, Line]:
 
 
 def _keep(path: Path, lines: Sequence[Line]) -> None:
-    """One line a campaign, so that a commit shows which answers changed."""
+    """One line per campaign, so that a commit shows which answers changed."""
     path.write_text("".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines), encoding="utf-8")
 
 
 def _line(work: Work, version: str, stored_lines: Mapping[str, Line], item: Item) -> dict[str, Any]:
-    """What the ledger keeps of one campaign, with the seconds of processor time that its diagnosis took."""
+    """The ledger's line of one campaign, with the processor time [s] of its diagnosis."""
     documents = item.documents()
     digest = digest_of(documents)
     before = stored_lines.get(item.name)

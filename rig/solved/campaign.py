@@ -31,7 +31,7 @@ class SolvedCampaign:
 
 
 def drawn(seed: int, number: int, fineness: float = FINENESS) -> SolvedCampaign:
-    """Campaign `number` of a seed. Seconds; one that cannot be solved is drawn again."""
+    """Campaign `number` of a seed. Takes seconds; a draw that cannot be solved is repeated."""
     random = np.random.default_rng([seed, number, 41])
     effect = str(random.choice(list(SHARES), p=list(SHARES.values())))
     for _ in range(_ATTEMPTS):
@@ -47,7 +47,7 @@ def drawn(seed: int, number: int, fineness: float = FINENESS) -> SolvedCampaign:
 
 def levels(design: Design, world: World, fineness: float = FINENESS) -> tuple[Floats, tuple[float, float]]:
     """First harmonic of the charge over force of each recording (rows,) [pC/N] in a world, at the true sizes and
-    places; and the narrowest and widest contact, a/h."""
+    positions; and the narrowest and widest contact, a/h."""
     true = design.true
     dwell = np.zeros(len(design.force)) if design.dwell_s is None else design.dwell_s
     unit = true.modulus * world.relaxed(dwell) * true.thickness**2
@@ -74,8 +74,8 @@ def _shares(charge_curve: Course, design: Design, rows: NDArray[np.intp], force:
 
 
 def measured(campaign: SolvedCampaign) -> tuple[Floats, Floats, Floats]:
-    """Real and imaginary part of each line, and the variance of each (rows, lines): the gain of the recording, and
-    noise relative to the line beside a floor."""
+    """Real and imaginary part of each line, and the variance of each (rows, lines): gain error of the recording, and
+    noise relative to the line plus a floor."""
     noise, f = campaign.design.noise, campaign.design.frequency_hz
     random = np.random.default_rng([*campaign.seed, 43])
     actual = campaign.level * np.exp(noise.gain * random.normal(size=len(campaign.level)))

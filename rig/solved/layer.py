@@ -86,7 +86,7 @@ def _edges(sublayers: tuple[Sublayer, ...], size: float, ratio: float) -> tuple[
 
 
 class PressedLayer:
-    """The layer and the sphere; each call of `press` goes on from the state before."""
+    """The layer and the sphere; each call of `press` continues from the previous state."""
 
     def __init__(
         self,
@@ -299,7 +299,8 @@ class PressedLayer:
         return np.asarray(np.hypot(*self._positions()) - self.radius)
 
     def base_pressure(self, at: Floats) -> Floats:
-        """Compressive stress on the base at radii, from the nodal reactions by the consistent mass of the base."""
+        """Compressive stress on the base at radii, from the nodal reactions by the consistent mass matrix of the
+        base."""
         nodes = len(self.base)
         r = self.r[self.base]
         mass = np.zeros((nodes, nodes))

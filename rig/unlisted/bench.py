@@ -44,7 +44,7 @@ class Companion:
 
 @dataclass(frozen=True)
 class State:
-    """What is really there in each recording."""
+    """The true state in each recording."""
 
     radius_mm: Array
     thickness_mm: Array
@@ -168,7 +168,7 @@ def static_log(design: Design, companion: Companion | None, s: State) -> Array:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the bench wrote down, and what only the bench knows."""
+    """The recorded data, and what only the bench knows."""
 
     frf: Complex
     exact: Complex

@@ -1,9 +1,8 @@
 """Draws what was planned and noted: skin, sensors, spheres, sequence of recordings, conditions and noise levels.
 
-Units: mm, N, MPa, Hz, s; `recorded_at` is in hours since the midnight before the first recording.
-
-The skin is linear, so a design is drawn again until large strain would not show: the estimate of
-`layer.finite_strain_shift`, weighed with the gain error, stays below `FINITE_STRAIN_CHI2` over the whole campaign.
+Units: mm, N, MPa, Hz, s; `recorded_at` is in hours since the midnight before the first recording. The skin is linear,
+so a design is drawn again until large strain would be invisible: the estimate of `layer.finite_strain_shift`, relative
+to the gain error, stays below `FINITE_STRAIN_CHI2` over the whole campaign.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ class Design:
 
     @property
     def count(self) -> int:
-        """How many recordings there are."""
+        """Number of recordings."""
         return int(self.sensor.size)
 
     def value(self, name: str) -> Array:
@@ -90,7 +89,7 @@ class Design:
 
     @property
     def offset_xy(self) -> Array:
-        """Commanded position less the sensor's place, (n, 2), mm."""
+        """Commanded position less the sensor's position, (n, 2), mm."""
         position = np.stack([self.value("x_mm"), self.value("y_mm")], axis=1)
         return np.asarray(position - self.sensor_xy[self.sensor])
 
@@ -226,7 +225,7 @@ def _plan(rng: Generator, needs: frozenset[str], careful: bool) -> Design:
 
 
 def draw_design(rng: Generator, needs: frozenset[str] = frozenset(), careful: bool = True) -> Design:
-    """A design that has the axes in `needs` and in which large strain does not show."""
+    """A design that has the axes in `needs` and in which large strain is invisible."""
     while True:
         design = _plan(rng, needs, careful)
         load = float(np.max(design.value("preload_n")))
@@ -235,7 +234,7 @@ def draw_design(rng: Generator, needs: frozenset[str] = frozenset(), careful: bo
 
 
 def add_random_columns(rng: Generator, design: Design, count: int) -> Design:
-    """`count` further columns of conditions that mean nothing: numbers, drifting numbers, or words."""
+    """`count` further columns of irrelevant conditions: numbers, drifting numbers, or words."""
     columns, names = dict(design.columns), list(design.conditions)
     for index in range(count):
         name = f"note_{index + 1:02d}"

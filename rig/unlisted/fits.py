@@ -1,4 +1,4 @@
-"""Least-squares fits of the base model, of the true law and of its rivals, by one who knows the noise.
+"""Least-squares fits of the base model, of the true law and of its rivals, with known noise.
 
 Recordings: y = linear columns + Phi(u(x)), fitted by Levenberg-Marquardt over many shapes at once. A law other than on
 the gain may be referred to any state, so a constant c0 with the prior `REFERENCE` is added to its u.

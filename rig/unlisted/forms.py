@@ -53,7 +53,7 @@ class Shape:
 
 
 def filled(column: Column) -> Array:
-    """The axis without gaps."""
+    """The axis with missing values filled in."""
     return np.asarray(np.where(np.isnan(column.values), np.nanmin(column.values), column.values))
 
 
@@ -108,7 +108,7 @@ def _free(column: Column, x: Array) -> Array:
 
 
 def possible(name: str, column: Column) -> tuple[str, ...]:
-    """Forms that can be told on an axis at all: by its kind and its number of levels."""
+    """Forms that can be distinguished on an axis, by its kind and its number of levels."""
     levels = np.unique(filled(column))
     if column.words:
         return ("step", "free") if levels.size > 2 else ("step",)

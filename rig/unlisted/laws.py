@@ -1,4 +1,4 @@
-"""The hidden laws: what they act on, along which axis, with which form, and what they are called."""
+"""The hidden laws: the quantity on which they act, their axis, form and name."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def listed(acts_on: str, axis: str, form: str, rising: bool) -> bool:
 
 
 def choose(rng: Generator) -> tuple[str, str]:
-    """What the law acts on and its axis."""
+    """The quantity on which the law acts, and its axis."""
     acts_on = str(rng.choice(list(WEIGHTS), p=list(WEIGHTS.values())))
     return acts_on, str(rng.choice(AXES[acts_on]))
 

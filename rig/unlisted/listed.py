@@ -1,7 +1,7 @@
 """Single mechanisms of the published catalogue, fitted to a campaign with a hidden law.
 
-A law that one of them describes as well is not unlisted. Each mechanism is fitted by one who owns the equations and
-the noise levels (with the nuisances of `observed.py`), beside the base model and the campaign's companion, whose
+A law that one of them describes as well is not unlisted. Each mechanism is fitted with the true equations and
+noise levels (with the nuisances of `observed.py`), beside the base model and the campaign's companion, whose
 parameters stay free. Mechanisms have no priors; bounds are wide.
 
 A mechanism is fitted to the numbers in which the law shows: to ln |FRF| of each recording (`listed_static.py`) if the

@@ -49,7 +49,7 @@ class Table:
         return np.asarray(y0 + r * (d0 + r * (c + r * d))), np.asarray(slope)
 
     def rows(self, keep: npt.NDArray[np.intp]) -> Table:
-        """The same for some of the recordings."""
+        """The same for a subset of the recordings."""
         return Table(self.start, self.step, self.values[keep], self.slopes[keep], self.scale)
 
 

@@ -1,6 +1,6 @@
-"""The truth about a campaign: the law, what its design cannot tell from the law, and what modelling it is worth.
+"""The truth about a campaign: the law, what the design cannot distinguish from it, and the gain from modelling it.
 
-All fits are by one who owns the equations and the noise levels (`fits.py`). Rivals are those that leave less than
+All fits use the true equations and noise levels (`fits.py`). Rivals are those that leave less than
 `INDISTINCT` more chi2 than the law's own form at its best:
 
 - form_also: another form, acting on the same quantity along the same axis;
@@ -10,7 +10,7 @@ All fits are by one who owns the equations and the noise levels (`fits.py`). Riv
 
 `chi2_gain_over_best_listed` is the gain over the best single mechanism of the published catalogue (`listed.py`): the
 gain over the base model less what that mechanism gains over the base model from the same numbers. A law is identifiable
-if both gains exceed `IDENTIFIABLE`; otherwise nobody can say that there is something, or that it is unlisted.
+if both gains exceed `IDENTIFIABLE`; otherwise no diagnosis can state that a law acts, or that it is unlisted.
 
 A free form fits whatever a narrower one does; it counts as a rival of free laws only. Positions may move along x or y.
 """
@@ -55,7 +55,7 @@ CLEAN_LINE = 0.05
 
 
 def observe(design: Design, data: Measurement, law: Law, companion: Companion | None) -> Observed:
-    """The numbers in which a law shows that does not go along frequency."""
+    """The numbers in which a law not along frequency is visible."""
     truth = state(design, law)
     if law.acts_on == "frequency_response":
         return loss_angles(design, data, responses(design, None, companion, base_state(design)))
@@ -74,7 +74,7 @@ def size_percent(design: Design, law: Law) -> tuple[float, float]:
 
 
 class Rivals:
-    """chi2 of every (acts_on, axis, form) that is asked for."""
+    """chi2 of each requested (acts_on, axis, form)."""
 
     def __init__(self, observed: Observed, law: Law) -> None:
         self.observed, self.law = observed, law
@@ -211,7 +211,7 @@ def held_out(
 
 
 def static_extra(design: Design, companion: Companion | None, truth: State) -> Array:
-    """What a static companion adds to ln |FRF|; `amplitudes` takes it out, predictions put it back."""
+    """The contribution of a static companion to ln |FRF|; `amplitudes` subtracts it, predictions add it."""
     return companion_column(design, companion, truth)[0] if companion else np.zeros(design.count)
 
 
