@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from rig.effects import KNOWN, Values, needed_by_law
+from rig.effects import ALL_EFFECTS, Values, needed_by_law
 from rig.strengths import INVERTED, SIGNED, Ranges
 from underskin.units import Floats
 
@@ -102,7 +102,7 @@ def suppositions(names: Sequence[str], ranges: Ranges) -> list[Supposition]:
 
 
 def _of_effect(name: str, ranges: Mapping[str, tuple[float, float]]) -> Iterator[tuple[Values, tuple[Coordinate, ...]]]:
-    effect = KNOWN[name]
+    effect = ALL_EFFECTS[name]
     for law in effect.laws or (None,):
         values: Values = {} if law is None else {"law": law}
         unused = set(effect.optional) - set(needed_by_law(name, values))

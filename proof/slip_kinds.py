@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from proof.slip_rivals import LevelRivals, left_of_conjugated, over_one_sign
+from proof.slip_rivals import LevelRivals, conjugated_residual, over_one_sign
 from rig.recorded import RecordedLines
 from underskin.findings.codes import Reason
 from underskin.mechanisms.unlisted.axes import recording_order
@@ -65,7 +65,7 @@ def _scaled(case: Case, logarithm: Floats) -> Slip:
     factors = np.exp(logarithm)
     entries = [_times(recording, float(factor)) for recording, factor in zip(case.entries, factors, strict=True)]
     chi2 = float((weight * (logarithm - mean) ** 2).sum())
-    return Slip(case.with_entries(entries), chi2, min(chi2, case.rivals.left_of(logarithm)))
+    return Slip(case.with_entries(entries), chi2, min(chi2, case.rivals.least_residual(logarithm)))
 
 
 def _times(recording: FrfRecording, factor: float, conjugate: float = 1.0) -> FrfRecording:
@@ -152,7 +152,7 @@ def conjugated(share: float) -> MakeSlip:
         ]
         phase = 4 * case.recorded.exact.imag**2 / case.recorded.line_variance
         chi2 = float(phase[turned].sum())
-        rivals = left_of_conjugated(case.recorded) if turned.all() else over_one_sign(case.recorded, turned, share)
+        rivals = conjugated_residual(case.recorded) if turned.all() else over_one_sign(case.recorded, turned, share)
         return Slip(case.with_entries(entries), chi2, min(chi2, rivals))
 
     return make_slip

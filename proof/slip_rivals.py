@@ -56,7 +56,7 @@ class LevelRivals:
         self.spread = _SPREAD * sensor
         self.rivals = list(_rivals(response))
 
-    def left_of(self, logarithm: Floats) -> float:
+    def least_residual(self, logarithm: Floats) -> float:
         """The least χ² that they leave of changes of ln level (recordings,)."""
         projector = self._projector(self.free)
         spread = self._projector(np.column_stack([self.free, self.spread]))
@@ -102,7 +102,7 @@ def _rivals(response: TrueResponse) -> Iterator[Floats]:
                 break
 
 
-def left_of_conjugated(recorded: RecordedLines) -> float:
+def conjugated_residual(recorded: RecordedLines) -> float:
     """The least χ² that an unconjugated phase leaves of the conjugated FRFs."""
     ranges = of_frf(dict(recorded.response.experiment.document))
     of_filters = _OfFilters(recorded)

@@ -48,7 +48,7 @@ def _judge(work: Work, seed: int, numbers: Sequence[int], progress: Callable[[in
 
 def _judged(work: Work, seed: int, version: str, number: int) -> dict[str, Any]:
     key = digest_of(["slips", seed, number, version])
-    return stored(work.folder / "slips", key, partial(of_one, seed, number))
+    return stored(work.folder / "slips", key, partial(judged_campaign, seed, number))
 
 
 def _description(seed: int, number: int) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def document(seed: int, number: int) -> dict[str, Any]:
     return campaign(record(_description(seed, number)))
 
 
-def of_one(seed: int, number: int) -> dict[str, Any]:
+def judged_campaign(seed: int, number: int) -> dict[str, Any]:
     """One campaign: what is named in it without a slip, and with each visible or committed slip."""
     sigma = load_table()
     description = _description(seed, number)

@@ -13,7 +13,7 @@ Result = Mapping[str, Any]
 WITH_CURVES = ("compression", "indentation")
 
 
-def told_apart(entries: Sequence[Result], how: str) -> list[bool]:
+def distinguished(entries: Sequence[Result], how: str) -> list[bool]:
     """Of campaigns that hide an error of E, of h or stiffening, identifiable, whether each is told apart `how`: from
     the FRFs `alone`, or `together` with curves."""
     return [
@@ -53,7 +53,7 @@ def _of_kinds(entries: Sequence[Result]) -> str:
         of_these = [judgement for judgement in entries if judgement["what"] in what]
         row = [called, str(len(of_these))]
         for how in ("alone", "together"):
-            row += [_of([judgement["right"][how] for judgement in of_these]), _of(told_apart(of_these, how))]
+            row += [_of([judgement["right"][how] for judgement in of_these]), _of(distinguished(of_these, how))]
         held = [is_held for judgement in of_these for is_held in judgement["modulus_held"]]
         rows.append([*row, _of(held), str(sum(judgement["contradicted"] for judgement in of_these))])
     heads = ["right, FRFs alone", "told apart, FRFs alone", "right, together", "told apart, together"]

@@ -8,7 +8,7 @@ from proof.concealed import judged_of
 from proof.judge import QUIET, Judged
 from proof.phrases import percent, right
 from proof.statistics import calibration, share
-from proof.text_joint import WITH_CURVES, told_apart
+from proof.text_joint import WITH_CURVES, distinguished
 from proof.text_wide import that_show
 from rig.identifiable import THRESHOLD
 
@@ -84,7 +84,7 @@ def _joint(result: Result) -> str:
     frfs_only, together = (
         (
             percent(share([judgement["right"][how] for judgement in with_curves])),
-            percent(share(told_apart(with_curves, how))),
+            percent(share(distinguished(with_curves, how))),
         )
         for how in ("alone", "together")
     )

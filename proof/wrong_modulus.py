@@ -35,10 +35,10 @@ def judge_wrong_modulus(work: Work, progress: Callable[[int, int], None]) -> dic
 
 def _judged(work: Work, version: str, number: int) -> dict[str, Any]:
     key = digest_of(["wrong modulus", SEED, number, version])
-    return stored(work.folder / "wrong_modulus", key, partial(of_one, SEED, number))
+    return stored(work.folder / "wrong_modulus", key, partial(judged_campaign, SEED, number))
 
 
-def of_one(seed: int, number: int) -> dict[str, Any]:
+def judged_campaign(seed: int, number: int) -> dict[str, Any]:
     """One campaign, diagnosed and judged."""
     document, truth = drawn_wrong_modulus(seed, number)
     return {"name": truth["name"], **compared(diagnosed(document), truth)}

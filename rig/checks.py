@@ -39,7 +39,7 @@ def number(field: str, value: Any, low: float, high: float) -> float:
     return float(value)
 
 
-def whole(field: str, value: Any, low: int, high: int) -> int:
+def integer(field: str, value: Any, low: int, high: int) -> int:
     """A whole number from low to high."""
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise RigError(field, value, f"must be a whole number, {low} to {high}")
@@ -68,7 +68,7 @@ def text(field: str, value: Any) -> str:
     return value
 
 
-def one_of(field: str, value: Any, allowed: Sequence[str]) -> str:
+def choice(field: str, value: Any, allowed: Sequence[str]) -> str:
     """One of the texts."""
     if value not in allowed:
         raise RigError(field, value, f"must be one of {', '.join(allowed)}")

@@ -58,7 +58,7 @@ class Body:
         return float(np.min(depths + compliance * self.modulus * forces))
 
 
-def course(body: Body, time: Floats, travel: Floats, compliance: float) -> tuple[Floats, Floats]:
+def contact_history(body: Body, time: Floats, travel: Floats, compliance: float) -> tuple[Floats, Floats]:
     """Depth and force of a contact while the stage moves.
 
     Parameters

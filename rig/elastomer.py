@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rig import effects, instrument
-from rig.contact_course import Body, course
+from rig.contact_course import Body, contact_history
 from rig.cylinder import cylinder_force
 from rig.effects import COMPRESSION, INDENTATION, Values
 from rig.errors import RigError
@@ -135,7 +135,7 @@ def _indented(
     time = np.linspace(0, sum(waits), (curves.samples - 1) * substeps + 1)
     travel = np.interp(time, np.cumsum(waits), corners)
     sunk = effects.of(on, "plastic_set", "ratio") * np.maximum.accumulate(np.maximum(travel, 0)) * largest / peak
-    depth, force = course(body, time, travel - sunk, compliance)
+    depth, force = contact_history(body, time, travel - sunk, compliance)
     time, depth, force = time[::substeps], (depth + sunk)[::substeps], force[::substeps]
     _check_loading(curves, int(((time <= waits[1]) & (depth > 0)).sum()), waits[1], float(time[-1]))
     return time, depth, force
@@ -161,11 +161,11 @@ def _check_depth(largest: float, deepest: float) -> None:
         raise RigError("curves.largest_displacement_mm", largest, allowed)
 
 
-def _check_loading(curves: CurveDesign, loading: int, ramp_s: float, whole_s: float) -> None:
+def _check_loading(curves: CurveDesign, loading: int, ramp_s: float, total_s: float) -> None:
     if loading < _LEAST_LOADING:
         needed = math.ceil(curves.samples * (_LEAST_LOADING + 1) / max(loading, 1))
         allowed = (
-            f"leaves {loading} samples while the load rises, in {ramp_s:g} s of {whole_s:g} s: must leave at least "
+            f"leaves {loading} samples while the load rises, in {ramp_s:g} s of {total_s:g} s: must leave at least "
             f"{_LEAST_LOADING}; about {needed} samples do, or a shorter hold_s"
         )
         raise RigError("curves.samples", curves.samples, allowed)

@@ -28,7 +28,7 @@ WHAT = tuple(_DRAWN)
 def joint_campaigns(seed: int, number: int, what: str | None = None) -> Joint:
     """Draw and record random joint campaigns `number` of a seed; what they join is drawn too if not given."""
     random = np.random.default_rng([seed, number, 29])
-    drawn = _DRAWN[str(random.choice(WHAT)) if what is None else checks.one_of("what", what, WHAT)]
+    drawn = _DRAWN[str(random.choice(WHAT)) if what is None else checks.choice("what", what, WHAT)]
     return first_feasible(drawn, random, f"drawn joint {seed}/{number}", f"skin-{seed}-{number}")
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.contact_course import Body, course
+from rig.contact_course import Body, contact_history
 from rig.cylinder import cylinder_force
 from rig.effects import INDENTATION
 from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
@@ -73,7 +73,7 @@ class CurvePart:
         if experiment.kind != INDENTATION:
             return modulus * cylinder_force(experiment.effects, self._recording, self._time_s, displacement)
         body = replace(self._body(experiment, values), modulus=modulus)
-        return course(body, self._time_s, displacement, frame_compliance(experiment.effects))[1]
+        return contact_history(body, self._time_s, displacement, frame_compliance(experiment.effects))[1]
 
     def _body(self, experiment: Experiment, values: Mapping[str, float]) -> Body:
         key = tuple(values[name] for name in self._shape)

@@ -17,7 +17,7 @@ from rig.joint_fit import deviation, least_chi2
 from rig.joint_hypotheses import hypothesis
 
 SCHEMA = "joint_truth/1"
-SHOWS = 20.0  # χ²
+VISIBLE_CHI2 = 20.0  # χ²
 IDENTIFIABLE = 0.1  # standard deviation of ln E
 
 
@@ -37,7 +37,7 @@ def joint_truth(joint: Joint) -> dict[str, Any]:
 def that_show(joint: Joint) -> list[Hidden]:
     """The hidden effects that are visible in all campaigns together: the `identifiable` of the truth."""
     everything = tuple(range(len(joint.documents)))
-    return [hidden for hidden in joint.hidden if _gain(joint, hidden, everything, curves=True) > SHOWS]
+    return [hidden for hidden in joint.hidden if _gain(joint, hidden, everything, curves=True) > VISIBLE_CHI2]
 
 
 def _document(joint: Joint, number: int) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
         "chi2_gain_alone": _rounded(gain_of_frfs),
         "chi2_gain_joint": _rounded(together),
         "chi2_gain_modulus_free": _rounded(modulus_free),
-        "identifiable": together > SHOWS,
+        "identifiable": together > VISIBLE_CHI2,
     }
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rig.contact_course import Body, course
+from rig.contact_course import Body, contact_history
 from rig.curve_fit import Curve, Law, Priors, least_chi2
 from rig.effects import INDENTATION, Values
 from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
@@ -122,7 +122,7 @@ class _Base:
         """Force at ln E over the true modulus and a shift of the zero of displacement."""
         if self.experiment.kind != INDENTATION:
             return self._neo_hookean
-        return self._course if self.on else self._hertz
+        return self._history if self.on else self._hertz
 
     def _displacement(self, number: int, shift: float) -> Floats:
         curve = self.recorded[number]
@@ -148,7 +148,7 @@ class _Base:
             self.bodies[radius] = pressed_body(self.experiment, self.on, radius, 1.2 * deepest)
         return self.bodies[radius]
 
-    def _course(self, number: int, log_modulus: float, shift: float) -> Floats:
+    def _history(self, number: int, log_modulus: float, shift: float) -> Floats:
         """Force of the effects in the model, calculated at some samples and at those next to a jump. Infinite beyond
         the rig's laws."""
         displacement, curve = self._displacement(number, shift), self.recorded[number]
@@ -158,7 +158,7 @@ class _Base:
         even = np.linspace(0, len(displacement) - 1, min(_POINTS, len(displacement))).astype(int)
         at = np.unique(np.concatenate([even, jumps, jumps + 1]))
         try:
-            _, force = course(body, curve.time_s[at], displacement[at], frame_compliance(self.on))
+            _, force = contact_history(body, curve.time_s[at], displacement[at], frame_compliance(self.on))
         except RigError:  # a step of the fit that went far astray, which is then rejected
             return np.full(len(displacement), np.inf)
         return np.interp(np.arange(len(displacement)), at, force)

@@ -29,7 +29,7 @@ def answer(report: Report) -> dict[str, Any]:
     """Verdict, set, probability, the d33 or modulus that is stated, and the set's parameters, with 95 % intervals."""
     stated = {"verdict": report.get("verdict", "slips"), "names": named(report)}
     if "slips" in report:
-        return {**stated, "slips": slips_told(report)}
+        return {**stated, "slips": distinguishable_slips(report)}
     fit = report.get("fit") or {}
     quantity, value = "d33", report.get("d33")
     if not value or value.get("value") is None:
@@ -46,7 +46,7 @@ def answer(report: Report) -> dict[str, Any]:
     return {**stated, "parameters": parameters} if parameters else stated
 
 
-def slips_told(report: Report) -> list[int]:
+def distinguishable_slips(report: Report) -> list[int]:
     """Of the slips that can be distinguished from other causes, how many are named, and how many there are."""
     identifiable = [of_slip["named"] for of_slip in report["slips"].values() if of_slip["over_rivals"] > THRESHOLD]
     return [sum(identifiable), len(identifiable)]

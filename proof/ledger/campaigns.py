@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 from proof import joint, judge, slips
 from proof.cases import DrawnCase, DrawnCurves
-from proof.ledger.answer import OPEN, RIGHT, WRONG, graded, slips_told
+from proof.ledger.answer import OPEN, RIGHT, WRONG, distinguishable_slips, graded
 from proof.results import data_folder
 from proof.stored import diagnosed, diagnosed_by
 from proof.unlisted import judged as judged_by_law
@@ -169,7 +169,7 @@ class Slips(Item):
     def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
         """What the screening names in it without a slip, and with each."""
         del documents  # drawn again, since slips are judged by the rig's equations
-        return slips.of_one(SLIP_SEED, self.number)
+        return slips.judged_campaign(SLIP_SEED, self.number)
 
     def truth(self) -> Truth:
         """The slips themselves are the truth."""
@@ -177,10 +177,10 @@ class Slips(Item):
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """Right where every slip that can be told is named and none without one."""
-        named, told = slips_told(report)
+        named, distinguishable = distinguishable_slips(report)
         if report["false"]:
             return WRONG
-        return RIGHT if named == told else OPEN
+        return RIGHT if named == distinguishable else OPEN
 
 
 @dataclass(frozen=True)

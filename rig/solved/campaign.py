@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.solved.charge import Course, harmonic, solve
+from rig.solved.charge import ChargeCurve, harmonic, solve
 from rig.solved.design import Design, drawn_design
 from rig.solved.layer import Floats, NotConverged
 from rig.solved.worlds import SHARES, World, drawn_world
@@ -56,19 +56,19 @@ def levels(design: Design, world: World, fineness: float = FINENESS) -> tuple[Fl
     for sphere in np.unique(design.sphere):
         rows = np.flatnonzero(design.sphere == sphere)
         low, high = float((force - dynamic)[rows].min()), float((force + dynamic)[rows].max())
-        charge_curve = solve(world.skin(), float(sphere / true.thickness), low, high, fineness)
-        levels_of_rows[rows] = _shares(charge_curve, design, rows, force, dynamic)
-        widths += charge_curve.contact_radius(force[rows]).tolist()
+        curve = solve(world.skin(), float(sphere / true.thickness), low, high, fineness)
+        levels_of_rows[rows] = _shares(curve, design, rows, force, dynamic)
+        widths += curve.contact_radius(force[rows]).tolist()
     return design.d33 * levels_of_rows, (min(widths), max(widths))
 
 
-def _shares(charge_curve: Course, design: Design, rows: NDArray[np.intp], force: Floats, dynamic: Floats) -> Floats:
+def _shares(curve: ChargeCurve, design: Design, rows: NDArray[np.intp], force: Floats, dynamic: Floats) -> Floats:
     """First harmonic over force of the share borne by the disc, for the rows of one sphere."""
     true, shares = design.true, np.empty(len(rows))
     places = np.round(design.distance[rows] / _DISTANCE_STEP_MM) * _DISTANCE_STEP_MM
     for distance in np.unique(places):
         here = places == distance
-        share = charge_curve.share(true.sensor_radius / true.thickness, float(distance / true.thickness))
+        share = curve.share(true.sensor_radius / true.thickness, float(distance / true.thickness))
         shares[here] = harmonic(share, force[rows[here]], dynamic[rows[here]])
     return shares
 

@@ -27,7 +27,7 @@ class Skin:
 
 
 @dataclass(frozen=True)
-class Course:
+class ChargeCurve:
     """Forces [E h²], contact radii [h] and base pressures [E] (steps, places) at radii `r` [h] of one sphere."""
 
     force: Floats
@@ -62,7 +62,7 @@ def inside(r: Floats, sensor: float, offset: float) -> Floats:
 
 
 @lru_cache(maxsize=8)
-def solve(skin: Skin, radius: float, lowest: float, highest: float, fineness: float = 1.5) -> Course:
+def solve(skin: Skin, radius: float, lowest: float, highest: float, fineness: float = 1.5) -> ChargeCurve:
     """The course of a sphere [h] over forces from `lowest` to `highest` [E h²]."""
     softest = min(part.material.modulus for part in skin.sublayers if part.thickness > 0.3)
     widest = np.cbrt(0.5625 * highest * radius / softest)
@@ -79,7 +79,7 @@ def solve(skin: Skin, radius: float, lowest: float, highest: float, fineness: fl
         else:
             depth *= max(ratio, min(1.5, (_MARGIN * lowest / force) ** 0.5 + 0.02))
     forces, contacts, pressures = zip(*steps, strict=True)
-    return Course(np.array(forces), np.array(contacts), r, np.array(pressures))
+    return ChargeCurve(np.array(forces), np.array(contacts), r, np.array(pressures))
 
 
 def harmonic(share: Floats, force: Floats, dynamic: Floats) -> Floats:

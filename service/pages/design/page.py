@@ -68,7 +68,7 @@ def at_once(request: Request, table: Table, sliders: SlidersOfQuery) -> Response
         "materials": with_values(sliders.values),
         "same": [same.curl, same.python],
     }
-    content = orjson.dumps({"wrong": shown.wrong.told} if shown.wrong else changed)
+    content = orjson.dumps({"wrong": shown.wrong.sentences} if shown.wrong else changed)
     answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
     compress(request, answer)
     return answer

@@ -14,7 +14,7 @@ from sqlalchemy import Connection
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.diagnosis.array import shown_array
 from service.pages.diagnosis.figure_columns import columns
-from service.pages.diagnosis.plan import FIELDS, left_open
+from service.pages.diagnosis.plan import FIELDS, is_undecided
 from service.pages.diagnosis.planned import PlannedRow, heads, planned_rows, rig_answer
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
@@ -105,7 +105,7 @@ def diagnosis(
         in_force=adopted is not None and adopted is of_skin[0] and adopted.model_withdrawn_at is None,
         may_be_adopted=of_campaign and report is not None and not_adopted is None,
         settled=report is not None and _settled(report),
-        open=of_campaign and report is not None and "curve" not in figures and left_open(report),
+        open=of_campaign and report is not None and "curve" not in figures and is_undecided(report),
         limit_fields=FIELDS,
         planned=planned,
         heads=heads(planned),

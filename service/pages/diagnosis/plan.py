@@ -46,7 +46,7 @@ _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
 
 
-def left_open(report: Mapping[str, Any]) -> bool:
+def is_undecided(report: Mapping[str, Any]) -> bool:
     """Whether a report leaves several explanations that further recordings could separate."""
     if report["verdict"] == "unexplained":
         return False

@@ -36,7 +36,7 @@ class VerdictSummary:
     id: str
     tag: str
     mood: Literal["good", "look", "quiet"]
-    beside: str
+    addition: str
     at: str  # when it ended, or was asked for
     name: str | None  # of one of several campaigns
     modulus: str | None = None  # of curves, under an answer that is settled

@@ -18,14 +18,14 @@ _MOST_LISTED_ERRORS = 20
 class WrongFields:
     """Errors in sentences, each with the name of its form field; empty for an error of no field."""
 
-    told: Sequence[tuple[str, str]] = ()
+    sentences: Sequence[tuple[str, str]] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.told)
+        return bool(self.sentences)
 
     def ids(self, name: str) -> str:
         """HTML ids of the error sentences of a field, separated by blanks."""
-        return " ".join(f"wrong-{index}" for index, (field, _) in enumerate(self.told, 1) if field == name)
+        return " ".join(f"wrong-{index}" for index, (field, _) in enumerate(self.sentences, 1) if field == name)
 
 
 NOTHING_WRONG = WrongFields()
