@@ -45,9 +45,9 @@ def judge(name: str, report: Mapping[str, Any], truth: Mapping[str, Any]) -> Jud
     """The report of one campaign judged by its truth (`truth/1`, or an entry of open-truth.json)."""
     visible = bool(truth["identifiable"])
     truth_set = tuple(sorted(truth["effects"]))
-    rivals = [tuple(sorted(alternative["mechanisms"])) for alternative in report["alternatives"]]
+    rivals = [tuple(sorted(entry["mechanisms"])) for entry in report["alternatives"]]
     fit = report["fit"]
-    heldout_percent = fit["after"]["heldout_rmse_percent"] if fit else None
+    left = fit["after"]["heldout_rmse_percent"] if fit else None
     return Judged(
         name=name,
         truth=truth_set,
@@ -58,7 +58,7 @@ def judge(name: str, report: Mapping[str, Any], truth: Mapping[str, Any]) -> Jud
         visible=bool(truth.get("every_effect_identifiable", visible)) and visible,
         one_visible=visible,
         size=max(float(truth["chi2_gain_of_truth"]), 0.0) ** 0.5,
-        held_out=None if heldout_percent is None else (float(heldout_percent), float(fit["noise_floor_percent"])),
+        held_out=None if left is None else (float(left), float(fit["noise_floor_percent"])),
     )
 
 
@@ -66,7 +66,7 @@ def answer(report: Mapping[str, Any]) -> tuple[str, ...]:
     """The set that a report names."""
     if report["verdict"] == "unexplained":
         return (UNKNOWN,)
-    return tuple(sorted(mechanism["name"] for mechanism in report["mechanisms"]))
+    return tuple(sorted(entry["name"] for entry in report["mechanisms"]))
 
 
 def shown(names: tuple[str, ...]) -> str:
