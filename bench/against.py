@@ -17,7 +17,7 @@ from bench.figures import Figure
 ROUNDS = 3
 _COMMANDS = 8  # campaigns of which the whole command is timed
 _FASTER = 5.0
-_WITH_LAWS = 1.5  # times as long may it take to try laws that nobody listed as well, which no earlier revision did
+_WITH_LAWS = 1.5  # allowed ratio of time, because unlisted laws are tried too, which no earlier revision did
 NAMED_ALONE = """
 from underskin.diagnosis import pipeline
 pipeline.with_laws = lambda *_: ()

@@ -65,7 +65,9 @@ def measure() -> list[Figure]:
     with servers.underskin() as server:
         with _small_requests(server) as quiet:
             time.sleep(_QUIET_S)
-        _post(server, "/v1/campaigns", _campaign(_BYTES // 1000), 201)  # starts what the server keeps ready afterwards
+        _post(
+            server, "/v1/campaigns", _campaign(_BYTES // 1000), 201
+        )  # starts the processes that the server keeps ready afterwards
         time.sleep(_QUIET_S)
         figures.append(Figure("/health beside nothing, 99th percentile", 1e3 * _percentile(quiet.times_s), "ms"))
         for name, (path, make, status) in _BODIES.items():

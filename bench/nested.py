@@ -105,7 +105,7 @@ def _compared(effects: Effects) -> Compared:
 
 
 def _explained(problem: FittingProblem) -> list[Explanation]:
-    # One by one, so that none is left for being hopeless beside the others.
+    # One by one, so that none is pruned because of the others.
     results = [explanation for names in HYPOTHESES for explanation in problem.explain([Request(names)])]
     return integrated([fit for fit in results if fit is not None])
 

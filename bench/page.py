@@ -19,8 +19,8 @@ ratios: `idle_percent` is how idle it was before the start. A target is what the
 one that was not met.
 """
 
-SOAK = "soak"  # what `make soak` measures
-AGAINST = "against"  # what `python -m bench diagnosis --against REV` measures
+SOAK = "soak"  # measured by `make soak`
+AGAINST = "against"  # measured by `python -m bench diagnosis --against REV`
 
 SECTIONS = {
     "accuracy": "Accuracy of the shipped table",

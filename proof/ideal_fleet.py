@@ -14,7 +14,11 @@ from underskin.diagnosis.several.fleet import SPREADS
 from underskin.diagnosis.several.population import FAR, QUANTITIES, REGULAR, Batch, State, populations
 from underskin.units import Floats
 
-_DECLARED = (0.02, 0.01, 1.5)  # deviations of the make's logarithms about what is declared; of d33, about the truth
+_DECLARED = (
+    0.02,
+    0.01,
+    1.5,
+)  # standard deviations of the batch's logarithms about the declared values; of d33, about the truth
 
 
 def departures(joint: Joint) -> dict[str, float]:

@@ -95,7 +95,7 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
     """
     ordered = tuple(name for name in problem.lines.mechanisms.named if name in names)
     (first,) = problem.explain([Request(ordered)])
-    assert first is not None  # alone, no fit is hopeless
+    assert first is not None  # without alternatives, no fit is pruned
     requests = [Request(ordered, larger=with_true_values(first, effects))]
     if len(ordered) > 1:
         single_fits = problem.explain([Request((name,)) for name in ordered])

@@ -110,7 +110,7 @@ def _exchanged(case: Case, random: np.random.Generator, since: float) -> Slip | 
     if case.entries[0].position_mm is not None:
         return Slip(wrong, _of_places(case, turned))
     gains = _of_gains(case, turned, first, second) if since else (0.0, 0.0)
-    return Slip(wrong, sum(gains), min(gains))  # a step of either sensor alone, of any size, leaves the other one's
+    return Slip(wrong, sum(gains), min(gains))  # a step of either sensor, of any size, leaves the other one's
 
 
 def _of_places(case: Case, turned: Mask) -> float:

@@ -34,7 +34,7 @@ _STEP = 1e-3
 _DELAY = "timing_delay"
 _LADDER: Values = {"law": "ladder"}
 _STEP_LAW: Values = {"law": "step"}
-# Effects that turn the phase: what is fitted of each, and its law.
+# Effects that turn the phase: the fitted parameter of each, and its law.
 _TURNING: tuple[tuple[str, tuple[str, ...], Values], ...] = (
     ("amplifier_high_pass", ("corner_hz",), {}),
     ("sensor_relaxation", ("exponent",), _LADDER),

@@ -10,7 +10,7 @@ from rig.draw import UNKNOWN
 
 Result = Mapping[str, Any]
 
-LOST = 1.0  # nats of evidence times prior by which a hidden set must be better than what was found to be a miss
+LOST = 1.0  # nats of evidence times prior by which a hidden set must exceed the best set found to be a miss
 _VERDICTS = ("explained", "ambiguous", "unexplained", "no_mismatch", "insufficient_data")
 
 

@@ -21,7 +21,7 @@ from rig.solved.layer import Material, PressedLayer, Sublayer
 DATA = Path(__file__).with_name("contact_strain.npz")
 RADII = np.concatenate([[0.04, 0.08, 0.12, 0.17, 0.23, 0.3], np.arange(0.4, 2.65, 0.14)])
 LOADS = np.array([0.01, 0.08, 0.15, 0.22, 0.28, 0.34, 0.40, 0.4642])  # x
-HIGHEST_WAVENUMBER = 12.0  # what finite strain adds is smooth on the base
+HIGHEST_WAVENUMBER = 12.0  # the addition by finite strain is smooth on the base
 _FINENESS = 1.4
 _WIDER = 1.1  # the contact may be wider than the linear one by
 _DEPTHS = np.geomspace(0.25, 1.0, 7)  # the course of depths, over that of the linear contact

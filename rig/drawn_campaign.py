@@ -12,7 +12,7 @@ from rig.truth import truth_of_curves, truth_of_lines
 from rig.wide_tails import USUAL
 
 JOINT = "joint"
-HIDES: dict[str, tuple[str, ...]] = {  # kinds, and what may be asked for of each
+HIDES: dict[str, tuple[str, ...]] = {  # kinds, and the possible requests for each
     FRF: tuple(SHARES),
     INDENTATION: tuple(SHARES),
     COMPRESSION: tuple(SHARES),

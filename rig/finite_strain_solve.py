@@ -22,7 +22,7 @@ from rig.layer import RIM, WAVENUMBERS, Floats
 DATA = Path(__file__).with_name("finite_strain.npz")
 RADII = np.concatenate([[0.04, 0.08, 0.12, 0.17, 0.23, 0.3], np.arange(0.4, 3.3, 0.14)])
 LOADS = np.array([0.116, 0.232, 0.348, 0.4642])  # x
-HIGHEST_WAVENUMBER = 12.0  # what finite strain adds is smooth on the base
+HIGHEST_WAVENUMBER = 12.0  # the addition by finite strain is smooth on the base
 _SHEAR = 1.0
 _Q0_OVER_E_X = 1.5 / np.pi * 0.5625 ** (-2 / 3)  # q0/E = this · L^(1/3)
 _GAUSS = np.polynomial.legendre.leggauss(3)

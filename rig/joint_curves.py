@@ -22,7 +22,7 @@ from rig.whitening import Whitener
 
 _SLOPE = 1e-4  # of the largest displacement
 _SAMPLES = 120  # of a curve: so many weigh as much as all
-_JUMP = 0.1  # of the largest force, between neighbours of these samples; samples beside a jump do not count
+_JUMP = 0.1  # of the largest force, between neighbouring samples; samples next to a jump do not count
 _NO_WEIGHT = 1e6
 _BEYOND = 1.2  # of the largest displacement: how far the law of a body reaches
 _UNKNOWN = 10.0  # of the largest force: scatter of the zero of force and of the drift

@@ -20,7 +20,7 @@ _TOLERANCE = 1e-4  # of χ²
 _EVALUATIONS = 40
 _SMALL = 0.1  # χ² that needs no second fit
 _HELD = 1e-4
-_ASTRAY = 1e6  # residuals beyond what the rig has solved: such a step is rejected
+_ASTRAY = 1e6  # residuals outside the rig's solutions: such a step is rejected
 
 
 class Part(Protocol):

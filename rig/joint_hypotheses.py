@@ -13,7 +13,11 @@ from rig.joint_lines import LinesPart
 from rig.layer import Floats
 
 _DECLARED_E, _DECLARED_H, _SENSOR = 0.02, 0.01, 0.01
-_BY_PRIORS = ("modulus_error", "thickness_error", D33_DEPARTURE)  # what a model has not is said by priors alone
+_BY_PRIORS = (
+    "modulus_error",
+    "thickness_error",
+    D33_DEPARTURE,
+)  # effects that a model lacks are described by priors only
 
 Hypothesis = tuple[list[Part], dict[str, Prior]]
 

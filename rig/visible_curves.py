@@ -26,7 +26,11 @@ from rig.layer import Floats
 THRESHOLD = 30.0
 _DECLARED = 0.02
 _FACTORS_ON_E = {"modulus_error", "compressible_layer"}
-_SHIFTS = (0.0, -0.2, 0.2)  # starts of z, of the largest displacement; beside known effects the first that has a fit
+_SHIFTS = (
+    0.0,
+    -0.2,
+    0.2,
+)  # starts of z over the largest displacement; with effects in the model the first that has a fit
 _OUT_OF_REACH: tuple[float, list[Floats]] = (np.inf, [])  # of a body that stiffens to infinity before its depth
 _STEP = 1e-4  # of the largest displacement
 _POINTS = 200  # of a course along the recorded displacement

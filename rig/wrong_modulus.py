@@ -29,7 +29,7 @@ _FACTORS = (2.0, 4.0)
 _KINDS = {FRF: 0.5, COMPRESSION: 0.25, INDENTATION: 0.25}
 _COMPANIONS = (*COMPANIONS, "adhesion", "contact_creep")
 _COMPANY = 0.35
-_HARD = 0.5  # share of the draws with loads up to what the skin bears
+_HARD = 0.5  # share of the draws with loads up to the limit of the skin
 _WIDEST, _HARDEST = 2.9, 0.09  # a/h and L that it bears
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import orjson
 
-KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
+KEY = re.compile(r"us_[\w-]{16,}")  # a text that looks like a key, wherever it is
 
 
 def without_keys(text: str) -> str:

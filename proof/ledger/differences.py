@@ -26,7 +26,7 @@ class Compared:
 
     part: str
     pairs: Sequence[tuple[Line, Line]]
-    seconds: tuple[float, float]  # processor time of the diagnoses, kept and new; nan where it is not known
+    seconds: tuple[float, float]  # processor time of the diagnoses, stored and new; nan if unknown
 
     def changed(self) -> list[tuple[Line, Line]]:
         """Pairs of different answers."""

@@ -50,7 +50,7 @@ class Sessions:
         noted = sessions.NewSession(session.id_of(cookie), key.name, key.sha256, address, shown, expires_at)
         try:
             self._store.write(sessions.add, noted)
-        except _STORE_FAILED as error:  # on a full disk what is kept can be read, by who logs in now, too
+        except _STORE_FAILED as error:  # on a full disk stored data can still be read, also by those who log in now
             self._failure.log("a login cannot be noted: the session ends with its key, or when it expires", error)
         return cookie
 

@@ -25,7 +25,7 @@ from underskin.recordings.rig_description import parse as parse_rig
 from underskin.several_errors import SeveralInvalid, errors_of
 
 RIG = "rig"  # name of the form's part that is a rig description
-_MOST_ERRORS = 100  # in the problem of a request of which nothing is kept
+_MOST_ERRORS = 100  # in the problem of a request of which nothing is stored
 _MOST_LISTED_ERRORS = 3  # of them in its sentence
 
 
@@ -44,7 +44,7 @@ class IngestOptions:
     most_unfolded_bytes: int
     estimator: Estimator | None = None
     turn_curves: bool = False  # that count pressing negative
-    use_stored_rig: bool = True  # whether the rig description kept with the skin counts where none is sent
+    use_stored_rig: bool = True  # whether the stored rig description of the skin is used if none is sent
     signed: str | None = None  # who corrects a campaign, as typed on a page; None: the sender
 
     def __post_init__(self) -> None:

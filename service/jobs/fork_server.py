@@ -101,7 +101,7 @@ def _become(descriptors: list[int], work: Callable[[], None]) -> NoReturn:
 def _report_exit(pid: int, status: int) -> None:
     """Write how a worker ended to the descriptor `status`: its exit code, or −signal."""
     code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    with suppress(OSError):  # nobody wants to know any more
+    with suppress(OSError):  # the server has ended
         os.write(status, b"%d" % code)
     os.close(status)
 

@@ -117,7 +117,7 @@ class WorkerProcess:
 
     def close(self) -> None:
         """Close its pipes."""
-        with suppress(OSError):  # what it had not read is lost with it
+        with suppress(OSError):  # unread input is lost with it
             self._shared.close()
 
 

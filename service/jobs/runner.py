@@ -20,10 +20,10 @@ from underskin.recordings.validation import LONGEST_NAME
 logger = logging.getLogger("underskin")
 
 _POLL_S = 2.0  # how often the queue is looked at: another server may have put something in
-_BEAT_S = 2.0  # how often a running one is kept alive and its progress kept
+_BEAT_S = 2.0  # interval of heartbeats and of stored progress
 _JOIN_S = 10.0
 _LONG_S = 30.0  # from which on a diagnosis that runs holds up others no more
-_SHORT_S = 60.0  # within which one must end that runs beside as many long ones as there are workers
+_SHORT_S = 60.0  # within which a diagnosis must end that runs in addition to as many long ones as there are workers
 _STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
@@ -102,7 +102,7 @@ class Runner:
                     pass
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            # Not while one starts: it may hold for minutes what this would wait for.
+            # Not while one starts: it may hold for minutes the lock for which this would wait.
             if not self._stirred.wait(_POLL_S) and not self._starting():
                 self._processes.get_ready()
 

@@ -96,7 +96,7 @@ def work(table: "SigmaTable | None", problem: str) -> None:
     from underskin.errors import UnderskinError
 
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # output that a library prints is no answer
 
     def send_message(message: dict[str, Any]) -> None:
         answers.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))

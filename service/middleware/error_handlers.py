@@ -66,7 +66,9 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
     match error:
         case Refusal():
             return error
-        case HTTPException(__cause__=Refusal() as refusal):  # FastAPI wraps what ends the reading of a body
+        case HTTPException(
+            __cause__=Refusal() as refusal
+        ):  # FastAPI wraps the exception that ends the reading of a body
             return refusal
         case HTTPException(__cause__=ClientDisconnect()):
             return Refusal(499, "The client left before its body was complete.", title="Client closed request")

@@ -45,7 +45,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         self._body_bytes = 0  # since `_progress`
         self._progress = self._heard = self.loop.time()
         self._unsent = 0
-        self._answered: float | None = None  # when a request was whose body still comes
+        self._answered: float | None = None  # time of a request whose body is still coming
 
     def connection_made(self, transport: Any) -> None:
         """Beyond the limit idle connections are closed, or only `/health` is answered."""
@@ -200,7 +200,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         if limit == "idle_answer" or (self.cycle is not None and self.cycle.response_started):
             self.transport.abort()
             return
-        if self._in_body or self._head_bytes:  # who has said nothing is told nothing
+        if self._in_body or self._head_bytes:  # no answer to a client that has sent nothing
             self.transport.write(b"".join((STATUS_LINE[408], b"connection: close\r\ncontent-length: 0\r\n\r\n")))
         self.transport.close()
 

@@ -14,7 +14,7 @@ from underskin.recordings.readers.sandbox import call_apart
 LONG_BYTES = 1_000_000  # beyond which a body is parsed apart: up to here it takes some hundredths of a second
 _MOST_NUMBERS = 2_000_000  # in one list of a body: its answer takes many times the memory of a column
 _READ = "underskin.recordings.readers.long_json:read"
-_MOST_PLAIN_BYTES = 12_000_000  # beside long lists of numbers: this part goes through this process's parser
+_MOST_PLAIN_BYTES = 12_000_000  # besides long lists of numbers: this part goes through this process's parser
 _MEMORY_TIMES, _LEAST_MEMORY_BYTES = 5, 150_000_000  # of the parsing process; the body itself is held here
 
 

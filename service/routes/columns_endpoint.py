@@ -30,7 +30,7 @@ Sheet = Annotated[
     Query(min_length=1, max_length=200, description="Of a workbook with several sheets: which of them, by its name."),
 ]
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
-# Beside JSON, what an answer in columns may be, for OpenAPI.
+# Formats of an answer in columns besides JSON, for OpenAPI.
 OTHER_ANSWERS: dict[str, Any] = {CSV: {}, NPZ: _BINARY}
 
 NOTES = "Underskin-Notes"
@@ -68,10 +68,10 @@ def add_columns_route(
         most_bytes = request.app.state.access.max_body_bytes
 
         def work() -> Response:
-            with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
+            with np.errstate(all="ignore"):  # an overflow is answered as out of the domain
                 sent, names_sent = parse(kind, body, content_type, most_bytes, sheet)
                 columns = answer(table, store, sent)
-                if preferred(accept) == CSV:  # the rows go back to where they came from, with what they are called
+                if preferred(accept) == CSV:  # CSV rows are returned to their source, with their labels
                     columns = replace(columns, names={**names_sent.labels, **columns.names})
                 answered = respond(columns, accept)
                 if names_sent.notes:
@@ -109,7 +109,7 @@ async def answer_json(request: Request, answer: Callable[[Any], Response]) -> Re
     body = await request.body()
 
     def work() -> Response:
-        with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
+        with np.errstate(all="ignore"):  # an overflow is answered as out of the domain
             return answer(json_document(body, request.headers.get("content-type", "")))
 
     return await heavy_answers.in_turn(work)

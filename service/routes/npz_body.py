@@ -28,7 +28,7 @@ NPZ = "application/x-npz"
 _MOST_HEADER = 1000  # characters; np.savez writes some hundred
 _MOST_MEMBERS = 64
 _DIRECTORY_END = 22  # bytes of a zip archive's last record
-_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what np.savez and np.savez_compressed write
+_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # the methods of np.savez and np.savez_compressed
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 

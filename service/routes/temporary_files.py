@@ -38,7 +38,7 @@ def made_file(request: Request, name: str, media_type: str, write: Callable[[Pat
     if WITHOUT_CONTENT in request.scope:
         headers = FileResponse("", media_type=media_type, filename=name).headers
         answer = Response(headers=headers)
-        del answer.headers["Content-Length"]  # as long as nothing is written, nobody knows it
+        del answer.headers["Content-Length"]  # unknown as long as nothing is written
         return answer
     folder: UploadFolder = request.app.state.uploads
     with disk_errors_refused(folder):

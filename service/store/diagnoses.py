@@ -26,7 +26,7 @@ from underskin.recordings.campaign import Campaign
 HEARTBEAT_TIMEOUT_S = 10.0
 _USABLE = ("queued", "running", "done")
 
-# All but the report and its figures, and what is said of its campaign: of several, of the latest of them.
+# All but the report and its figures, with columns of its campaign, of several the latest of them.
 _LISTED = (
     *[column for column in diagnoses.c if column.name not in ("report", "figures")],
     campaigns.c.id.label("campaign_id"),

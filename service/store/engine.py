@@ -19,7 +19,7 @@ from service.store.sqlite_files import SqliteFiles
 from service.store.write_turns import SOON_S, WAIT_S, WriteTurns, busy
 
 SQLITE_FILE = "underskin.sqlite3"
-CONNECTION_WAIT_S = 10.0  # for one of the connections of a pool, beside the wait for other writers
+CONNECTION_WAIT_S = 10.0  # for a connection of the pool, in addition to the wait for other writers
 _TAKES_NOTHING = (errno.EROFS, errno.EIO, errno.EFBIG)  # the last where files may not grow beyond some size
 _NOT_WRITTEN = (  # of SQLite, other than for a full disk
     sqlite3.SQLITE_IOERR_WRITE,
@@ -109,7 +109,7 @@ class Database:
                     connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
                 yield connection
                 self.require_in_place()
-            self.require_in_place()  # what was moved during the commit is not acknowledged either
+            self.require_in_place()  # a move during the commit is not acknowledged either
             self._turns.note(in_vain=False)
         except (DBAPIError, OSError) as error:
             failure = storage_failure(error)
@@ -159,7 +159,7 @@ class Database:
             if not self.is_sqlite:
                 yield
                 return
-            self.require_in_place()  # a lock elsewhere, made anew, would keep nobody out
+            self.require_in_place()  # a new lock file elsewhere would exclude nobody
             with self._turns.sole(self._lock_file, wait_s):
                 yield
 
@@ -233,7 +233,7 @@ def _engine(url: URL, files: SqliteFiles | None) -> Engine:
         "pool_timeout": CONNECTION_WAIT_S,
         "json_serializer": lambda value: orjson.dumps(value).decode(),
         "json_deserializer": orjson.loads,
-        "hide_parameters": True,  # what is kept, keys' digests included, stays out of errors, and so of the log
+        "hide_parameters": True,  # stored values, keys' digests included, stay out of errors and thus of the log
     }
     if files is not None:
         engine = create_engine(url, creator=files.connect, **options)

@@ -90,7 +90,7 @@ def restore(store: Database, file: Path, before: Path, progress: backup.Progress
     """
     require_known(backup.verify(store, file))
     store.make()
-    with store.without_writers():  # what is acknowledged after the backup would be lost
+    with store.without_writers():  # writes acknowledged after the backup would be lost
         needed = store.read(key_requirement.is_needed)
         if version(store) is not None:
             backup.make(store, before, progress)

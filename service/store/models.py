@@ -13,7 +13,7 @@ from service.store.tables import AnyRow, diagnoses, models
 from service.store.tables import skins as skin_rows
 from service.store.times import now
 
-_MODEL_COLUMNS = [column.label(f"model_{column.name}") for column in models.c]  # beside what is said of the diagnosis
+_MODEL_COLUMNS = [column.label(f"model_{column.name}") for column in models.c]  # next to the columns of the diagnosis
 
 
 def adopt(connection: Connection, root: str, diagnosis: AnyRow, adopted_from: str | None) -> AnyRow:

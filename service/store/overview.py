@@ -50,7 +50,7 @@ def glances(
     the one with the campaign of the number `before`."""
     last = func.max(campaigns.c.number)
     latest = func.coalesce(func.max(case((kept.CURRENT, kept.TIME))), func.max(kept.TIME))
-    listed = func.count(case((kept.LISTED, campaigns.c.number)))  # not what was discarded
+    listed = func.count(case((kept.LISTED, campaigns.c.number)))  # not discarded ones
     query = select(skins.c.root_id, listed, last).join(skins, skins.c.id == campaigns.c.skin_id)
     put_away = select(skins.c.id).where(skins.c.discarded_at.is_not(None)).correlate(None)
     query = query.where(skins.c.root_id.not_in(put_away))

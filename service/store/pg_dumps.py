@@ -18,7 +18,7 @@ from service.store.engine import Database
 from service.store.errors import StoreError
 from service.store.tables import metadata
 
-Copied = Callable[[int, int | None], object]  # told the bytes that are done, and how many there are where that is known
+Copied = Callable[[int, int | None], object]  # called with the bytes done, and the total if known
 _STEP_BYTES = 1 << 20
 _LOOK_S = 0.1
 _APART = "underskin_restoring"  # the schema that a dump is read into, while the store's own tables are read
@@ -60,7 +60,7 @@ def replace(database: Database, file: Path, copied: Copied) -> None:
     address, password = _address(database)
     schema = str(database.read(lambda connection: connection.execute(text("SELECT current_schema()")).scalar_one()))
     tables = _TABLE_IN_LIST.findall(_run("pg_restore", "--list", str(file)))
-    gone = ", ".join(f'"{schema}".{name}' for name in sorted({*tables, *metadata.tables, "alembic_version"}))
+    dropped = ", ".join(f'"{schema}".{name}' for name in sorted({*tables, *metadata.tables, "alembic_version"}))
     moved = "".join(f'ALTER TABLE {_APART}.{name} SET SCHEMA "{schema}";\n' for name in tables)
     command = ["psql", "--dbname", address, "--quiet", "--no-psqlrc", "--set=ON_ERROR_STOP=1", "--output=/dev/null"]
     with (
@@ -73,7 +73,9 @@ def replace(database: Database, file: Path, copied: Copied) -> None:
             script.write(f"BEGIN; CREATE SCHEMA {_APART};\n".encode())
             complete = _write_script(file, tables, script, complaints, copied)
             end = (
-                f"DROP TABLE IF EXISTS {gone};\n{moved}DROP SCHEMA {_APART};\nCOMMIT;\n" if complete else "ROLLBACK;\n"
+                f"DROP TABLE IF EXISTS {dropped};\n{moved}DROP SCHEMA {_APART};\nCOMMIT;\n"
+                if complete
+                else "ROLLBACK;\n"
             )
             script.write(end.encode())
         psql.wait()

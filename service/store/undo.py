@@ -16,7 +16,7 @@ from service.store.tables import AnyRow, campaigns, diagnoses, models, recording
 from service.store.tables import skins as skin_rows
 from service.store.times import now
 
-_FIGURES = ("withdraw", "exclude", "correct", "join")  # what changes figures; so does putting a campaign away
+_FIGURES = ("withdraw", "exclude", "correct", "join")  # changes that affect figures; discarding a campaign does too
 
 
 def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRow:

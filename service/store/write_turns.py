@@ -13,7 +13,7 @@ from typing import IO
 from sqlalchemy.exc import OperationalError
 
 WAIT_S = 20.0  # for others' writes, a restore included; then the client is asked to come again
-SOON_S = 1.0  # the same for what can be made again, and need not be kept now
+SOON_S = 1.0  # the same for data that can be made again and need not be stored now
 MOST_WAITING = 64  # of the threads of a process (`THREADS`)
 THREADS = 2 * MOST_WAITING  # that answer requests
 FOR_A_PLACE_S = 1.0  # a burst of more writes passes within that, while nobody holds the lock

@@ -83,7 +83,7 @@ def adopt(connection: Connection, skin_id: str, diagnosis_id: str, sender: str |
         raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
     if diagnosis.kind != "campaign":
         raise Conflict(f"Diagnosis {diagnosis.id!r} is of several campaigns: adopt the diagnosis of one of them.")
-    of_row(connection, diagnosis)  # which refuses what cannot serve
+    of_row(connection, diagnosis)  # which rejects unusable models
     return models.adopt(connection, root, diagnosis, sender)
 
 
@@ -122,7 +122,7 @@ class RowsUnderModel:
     """The rows of a request under an adopted model."""
 
     model_in_force: ModelInForce
-    columns: Mapping[str, Floats]  # as in the answer, those that an adopted model can tell
+    columns: Mapping[str, Floats]  # as in the answer, those that an adopted model provides
     level: Floats  # (rows,) FRF over d33 on the plateau [-]
     inside: NDArray[np.bool_]  # (rows,)
     _request: PressedSkinColumns

@@ -7,7 +7,7 @@ from sqlalchemy import Connection
 from service.schemas.changes import Change
 from service.store import AnyRow, changes, models, undo
 
-_MOST = 20  # the latest, of which it is said whether they can be undone
+_MOST = 20  # the latest, for which it is stated whether they can be undone
 _NAMES = ("name", "title")
 _DONE = {"withdraw": "withdrawn", "discard": "discarded", "correct": "put in the place of another campaign"}
 _STORED_FIELDS = set(Change.model_fields) - {"statement", "undone", "may_be_undone"}

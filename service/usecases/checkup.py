@@ -61,7 +61,7 @@ def examine(settings: Settings) -> Iterator[Observation]:
                 for look in (_of_clock, _of_queue):
                     yield store.read(look)
         except (DBAPIError, StoreMoved, OSError) as error:
-            if answers.level is not Level.CRITICAL:  # else it is said already
+            if answers.level is not Level.CRITICAL:  # otherwise reported already
                 yield _unanswered(error)
         yield from carried_out("keys", _of_keys(settings, needed=needed, made=made))
 

@@ -107,9 +107,9 @@ def derive(
         try:
             row = store.read(campaigns.find, campaign_id)
             answers[campaign_id] = answer(store, table, row, None, soon=soon)
-            with suppress(Refusal, Conflict, InvalidInput):  # where no model is in force, or it cannot tell this one
+            with suppress(Refusal, Conflict, InvalidInput):  # without a model in force, or if it does not apply
                 adopted_answer(store, table, row, model_in_force(store, row.skin_id), None, soon=soon)
-        except Exception:  # the campaign itself is kept, and that is what was promised
+        except Exception:  # the campaign itself is stored, as promised
             logger.exception("no d33 from a campaign", extra={"fields": {"campaign": campaign_id}})
     return answers
 
@@ -204,7 +204,7 @@ def _computed(
     try:
         fields, inversion = _inverted(campaign, table, band_hz)
         full_document = {**document, **fields, "left_out": entries + fields["left_out"]}
-        D33.model_validate(orjson.loads(orjson.dumps(full_document)))  # what is kept can be answered
+        D33.model_validate(orjson.loads(orjson.dumps(full_document)))  # stored answers must be valid
     except InvalidInput:  # of the band
         raise
     except Exception as error:

@@ -24,7 +24,7 @@ from underskin.surrogate.off_centre_sigma import sigma_beside
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
-THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # what is searched, within the table
+THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # the search range, within the table
 _THICKNESSES, _RADII = 8, 6
 _CONTACT: ContactName = "solved"
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors

@@ -22,7 +22,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 ALIKE = 0.7  # cosine from which on another mechanism is named
 _MOST_TWINS = 4
-_OTHER_AXES = {  # those that no unnamed law follows
+_OTHER_AXES = {  # axes that no unlisted law follows
     "position_mm": "the place of the sphere",
     "phase": "the phase",
     "sample_height_mm": "the sample's height",
@@ -59,7 +59,7 @@ class Catalogue:
 
 def catalogue(store: Database, table: SigmaTable) -> Catalogue:
     """The present catalogue."""
-    laws, listed = mechanisms.catalogue(), {listed_entry.name: listed_entry for listed_entry in mechanisms.entries()}
+    laws, listed = mechanisms.catalogue(), {item.name: item for item in mechanisms.entries()}
     alike, seen = _twins(table, digest()), findings(store)
     return Catalogue(
         [

@@ -15,7 +15,7 @@ from underskin.errors import FileError
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.folder import FOLDER
 
-_SET_ASIDE = "discarded"  # a folder beside the files, from which none is read
+_SET_ASIDE = "discarded"  # a folder next to the files that is not read
 
 
 @dataclass(frozen=True)

@@ -66,14 +66,14 @@ def keep(content: bytes) -> MechanismEntry:
     folder = mechanism_files.folder_of_lab()
     mechanism = checked(content, "", apart=True)
     file = folder / f"{mechanism.name}.yaml"
-    kept_entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
+    new_entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
     if mechanism.name in catalogue():
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.")
     try:
         mechanism_files.write(file, content)
     except FileExistsError:
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.") from None
-    return kept_entry
+    return new_entry
 
 
 def keep_found(connection: Connection, diagnosis_id: str, name: str, description: str | None) -> MechanismEntry:

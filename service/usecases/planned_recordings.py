@@ -54,8 +54,8 @@ def _places(about: Mapping[str, Any]) -> dict[str, list[float]]:
 
 def _off_centre_mm(conditions: Mapping[str, Any], places: Mapping[str, list[float]]) -> Floats:
     """Offset of the sphere from the sensor's position, x and y [mm]; 0 if no position is given."""
-    sensor_place = places[conditions["sensor"]]
-    return np.subtract(conditions.get("position_mm") or sensor_place, sensor_place)
+    sensor_position = places[conditions["sensor"]]
+    return np.subtract(conditions.get("position_mm") or sensor_position, sensor_position)
 
 
 def _is_planned(recorded: Mapping[str, Any], planned: Mapping[str, Any]) -> bool:

@@ -32,7 +32,7 @@ logger = logging.getLogger("underskin")
 _PREFIX, _STAMP = "underskin-", "%Y%m%dT%H%M%SZ"
 _NAME = re.compile(rf"{_PREFIX}(\d{{8}}T\d{{6}}Z)\.(?:sqlite3|pgdump)")
 SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
-_SMALLER = 0.5  # of the largest one's bytes: it is not the same store, or most of it is gone
+_SMALLER = 0.5  # of the largest one's bytes: below, it is another store, or most of it is gone
 _LOCK = ".underskin-backup-lock"
 OWNER = ".underskin-backups-of"  # holds the identity of the store whose folder it is
 _NOTE = "scheduled-backups-in"  # of the data folder: holds the address of the folder that they were last made in
@@ -174,7 +174,7 @@ class ScheduledBackups:
             file = self._folder / f"{_PREFIX}{datetime.now(UTC):{_STAMP}}{suffix}"
             try:
                 self._store.write(mechanism_files.remember)
-            except StorageFailed as error:  # a disk that takes nothing here keeps nobody from a backup elsewhere
+            except StorageFailed as error:  # an unwritable disk here must not prevent a backup elsewhere
                 logger.warning("mechanisms of the lab's own are in the backup as they were at the last one: %s", error)
             backup.make(self._store, file)
             self._rotate(file.stat().st_size)
@@ -192,7 +192,7 @@ class ScheduledBackups:
             durable.write_text(owner, self._store.read(identity.find) or self._store.write(identity.ensure))
         self._owned = True
         if not self._is_noted():
-            with suppress(OSError):  # a disk that takes nothing here keeps nobody from a backup elsewhere
+            with suppress(OSError):  # an unwritable disk here must not prevent a backup elsewhere
                 durable.write_text(self._note, self._address)
 
     def _is_noted(self) -> bool:

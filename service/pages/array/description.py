@@ -23,7 +23,7 @@ from underskin.several_errors import all_of, noting
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
-# The L up to which it is known what finite strain adds, and how much in percent there (docs/http-api.md).
+# The L up to which the addition by finite strain is known, and that addition in percent (docs/http-api.md).
 _KNOWN_UP_TO_L, _ADDED_PERCENT = 0.1, 3
 GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
 _DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
@@ -46,7 +46,7 @@ class Described:
     glue: str
     units_checked: bool
     sensors: Sequence[Mapping[str, Any]] | None  # the skin's; None: a grid of the form's
-    taken: Sequence[str]  # in sentences, which values nobody declared
+    taken: Sequence[str]  # sentences on undeclared values
 
     @property
     def fields(self) -> Sequence[tuple[str, str, str]]:
@@ -120,7 +120,7 @@ def _form_field(error: InvalidInput) -> str:
 def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
     """The answer of `POST /v1/stress`; raises UnderskinError."""
     table = influence_table(request.app.state.settings.tables)
-    with np.errstate(all="ignore"):  # what overflows is out of reach
+    with np.errstate(all="ignore"):  # an overflow is out of reach
         return answer(table, read_request(document))
 
 

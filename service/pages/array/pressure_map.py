@@ -35,7 +35,7 @@ router = APIRouter(prefix="/loads/map")
 _EXAMPLE = "map.csv"
 _LARGEST_BYTES = 1_000_000
 _LARGEST_BODY_BYTES = 2 * _LARGEST_BYTES + 100_000  # a file, the text of the last map, and the other fields
-_LONGEST_FIELD = 1000  # bytes of a field beside the map
+_LONGEST_FIELD = 1000  # bytes of a field other than the map
 _MAP, _FILE, _SKIN = "map", "file", "skin"
 
 

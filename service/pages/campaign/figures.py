@@ -15,7 +15,7 @@ _AGAINST_PRELOAD = (
 )  # fmt: skip
 _MOST_CURVES = 24
 _MOST_CACHED = 64
-Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, what is shown
+Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, shown part
 _cache: dict[Which, list[Drawn]] = {}
 _keeping = Lock()
 

@@ -8,7 +8,7 @@ from service.pages.shared.formats import change_in_percent, short_and_exact
 from service.schemas.design import DesignAnswer
 from underskin.prediction.answers import OTHER, WORDS
 
-BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
+BLIND_PERCENT = 10.0  # of the response above a sensor: below, it is invisible
 
 
 @dataclass(frozen=True)

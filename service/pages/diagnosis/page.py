@@ -125,7 +125,7 @@ def _outdated(connection: Connection, row: AnyRow) -> str | None:
     def named(match: re.Match[str]) -> str:
         try:
             return f"“{campaigns.find(connection, match[0]).name}”"
-        except Missing:  # it stands in what a person wrote
+        except Missing:  # the text is user input
             return match[0]
 
     why = diagnoses.outdated(row)
@@ -216,7 +216,7 @@ def _why_not_adopted(report: Mapping[str, Any]) -> str | None:
     try:
         document(report, "kept")
     except InvalidInput as refusal:
-        return refusal.allowed.removesuffix(": it cannot be kept")  # as the page has said
+        return refusal.allowed.removesuffix(": it cannot be kept")  # as stated on the page
     return None
 
 

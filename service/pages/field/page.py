@@ -139,7 +139,7 @@ def _computed(table: SigmaTable, given: Mapping[str, float], count: int, units_c
     skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
     force = checked("preload_n", given["preload_n"], units_checked=units_checked)
-    with np.errstate(all="ignore"):  # what overflows is outside the table
+    with np.errstate(all="ignore"):  # an overflow is outside the table
         return stress_field(table, skin, indenter, force * np.arange(1, count + 1) / count, _RADII, _DEPTHS)
 
 

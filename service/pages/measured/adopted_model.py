@@ -18,7 +18,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 if TYPE_CHECKING:
     from underskin.prediction.adopted_model import AdoptedModel
 
-# Words and unit of what a model may need beside sphere and preload.
+# Words and unit of the additional values that a model may need besides sphere and preload.
 _NEEDED = {
     "dynamic_force_n": ("dynamic force", "N"),
     "dwell_s": ("time the preload was held", "s"),

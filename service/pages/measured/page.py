@@ -35,7 +35,7 @@ FIELDS = tuple(field for field in SKIN_FIELDS if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
 _WITHOUT_UNCERTAINTY = 3  # numbers of a row
 _ROWS = "4 1 7.06 0.1\n4 3 7.45 0.1"
-_ROW, _ALL_ROWS = "row", "measurements"  # as errors call what is in the rows
+_ROW, _ALL_ROWS = "row", "measurements"  # names in errors of the columns of the rows
 _CHECKS: dict[str, Check] = {
     "indenter_radius_mm": declared,
     "preload_n": declared,

@@ -38,7 +38,7 @@ class Drawn:
     json: Markup
     numbers: str | None  # address of its numbers as CSV
     about: str
-    choices: tuple[str, ...] = ()  # what one can choose to see, the first at first
+    choices: tuple[str, ...] = ()  # selectable views, the first is the default
 
 
 def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None) -> Drawn:

@@ -47,7 +47,7 @@ _LABELS = {
     "reason": "Reason",
     "who": "Your name",
     "skin_id": "Id of the other skin",
-}  # of forms that change what is kept
+}  # of forms that change stored data
 
 
 async def _fields(request: Request) -> dict[str, str]:

@@ -41,7 +41,7 @@ def headers() -> dict[str, str]:
     return {
         "Content-Security-Policy": _policy(),
         "X-Content-Type-Options": "nosniff",
-        "Referrer-Policy": "same-origin",  # with no referrer, a form would tell no origin either
+        "Referrer-Policy": "same-origin",  # without a referrer, a form would send no origin either
         "Cross-Origin-Opener-Policy": "same-origin",
         "Cache-Control": "no-store",
     }

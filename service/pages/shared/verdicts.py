@@ -139,7 +139,10 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 
 def _quoted(report: Mapping[str, Any]) -> str:
     """The d33 of a report in words; if it may not be quoted, with the report's reason."""
-    from underskin.diagnosis.reporting.wording import as_stated, not_quoted  # with what draws, which takes long
+    from underskin.diagnosis.reporting.wording import (
+        as_stated,
+        not_quoted,
+    )  # with plotting code, which is slow to import
 
     d33 = report["d33"]
     low, high = as_stated(d33["low"]), as_stated(d33["high"])

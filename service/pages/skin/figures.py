@@ -18,7 +18,7 @@ _MOST_NAMED = 5  # sensors, in a sentence
 
 Shown = Literal["d33", "uncertainty", "trend"]
 
-# Column of the values, column of their uncertainties, name, unit, what colours are compared against.
+# Column of the values, column of their uncertainties, name, unit, reference of the colour scale.
 _QUANTITIES: dict[Shown, tuple[str, str, str, str, Literal["others", "zero", "nothing"]]] = {
     "d33": ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33", "pC/N", "others"),
     "uncertainty": ("d33_uncertainty_pc_per_n", "d33_uncertainty_pc_per_n", "uncertainty of d33", "pC/N", "nothing"),
@@ -53,7 +53,7 @@ def _last(of_sensor: SensorHistory | None) -> dict[str, Any]:
     """The last value of a sensor that the latest campaign did not measure."""
     if of_sensor is None or not of_sensor.points:
         return {"reasons": "", "absent": "never measured with FRFs"}
-    from underskin.figures.style import SDS_OF_95  # with what draws, which takes long
+    from underskin.figures.style import SDS_OF_95  # with plotting code, which is slow to import
 
     point = of_sensor.points[-1]
     half = SDS_OF_95 * point.d33_uncertainty_pc_per_n
@@ -85,7 +85,7 @@ def drawn_map(
     from underskin.figures.array_map import Quantity, array_map, told_apart
 
     value, uncertainty, name, unit, against = _QUANTITIES[show]
-    # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
+    # With few campaigns a slope's uncertainty is smaller than Student's t allows, so its own test decides.
     significant = tuple(row.get("significant", False) for row in rows) if show == "trend" else None
     ends = _ENDS.get(show)
     intervals = None if ends is None else tuple((row.get(ends[0]), row.get(ends[1])) for row in rows)

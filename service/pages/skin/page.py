@@ -44,7 +44,7 @@ router = APIRouter(prefix="/skins/{skin_id}")
 _ON_A_PAGE = 50
 _SEVERAL: tuple[DiagnosisKind, ...] = ("skin", "fleet")
 _MOST_TOGETHER = 5  # of the latest diagnoses of each kind
-_AT_ONCE = 2  # campaigns whose d33 a page waits for
+_AT_ONCE = 2  # campaigns whose d33 a page computes before it answers
 _MAP_COLUMNS = (
     "sensor", "x_mm", "y_mm", *D33Value.model_fields,
     "slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year", "absent",

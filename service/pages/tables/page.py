@@ -20,7 +20,7 @@ from underskin.surrogate.sigma_table import SIGMA_TABLE
 
 router = APIRouter(prefix="/tables")
 
-# Of each table: its file, a title, what it holds.
+# Of each table: its file, a title, its content.
 _HELD = {
     "sigma": (
         SIGMA_TABLE,
@@ -38,7 +38,7 @@ _HELD = {
         "A sphere that sinks deep: what finite strain adds to σ, contact radius and depth. No answer uses it yet.",
     ),
 }
-# Words of an axis, and what it is in lab units on the paper's prototype: symbol, factor, unit.
+# Words of an axis, and its quantity on the paper's prototype in lab units: symbol, factor, unit.
 _H, _RT, _E = (PROTOTYPE[name] for name in ("thickness_mm", "sensor_radius_mm", "youngs_modulus_mpa"))
 _R = PROTOTYPE["indenter_radius_mm"]
 _AXES = {
@@ -63,8 +63,8 @@ class DescribedTable(TableEntry):
 
     title: str
     holds: str
-    domain: list[tuple[str, TableAxis, str]]  # words, the axis, what it is on the prototype
-    errors: list[tuple[str, float, float]]  # of what, median and largest
+    domain: list[tuple[str, TableAxis, str]]  # words, the axis, its quantity on the prototype
+    errors: list[tuple[str, float, float]]  # quantity, median and largest
     made: list[tuple[str, Any]]
     versions: str
 

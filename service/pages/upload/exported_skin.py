@@ -59,7 +59,7 @@ def bring_in(request: Request, store: Database, pending: PendingUpload) -> None:
         with pending_uploads.in_use(pending):
             try:
                 brought = skin_imports.bring_in(store, pending.files[0])
-            except Conflict:  # somebody changed what is here since it was looked at
+            except Conflict:  # the stored data were changed since it was examined
                 look(store, pending)
                 return
         pending.kept_at = f"/skins/{quote(brought.skin_id, safe='')}"

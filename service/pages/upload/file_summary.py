@@ -48,7 +48,7 @@ class RecordingSummary:
     points: int
     frf_pc_per_n: float | None
     recorded_at: str | None = None
-    conditions: Mapping[str, float | str] | None = None  # what the lab noted by names of its own
+    conditions: Mapping[str, float | str] | None = None  # conditions under names of the lab's own
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class FileSummary:
     campaigns: Sequence[str]  # their names
     skin: str | None
     described: Sequence[SkinDescription] = ()  # different ones, of its campaigns; of each the first sensors
-    known: Sequence[str] = ()  # what to know before it is kept
+    known: Sequence[str] = ()  # warnings before it is stored
     day: str | None = None  # of the first recording that has a time
     instrument: str | None = None  # that wrote it, as `instruments.recognised` has it
     parts: int = 0

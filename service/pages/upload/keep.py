@@ -52,7 +52,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
                 settings.max_unfolded_bytes,
                 pending.estimator,
                 turn_curves=pending.turned,
-                use_stored_rig=False,  # what the page showed is kept, and no more
+                use_stored_rig=False,  # exactly the previewed data are stored
                 signed=signed(request, sent) if pending.corrects is not None else None,
             )
             with pending_uploads.in_use(pending):
@@ -126,10 +126,10 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
             sentences.append(earlier[0])
         if store.read(repeats.changes_nothing, in_file.campaign, skin_id, corrects):
             sentences.append("it says the same as the campaign that it corrects: nothing would change.")
-        skin_kept = store.read(repeats.otherwise_named, in_file.campaign, corrects)
-        if skin_kept is not None:
+        stored_skin_id = store.read(repeats.otherwise_named, in_file.campaign, corrects)
+        if stored_skin_id is not None:
             sentences.append(
-                f"the file names skin {in_file.campaign.skin.id}, not {skin_kept}, that of the campaign that it "
+                f"the file names skin {in_file.campaign.skin.id}, not {stored_skin_id}, that of the campaign that it "
                 "corrects: the name below decides."
             )
         sentences += [

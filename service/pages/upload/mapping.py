@@ -59,11 +59,11 @@ def guessed(
     for channel, field in zip(channels, fields, strict=True):
         if field and field not in channels_by_field:
             channels_by_field[field] = {"channel": channel.name}
-    known_skin = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
+    skin_values = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
     return {
         "schema": SCHEMA,
         "kind": kind,
-        "skin": {"poisson_ratio": 0.5, **known_skin},
+        "skin": {"poisson_ratio": 0.5, **skin_values},
         "recording": _stated(properties, kind, dated=dated),
         "channels": spring_mapping.guessed(channels_by_field, channels, properties)
         if kind == "indentation"

@@ -43,7 +43,7 @@ from underskin.recordings.frf.estimators import checked_estimator
 
 router = APIRouter(prefix="/upload")
 
-_LONGEST_FIELD = 1000  # bytes of a field beside the files
+_LONGEST_FIELD = 1000  # bytes of a field other than the files
 _ESTIMATOR = "estimator"
 _ESTIMATORS = {"H1": "noise in the charge", "H2": "noise in the force", "Hv": "noise in both"}  # for which each is
 _MOST_SKINS = 200  # that the form offers

@@ -27,7 +27,7 @@ from underskin.recordings.rig_description import RigDescription
 LASTS_S = 3600.0
 _MOST_UPLOADS = 50
 _MOST_OF_SESSION = 5
-_MOST_DRAWN = 6  # files whose figures are kept
+_MOST_DRAWN = 6  # files whose figures are cached
 _GONE = (
     "This upload is not here any more: an upload that is not kept goes after an hour, when room is needed for others, "
     "or when the server is restarted. Nothing of it was kept; send it again."
@@ -59,26 +59,24 @@ class PendingUpload:
     skin: str | None = None
     rig: RigDescription | None = None
     rig_label: str | None = None  # the file that a request would send it as; None where none need be sent
-    remembered: Remembered | None = None  # where `rig` comes from, unless it was sent or said in the form
-    lacking: Remembered | None = None  # what was remembered for the skin, and needs channels that these files lack
+    remembered: Remembered | None = None  # origin of `rig`, unless it was sent or entered in the form
+    lacking: Remembered | None = None  # a stored rig description of the skin that needs channels which these files lack
     draft: dict[str, Any] | None = None  # the rig description as the form had it, usable or not
-    of_files: Mapping[int, Mapping[str, str]] = field(default_factory=dict)  # what was typed of single files
-    refused: list[dict[str, Any]] = field(
-        default_factory=list
-    )  # what is wrong with the form, or kept it from being kept
+    of_files: Mapping[int, Mapping[str, str]] = field(default_factory=dict)  # typed values of single files
+    refused: list[dict[str, Any]] = field(default_factory=list)  # errors of the form, or errors that prevented storing
     seen: list[FileSummary] = field(default_factory=list)
     drawn: dict[int, list[Drawn]] = field(default_factory=dict)
     estimator: Estimator | None = None  # of FRFs from time series, whatever files or rig say
-    corrects: str | None = None  # the campaign whose place it takes
+    corrects: str | None = None  # the campaign that it replaces
     reason: str = ""  # why it does
     who: str = ""  # that says so, as typed
     skin_summary: SkinSummary | None = None  # where it is an exported skin
     negative: bool = False  # whether curves of it count pressing negative
     turned: bool = False  # whether those were turned
-    kept_at: str | None = None  # the page of what was kept
+    kept_at: str | None = None  # the page of the stored data
     discarded: bool = False  # it can be taken back while it is here
     users: int = 0  # that read its files now
-    given_up: bool = False  # whether its files go as soon as nobody reads them
+    given_up: bool = False  # whether its files are removed once nobody reads them
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property

@@ -7,7 +7,7 @@ from service.pages.upload.file_summary import ChannelSummary
 from underskin.errors import InvalidInput, wrong_type
 from underskin.recordings.readers.unit_labels import labelled_unit, unit
 
-DEFLECTION = "deflection"  # what a channel can be in the form beside a campaign's fields
+DEFLECTION = "deflection"  # roles of a channel in the form besides a campaign's fields
 SPRING = "spring_constant_n_per_m"
 CURVES = {
     "": "each part of the file",
@@ -60,9 +60,9 @@ def shown_as(document: Mapping[str, Any], name: str) -> tuple[str, Mapping[str, 
 def spring_constant(document: Mapping[str, Any]) -> Any:
     """The constant [N/m] that the form shows: a number, `{property: NAME}`, or None."""
     channels = document.get("channels", {})
-    given = channels.get("force_n", {}).get(SPRING)
+    stated = channels.get("force_n", {}).get(SPRING)
     stiffness = channels.get("displacement_mm", {}).get("stiffness_n_per_mm")
-    return given if stiffness is None else _rounded(1e3 * stiffness)
+    return stated if stiffness is None else _rounded(1e3 * stiffness)
 
 
 def is_travel(document: Mapping[str, Any]) -> bool:

@@ -7,7 +7,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.spectra import mean_of
 from underskin.units import readable_unit
 
-_ALIKE = 0.2  # of the stated preload: what a measured one may differ by
+_ALIKE = 0.2  # allowed deviation of the measured preload, relative to the stated one
 _REPORTED_RATIO = 3.0  # times the stated preload: beyond that, the findings of a campaign's d33 say so
 _PARTS, _STEADY = 4, 0.2  # of a recording, in which the means of a static force are alike, as a part of its mean
 
