@@ -17,7 +17,7 @@ async def in_turn(work: Callable[[], _Answer]) -> _Answer:
         return await asyncio.to_thread(work)
 
 
-def each_in_turn(endpoint: Callable[_Parameters, _Answer]) -> Callable[_Parameters, Awaitable[_Answer]]:
+def computed_in_turn(endpoint: Callable[_Parameters, _Answer]) -> Callable[_Parameters, Awaitable[_Answer]]:
     """An endpoint that answers the same `in_turn`; `inspect.unwrap` gives the endpoint back."""
 
     @functools.wraps(endpoint)

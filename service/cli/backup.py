@@ -41,7 +41,7 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
     try:
         make_data_folder(settings.data)
         store = database(settings.database_url, settings.data)
-        before = backups.place(store, settings.data, "before-restore")
+        before = backups.path_for(store, settings.data, "before-restore")
         store.make()
         if migrate.version(store) is not None:
             _remember_mechanisms(store)

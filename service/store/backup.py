@@ -27,7 +27,7 @@ def untold(_what: str, _done: int, _of: int | None) -> None:
     """A progress callback that does nothing."""
 
 
-def place(database: Database, folder: Path, occasion: str) -> Path:
+def path_for(database: Database, folder: Path, occasion: str) -> Path:
     """The path of an automatic backup in the data folder; unique within a second too."""
     suffix = ".sqlite3" if database.is_sqlite else ".pgdump"
     return folder / "backups" / f"{occasion}-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{suffix}"

@@ -155,7 +155,7 @@ class Database:
     @contextmanager
     def _turn(self, wait_s: float) -> Iterator[None]:
         """The lock of writers; SQLite has one writer at a time anyway, but its own lock cannot span a restore."""
-        with self._turns.place():
+        with self._turns.slot():
             if not self.is_sqlite:
                 yield
                 return

@@ -31,7 +31,7 @@ def migrate(database: Database, folder: Path) -> None:
             require_known(before)
             occasion = f"before-{VERSIONS[-1]}"
             backup.remove_parts(folder, occasion)
-            backup.make(database, backup.place(database, folder, occasion))
+            backup.make(database, backup.path_for(database, folder, occasion))
         _upgrade(database)
 
 

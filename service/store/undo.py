@@ -162,7 +162,7 @@ def _uncorrect(connection: Connection, change: AnyRow, made_from: str | None) ->
     skins.bring_back(connection, skins.require_root(connection, older.skin_id))
 
 
-def _part(connection: Connection, change: AnyRow) -> None:
+def _separate(connection: Connection, change: AnyRow) -> None:
     """Separate the joined skin, and those that counted as it."""
     other, members = change.before["skin_id"], change.before["members"]
     counted = skin_rows.c.id.in_(members) & (skin_rows.c.root_id == change.skin_id)
@@ -188,7 +188,7 @@ def _campaign(connection: Connection, change: AnyRow, **values: object) -> None:
 _TAKE_BACK = {
     "withdraw": _use_again,
     "exclude": _include,
-    "join": _part,
+    "join": _separate,
     "annotate": _as_before,
     "discard": _as_before,
 }

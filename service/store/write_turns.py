@@ -16,7 +16,7 @@ WAIT_S = 20.0  # for others' writes, a restore included; then the client is aske
 SOON_S = 1.0  # the same for data that can be made again and need not be stored now
 MOST_WAITING = 64  # of the threads of a process (`THREADS`)
 THREADS = 2 * MOST_WAITING  # that answer requests
-FOR_A_PLACE_S = 1.0  # a burst of more writes passes within that, while nobody holds the lock
+SLOT_WAIT_S = 1.0  # a burst of more writes passes within that, while nobody holds the lock
 VAIN_S = 5.0  # for so long after a wait in vain nothing begins that takes long before it writes
 _LOOK_S = 0.005  # how often another process' lock is looked at
 
@@ -43,9 +43,9 @@ class WriteTurns:
             raise busy("a turn to write")
 
     @contextmanager
-    def place(self) -> Iterator[None]:
+    def slot(self) -> Iterator[None]:
         """A place among those that write or wait for a turn; raises OperationalError if none becomes free soon."""
-        if not self._places.acquire(timeout=FOR_A_PLACE_S):
+        if not self._places.acquire(timeout=SLOT_WAIT_S):
             raise busy("a turn to write")
         try:
             yield

@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.heavy_answers import each_in_turn
+from service.heavy_answers import computed_in_turn
 from service.pages.array.description import (
     LOAD,
     Described,
@@ -78,7 +78,7 @@ def charge_csv(
 
 
 @router.get("/base.csv")
-@each_in_turn
+@computed_in_turn
 def base_csv(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
     """The normal stress on the base, a row for each grid point."""
     document = _document(described(store, table, request.query_params, skin), loads)

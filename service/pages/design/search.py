@@ -9,7 +9,7 @@ import numpy as np
 from fastapi import APIRouter, Depends, Request, Response
 
 from service.dependencies import Store, Table
-from service.heavy_answers import each_in_turn
+from service.heavy_answers import computed_in_turn
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import in_form_words
 from service.pages.shared.html import page
@@ -69,7 +69,7 @@ TypedInQuery = Annotated[Typed, Depends(_typed)]
 
 
 @router.get("")
-@each_in_turn
+@computed_in_turn
 def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
     """The page."""
     searched, wrong = None, NOTHING_WRONG
@@ -95,7 +95,7 @@ def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
 
 
 @router.get("/region.csv")
-@each_in_turn
+@computed_in_turn
 def region_csv(table: Table, typed: TypedInQuery) -> Response:
     """Every examined pair of thickness and sensor radius."""
     with np.errstate(all="ignore"):

@@ -10,7 +10,7 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from service.dependencies import Store, Table
-from service.heavy_answers import each_in_turn
+from service.heavy_answers import computed_in_turn
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import UNLIKELY, in_form_words, number
@@ -81,7 +81,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
 
 
 @router.get("/frames")
-@each_in_turn
+@computed_in_turn
 def at_once(request: Request, table: Table) -> Response:
     """What changes in the page while the load grows, a frame for each force, as JSON."""
     from underskin.figures.stress_field import frames
