@@ -115,10 +115,10 @@ if __name__ == "__main__":
     parser.add_argument(
         "--against", metavar="REV", help="with diagnosis: processor time beside that of another revision"
     )
-    given = parser.parse_args()
-    unknown = set(given.parts) - set(PARTS)
+    options = parser.parse_args()
+    unknown = set(options.parts) - set(PARTS)
     if unknown:
         parser.error(f"no such part: {', '.join(sorted(unknown))}")
-    if given.against is not None and given.parts != ["diagnosis"]:
+    if options.against is not None and options.parts != ["diagnosis"]:
         parser.error("--against goes with diagnosis alone")
-    main(given.parts, given.against)
+    main(options.parts, options.against)

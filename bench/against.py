@@ -11,13 +11,13 @@ from pathlib import Path
 from statistics import median
 
 from bench.diagnosed import document
-from bench.diagnosis import CASES, ONE_THREAD, PRELOADS_N, ROOT, command_seconds
+from bench.diagnosis import CASES, PRELOADS_N, ROOT, SINGLE_THREAD, command_seconds
 from bench.figures import Figure
 
 ROUNDS = 3
 _COMMANDS = 8  # campaigns of which the whole command is timed
 _FASTER = 5.0
-_WITH_LAWS = 1.5  # times as long may it take to try laws that nobody listed as well, which no earlier revision did
+_WITH_LAWS = 1.5  # allowed ratio of time, because unlisted laws are tried too, which no earlier revision did
 NAMED_ALONE = """
 from underskin.diagnosis import pipeline
 pipeline.with_laws = lambda *_: ()
@@ -54,15 +54,15 @@ def measure(revision: str) -> list[Figure]:
     folder = os.environ.get("UNDERSKIN_CAMPAIGNS")
     sets = {"open campaigns": sorted((Path(folder) / "open").glob("*.json")) if folder else []}
     figures = []
-    with tempfile.TemporaryDirectory() as temporary, worktree(ROOT, revision, Path(temporary) / "tree") as other:
+    with tempfile.TemporaryDirectory() as temporary, worktree(ROOT, revision, Path(temporary) / "tree") as base_tree:
         sets["campaigns of 100 recordings × 60 lines"] = _written(Path(temporary))
         for name, files in sets.items():
             if not files:
                 continue
             rounds = [
                 (
-                    *(_seconds(ROOT, files), _seconds(ROOT, files, NAMED_ALONE), _seconds(other, files)),
-                    *([command_seconds(file, tree) for file in files[:_COMMANDS]] for tree in (ROOT, other)),
+                    *(_seconds(ROOT, files), _seconds(ROOT, files, NAMED_ALONE), _seconds(base_tree, files)),
+                    *([command_seconds(file, tree) for file in files[:_COMMANDS]] for tree in (ROOT, base_tree)),
                 )
                 for _ in range(ROUNDS)
             ]
@@ -110,7 +110,7 @@ def _seconds(tree: Path, files: Sequence[Path], before: str = "") -> list[float]
     run = subprocess.run(
         [sys.executable, "-c", before + OF_ANY_REVISION + _TIMES, *map(str, files)],
         cwd=tree,
-        env={**os.environ, **ONE_THREAD, "PYTHONPATH": str(tree), "UNDERSKIN_TABLES": str(tree / "tables")},
+        env={**os.environ, **SINGLE_THREAD, "PYTHONPATH": str(tree), "UNDERSKIN_TABLES": str(tree / "tables")},
         check=True,
         capture_output=True,
         text=True,

@@ -54,8 +54,10 @@ def measure() -> list[Figure]:
             "plain": _Contestant(_connected(plain), "/sigma", json, _JSON),
         }
         os.sched_setaffinity(0, {servers.LOAD_CORE})
-        _check_same_answers({name: one.answer() for name, one in contestants.items()})
-        times = interleaved({name: partial(seconds, one.answer) for name, one in contestants.items()}, ROUNDS)
+        _check_same_answers({name: contestant.answer() for name, contestant in contestants.items()})
+        times = interleaved(
+            {name: partial(seconds, contestant.answer) for name, contestant in contestants.items()}, ROUNDS
+        )
     over = "over a plain FastAPI route with SciPy"
     return [
         Figure(f"POST /v1/sigma, {ROWS:,} rows", ROWS / median(times["JSON"]), "rows/s", 1e6),

@@ -1,4 +1,4 @@
-"""Bodies of JSON as large as they may be: how long `/health` takes meanwhile, and the memory that they take."""
+"""JSON bodies of the largest allowed size: the response time of `/health` meanwhile, and the memory that they take."""
 
 import http.client
 import json
@@ -19,9 +19,9 @@ _EVERY_S = 0.01
 _P = 0.99
 
 
-def _filled(start: str, entry: str, end: str) -> bytes:
-    """A body whose middle is one entry again and again."""
-    return f"{start}{entry * ((_BYTES - len(start) - len(end)) // len(entry))}{end}".encode()
+def _filled(start: str, element: str, end: str) -> bytes:
+    """A body made of one repeated element."""
+    return f"{start}{element * ((_BYTES - len(start) - len(end)) // len(element))}{end}".encode()
 
 
 def _columns() -> bytes:
@@ -36,8 +36,10 @@ def _campaign(size: int = _BYTES) -> bytes:
     made = document({}, columns=4, preloads_n=(0.5, 1.0), lines=60)
     recordings = made["recordings"]
     assert isinstance(recordings, list)
-    entry = json.dumps(recordings[0])
-    entries = (entry.replace(f'"{recordings[0]["id"]}"', f'"r{number}"', 1) for number in range(size // len(entry)))
+    recording = json.dumps(recordings[0])
+    entries = (
+        recording.replace(f'"{recordings[0]["id"]}"', f'"r{number}"', 1) for number in range(size // len(recording))
+    )
     return (
         json.dumps({**made, "recordings": []})
         .replace('"recordings": []', f'"recordings": [{",".join(entries)}]')
@@ -61,26 +63,28 @@ def measure() -> list[Figure]:
     """The 99th percentile of `/health` while nothing else is asked and beside each body, and the most memory."""
     figures = []
     with servers.underskin() as server:
-        with _beside(server) as quiet:
+        with _small_requests(server) as quiet:
             time.sleep(_QUIET_S)
-        _post(server, "/v1/campaigns", _campaign(_BYTES // 1000), 201)  # starts what the server keeps ready afterwards
+        _post(
+            server, "/v1/campaigns", _campaign(_BYTES // 1000), 201
+        )  # starts the processes that the server keeps ready afterwards
         time.sleep(_QUIET_S)
         figures.append(Figure("/health beside nothing, 99th percentile", 1e3 * _percentile(quiet.times_s), "ms"))
         for name, (path, make, status) in _BODIES.items():
             body = make()
             before = memory_bytes(server.process.pid)
-            with _beside(server) as beside:
+            with _small_requests(server) as small_requests:
                 _post(server, path, body, status)
-            times = 1e3 * _percentile(beside.times_s)
+            times = 1e3 * _percentile(small_requests.times_s)
             figures.append(Figure(f"/health beside 62 MB, {name}, 99th percentile", times, "ms", 200, "lower"))
             longest = f"processor time of the server within one /health beside 62 MB, {name}, longest"
-            figures.append(Figure(longest, 1e3 * max(beside.held_s), "ms", 200, "lower"))
-            grown = (beside.memory_bytes - before) / len(body)
+            figures.append(Figure(longest, 1e3 * max(small_requests.held_s), "ms", 200, "lower"))
+            grown = (small_requests.memory_bytes - before) / len(body)
             figures.append(Figure(f"memory beside 62 MB, {name}", grown, "× the body", 6, "lower"))
     return figures
 
 
-class _Beside:
+class _SmallRequests:
     """What is measured while a request is answered."""
 
     def __init__(self) -> None:
@@ -91,8 +95,8 @@ class _Beside:
 
 
 @contextmanager
-def _beside(server: Server) -> Iterator[_Beside]:
-    seen = _Beside()
+def _small_requests(server: Server) -> Iterator[_SmallRequests]:
+    seen = _SmallRequests()
 
     def ask() -> None:
         connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
@@ -123,10 +127,10 @@ def _post(server: Server, path: str, body: bytes, status: int) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=600)
     connection.request("POST", path, body, {"Content-Type": "application/json"})
     answer = connection.getresponse()
-    said = answer.read()
+    message = answer.read()
     connection.close()
     if answer.status != status:
-        raise RuntimeError(f"{path} answered {answer.status}: {said[:500].decode()}")
+        raise RuntimeError(f"{path} answered {answer.status}: {message[:500].decode()}")
 
 
 def _percentile(times_s: list[float]) -> float:

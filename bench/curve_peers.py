@@ -55,8 +55,8 @@ def jkr(curve: Curve, contact_point: float, modulus: float, work: float) -> Floa
     return np.where(curve.depth >= contact_point, force, 0.0)
 
 
-def hertz_left(curve: Curve) -> float:
-    """The sum of squares [N²] that SciPy's least squares of Hertz' law leave."""
+def hertz_residual(curve: Curve) -> float:
+    """The residual sum of squares [N²] of SciPy's least squares of Hertz' law."""
     modulus = 1 / _reference(curve)
     return _least(
         curve,
@@ -65,8 +65,8 @@ def hertz_left(curve: Curve) -> float:
     )
 
 
-def jkr_left(curve: Curve) -> float:
-    """The sum of squares [N²] that SciPy's least squares of JKR's law and a steady drift leave, on a way in."""
+def jkr_residual(curve: Curve) -> float:
+    """The residual sum of squares [N²] of SciPy's least squares of JKR's law with a linear drift, for loading."""
     modulus = 1 / _reference(curve)
     jump = int(curve.force.argmin())
     gaps = np.arange(max(jump - _GAPS, 0), min(jump + _GAPS, len(curve.depth) - 1))
@@ -81,10 +81,10 @@ def jkr_left(curve: Curve) -> float:
     return _least(curve, lambda x: jkr(curve, x[0], modulus * np.exp(x[1]), np.exp(x[3])) + x[4] * along, starts)
 
 
-def nanite_left(curves: Sequence[Curve]) -> list[float]:
+def nanite_residuals(curves: Sequence[Curve]) -> list[float]:
     """The same of Hertz' law by nanite, from the environment that `make bench` installs for it."""
     python = _CHECKOUT / ".venv-nanite" / "bin" / "python"
-    asked = [
+    request = [
         {
             "radius_m": curve.radius,
             "poisson_ratio": curve.poisson_ratio,
@@ -96,13 +96,13 @@ def nanite_left(curves: Sequence[Curve]) -> list[float]:
     ]
     run = subprocess.run(
         [python, _CHECKOUT / "bench" / "peers" / "nanite_hertz.py"],
-        input=json.dumps(asked),
+        input=json.dumps(request),
         env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": ""},
         check=True,
         capture_output=True,
         text=True,
     )
-    return [entry["left_n2"] for entry in json.loads(run.stdout)]
+    return [fit["left_n2"] for fit in json.loads(run.stdout)]
 
 
 def _reference(curve: Curve) -> float:
@@ -126,7 +126,7 @@ def _starts(curve: Curve) -> list[tuple[float, float, float]]:
 
 
 def _least(curve: Curve, law: Callable[[Floats], Floats], starts: Sequence[Sequence[float]]) -> float:
-    """Of several starts (contact point [m], logarithm of a factor on the modulus, zero [N], …) the least."""
+    """The least residual over several starts (contact point [m], logarithm of a factor on the modulus, zero [N], …)."""
     unit, travel = float(np.ptp(curve.force)), float(np.ptp(curve.depth))
     size = np.array([travel, 1.0, unit, *np.ones(len(starts[0]) - 3)])
 

@@ -1,4 +1,5 @@
-"""Curves of spheres: what plain least squares leave beside others' fits, and the processor time of a diagnosis."""
+"""Curves of spheres: residuals of plain least squares compared with other fits, and the processor time of a
+diagnosis."""
 
 import json
 import os
@@ -16,8 +17,8 @@ from rig.description import parse as experiment
 from rig.elastomer import campaign_of_curves, record_curves
 
 ROUNDS = 3
-_ONE_CURVE, _TWELVE_CURVES, _REAL = 3.0, 10.0, 5.0  # s
-_ONE = """
+_SINGLE_CURVE, _TWELVE_CURVES, _REAL = 3.0, 10.0, 5.0  # s
+_SCRIPT = """
 import json, sys, time
 from underskin import diagnose, load_table
 from underskin.recordings.campaign import parse
@@ -36,7 +37,7 @@ def measure() -> list[Figure]:
     samples = "of 3,000 samples with air, snap-in, hold and pull-off"
     figures = [
         *accuracy(),
-        Figure(f"One curve {samples}", _seconds(drawn([0.017], [4e-4], 1)), "s", _ONE_CURVE, "lower"),
+        Figure(f"One curve {samples}", _seconds(drawn([0.017], [4e-4], 1)), "s", _SINGLE_CURVE, "lower"),
         Figure(
             f"Twelve curves {samples}", _seconds(drawn([0.017, 0.012], [4e-4, 1e-4], 3)), "s", _TWELVE_CURVES, "lower"
         ),
@@ -92,7 +93,7 @@ def _seconds(document: dict[str, Any]) -> float:
 
 def _once(file: Path) -> float:
     run = subprocess.run(
-        [sys.executable, "-c", _ONE, str(file)],
+        [sys.executable, "-c", _SCRIPT, str(file)],
         env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         check=True,
         capture_output=True,

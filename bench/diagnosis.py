@@ -26,12 +26,12 @@ CASES: dict[str, tuple[Effects, float]] = {  # what is hidden, and the scatter o
 PRELOADS_N = (0.3, 0.5, 0.7, 1, 1.3, 1.6, 2, 2.3, 2.6, 3)
 ROUNDS = 3
 ROOT = Path(__file__).parents[1]
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+SINGLE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 _COMMAND = "start, reading, diagnosis and report"
 _MEMORY = 400.0  # MB
 _SMALL: dict[str, Any] = {"columns": 5, "preloads_n": PRELOADS_N, "lines": 60}
 _LARGE: dict[str, Any] = {"columns": 41, "preloads_n": (0.3, 0.6, 1, 1.4, 1.8, 2.2, 2.6, 3), "lines": 400}
-_ONE = """
+_SCRIPT = """
 import sys, time
 from pathlib import Path
 from underskin.compiled import load_all
@@ -81,7 +81,11 @@ def _diagnosed(effects: Effects, design: dict[str, Any]) -> tuple[float, float, 
 
 def _once(file: Path) -> tuple[float, float]:
     run = subprocess.run(
-        [sys.executable, "-c", _ONE, str(file)], env=os.environ | ONE_THREAD, check=True, capture_output=True, text=True
+        [sys.executable, "-c", _SCRIPT, str(file)],
+        env=os.environ | SINGLE_THREAD,
+        check=True,
+        capture_output=True,
+        text=True,
     )
     seconds, peak, _ = run.stdout.split()
     return float(seconds), float(peak)
@@ -91,10 +95,10 @@ def command_seconds(file: Path, tree: Path = ROOT) -> float:
     """Processor time of `underskin diagnose FILE` of the tree of a revision, from its start to the report."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "underskin", "diagnose", str(file), "--output-dir", folder, "--workers", "1"]
-        settings = {**ONE_THREAD, "PYTHONPATH": str(tree), "UNDERSKIN_TABLES": str(tree / "tables")}
-        begun = _of_children()
+        settings = {**SINGLE_THREAD, "PYTHONPATH": str(tree), "UNDERSKIN_TABLES": str(tree / "tables")}
+        started = _of_children()
         subprocess.run(command, cwd=tree, env=os.environ | settings, check=True, capture_output=True)
-        return _of_children() - begun
+        return _of_children() - started
 
 
 def _of_children() -> float:

@@ -1,4 +1,4 @@
-"""Ten skins of one make diagnosed as a fleet, from their campaigns' thousand recordings."""
+"""Ten skins of one batch diagnosed as a fleet, from their campaigns' thousand recordings."""
 
 import time
 
@@ -21,8 +21,8 @@ def measure() -> list[Figure]:
         f"skin-{number}": document({}, columns=5, preloads_n=PRELOADS_N, lines=60, seed=number)
         for number in range(_SKINS)
     }
-    skins = {skin: [parse({**own, "name": skin})] for skin, own in documents.items()}
-    recordings = sum(len(own[0].recordings) for own in skins.values())
+    skins = {skin: [parse({**documents_of_skin, "name": skin})] for skin, documents_of_skin in documents.items()}
+    recordings = sum(len(documents_of_skin[0].recordings) for documents_of_skin in skins.values())
     clock, processor = time.perf_counter(), time.process_time()
     diagnose_fleet(skins, table, "bench")
     clock, processor = time.perf_counter() - clock, time.process_time() - processor

@@ -66,18 +66,23 @@ def measure() -> list[Figure]:
     figures = []
     with threadpool_limits(1):
         results = {name: _compared(effects) for name, effects in HIDDEN.items()}
-    for name, entry in results.items():
-        apart = max(abs(entry.laplace[index] - entry.sampled[index]) for index in entry.rivals)
-        error = max(entry.errors[index] for index in entry.rivals)
+    for name, comparison in results.items():
+        apart = max(abs(comparison.laplace[index] - comparison.sampled[index]) for index in comparison.rivals)
+        error = max(comparison.errors[index] for index in comparison.rivals)
         figures += [
-            Figure(f"{name} hidden: processor time, ours", entry.laplace_seconds, "s"),
-            Figure(f"{name} hidden: processor time, dynesty", entry.sampled_seconds, "s"),
-            Figure(f"{name} hidden: dynesty's time", entry.sampled_seconds / entry.laplace_seconds, "× ours", 50.0),
-            Figure(f"{name} hidden: hypotheses within {WITHIN:g} nats of the winner", len(entry.rivals), ""),
+            Figure(f"{name} hidden: processor time, ours", comparison.laplace_seconds, "s"),
+            Figure(f"{name} hidden: processor time, dynesty", comparison.sampled_seconds, "s"),
+            Figure(
+                f"{name} hidden: dynesty's time",
+                comparison.sampled_seconds / comparison.laplace_seconds,
+                "× ours",
+                50.0,
+            ),
+            Figure(f"{name} hidden: hypotheses within {WITHIN:g} nats of the winner", len(comparison.rivals), ""),
             Figure(f"{name} hidden: their log evidences, largest difference", apart, "nats"),
             Figure(f"{name} hidden: the sampler's own standard error, largest", error, "nats"),
         ]
-    same = sum(entry.same_winner for entry in results.values())
+    same = sum(comparison.same_winner for comparison in results.values())
     return [*figures, Figure("campaigns with the same winner", same, f"of {len(results)}", float(len(results)))]
 
 
@@ -89,20 +94,20 @@ def _compared(effects: Effects) -> Compared:
         explained = _explained(problem)
         times.append(time.process_time() - start)
     start = time.process_time()
-    sampled = [_sampled(problem, entry) for entry in explained]
+    sampled = [_sampled(problem, explanation) for explanation in explained]
     return Compared(
-        [entry.log_evidence for entry in explained],
-        [entry.log_evidence for entry in sampled],
-        [entry.error for entry in sampled],
+        [explanation.log_evidence for explanation in explained],
+        [explanation.log_evidence for explanation in sampled],
+        [explanation.error for explanation in sampled],
         median(times),
         time.process_time() - start,
     )
 
 
 def _explained(problem: FittingProblem) -> list[Explanation]:
-    # One by one, so that none is left for being hopeless beside the others.
+    # One by one, so that none is pruned because of the others.
     results = [explanation for names in HYPOTHESES for explanation in problem.explain([Request(names)])]
-    return integrated([entry for entry in results if entry is not None])
+    return integrated([fit for fit in results if fit is not None])
 
 
 def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:
@@ -113,8 +118,8 @@ def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:
     without = nested(Posterior(plain, explained.point))
     if explained.has_position_scatter == 0:
         return without
-    beside = nested(Posterior(has_position_scatter, explained.point))
-    parts = np.add(np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER]), [without.log_evidence, beside.log_evidence])
+    sampled = nested(Posterior(has_position_scatter, explained.point))
+    parts = np.add(np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER]), [without.log_evidence, sampled.log_evidence])
     total = float(np.logaddexp.reduce(parts))
-    error = float(np.hypot(*(np.exp(parts - total) * [without.error, beside.error])))
-    return Sampled(total, error, without.likelihoods + beside.likelihoods)
+    error = float(np.hypot(*(np.exp(parts - total) * [without.error, sampled.error])))
+    return Sampled(total, error, without.likelihoods + sampled.likelihoods)

@@ -19,8 +19,8 @@ ratios: `idle_percent` is how idle it was before the start. A target is what the
 one that was not met.
 """
 
-SOAK = "soak"  # what `make soak` measures
-AGAINST = "against"  # what `python -m bench diagnosis --against REV` measures
+SOAK = "soak"  # measured by `make soak`
+AGAINST = "against"  # measured by `python -m bench diagnosis --against REV`
 
 SECTIONS = {
     "accuracy": "Accuracy of the shipped table",
@@ -103,12 +103,12 @@ def keep(part: str, measured: Mapping[str, object], figures: Sequence[Figure]) -
 def keep_soak(measured: Mapping[str, object], figures: Sequence[Figure]) -> None:
     """Store those of a soak of a commit beside what it has not measured yet: a soak takes hours, so that its parts may
     be of several commits, each of which is named. Counts that have not reached their target replace nothing."""
-    kept = {entry["name"]: entry for entry in _results().get(SOAK, {}).get("figures", [])}
+    stored = {stored_figure["name"]: stored_figure for stored_figure in _results().get(SOAK, {}).get("figures", [])}
     for figure in figures:
         unfinished = figure.better == "higher" and figure.met is False
-        if not (unfinished and figure.name in kept):
-            kept[figure.name] = {**asdict(figure), "commit": measured["commit"]}
-    _store(SOAK, measured, [kept[name] for name in sorted(kept)])
+        if not (unfinished and figure.name in stored):
+            stored[figure.name] = {**asdict(figure), "commit": measured["commit"]}
+    _store(SOAK, measured, [stored[name] for name in sorted(stored)])
 
 
 def _store(part: str, measured: Mapping[str, object], figures: Sequence[Mapping[str, object]]) -> None:

@@ -27,14 +27,14 @@ def measure() -> list[Figure]:
         for first in range(0, CAMPAIGNS, _AT_ONCE):
             small = [campaign(lines=20, sensors=4, preloads=2, seed=first + number) for number in range(_AT_ONCE)]
             server.post(f"/v1/campaigns?skin=palm-{first // _AT_ONCE % SKINS}", small)
-        whole = server.post("/v1/campaigns?skin=palm-3", campaign(lines=400))["id"]
+        campaign_id = server.post("/v1/campaigns?skin=palm-3", campaign(lines=400))["id"]
         paths = {
             "Start": "/",
             "Skin of 41 campaigns": "/skins/palm-3",
             "The same, one sensor's lines and history": "/skins/palm-3?sensor=s07",
-            f"Campaign of {RECORDINGS} recordings": f"/campaigns/{whole}",
-            "The campaign, one sensor's lines": f"/campaigns/{whole}?show=s07",
-            "Compare two campaigns": f"/compare?skin=palm-3&second={whole}",
+            f"Campaign of {RECORDINGS} recordings": f"/campaigns/{campaign_id}",
+            "The campaign, one sensor's lines": f"/campaigns/{campaign_id}?show=s07",
+            "Compare two campaigns": f"/compare?skin=palm-3&second={campaign_id}",
             "d33 of measured responses": "/d33?skin=palm-3",
             "Fleets": "/fleets",
             "Loads": "/loads?skin=palm-3",
@@ -63,7 +63,7 @@ def measure() -> list[Figure]:
         figures.append(
             Figure(
                 f"Longest busy spell of the main thread, {RECORDINGS} recordings drawn",
-                median(_stands_still(address, whole) for _ in range(ROUNDS)),
+                median(_stands_still(address, campaign_id) for _ in range(ROUNDS)),
                 "ms",
                 200.0,
                 "lower",
@@ -75,10 +75,10 @@ def measure() -> list[Figure]:
 def _diagnosed(client: httpx.Client) -> str:
     """The page of a diagnosis that is done, of the campaign that came first."""
     first = client.get("/v1/campaigns", params={"skin": "palm-0", "limit": 1}).json()["campaigns"][0]["id"]
-    asked = client.post(f"/v1/campaigns/{first}/diagnosis").json()["id"]
-    while client.get(f"/v1/diagnoses/{asked}").json()["state"] in ("queued", "running"):
+    diagnosis_id = client.post(f"/v1/campaigns/{first}/diagnosis").json()["id"]
+    while client.get(f"/v1/diagnoses/{diagnosis_id}").json()["state"] in ("queued", "running"):
         time.sleep(0.2)
-    return f"/diagnoses/{asked}"
+    return f"/diagnoses/{diagnosis_id}"
 
 
 def _milliseconds(client: httpx.Client, path: str) -> float:
@@ -102,7 +102,7 @@ def _loaded(client: httpx.Client, path: str) -> list[str]:
 def _weight(client: httpx.Client, path: str) -> int:
     """Bytes of a page and of what it loads, as sent."""
     total = 0
-    for part in (path, *{one for one in _loaded(client, path) if _LIBRARY not in one}):
+    for part in (path, *{loaded for loaded in _loaded(client, path) if _LIBRARY not in loaded}):
         with client.stream("GET", part) as answer:
             total += sum(len(chunk) for chunk in answer.iter_raw())
     return total

@@ -63,7 +63,7 @@ def processor_s(pid: int) -> float:
 
 @contextmanager
 def underskin(data: Path | None = None) -> Iterator[Server]:
-    """Our service as `make serve` starts it; what it keeps is in `data`, or gone at the end."""
+    """Our service as `make serve` starts it; its data are in `data`, or deleted at the end."""
     port = _free_port()
     command = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(port)]
     with (
@@ -109,13 +109,13 @@ def tesseract() -> Iterator[Server]:
 def _running(
     command: Sequence[str], port: int, path: str, settings: Mapping[str, str] | None = None
 ) -> Iterator[Server]:
-    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    single_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     # Tesseract's runtime leaves a folder per request where it runs; in memory it is not slowed by the disk.
     with tempfile.TemporaryFile("w+") as errors, tempfile.TemporaryDirectory(dir="/dev/shm") as scratch:
         start = time.perf_counter()
         process = subprocess.Popen(
             ["taskset", "-c", str(SERVER_CORE), *command],
-            env=os.environ | one_thread | dict(settings or {}),
+            env=os.environ | single_thread | dict(settings or {}),
             cwd=scratch,
             stdout=subprocess.DEVNULL,
             stderr=errors,

@@ -1,7 +1,7 @@
-"""The soak: what `make soak` has done already, and what it measured; an interrupted run goes on where it was.
+"""The soak test: what `make soak` has done already, and its measurements; an interrupted run is continued.
 
-Under `build/soak/`, in a folder for each state of the code: `passed`, a test a line, which is not run again; and
-`figures.jsonl`, which `python -m bench soak` writes into docs/validation.md, beside those of earlier commits.
+Under `build/soak/`, in a folder for each state of the code: `passed`, one test per line, which is not run again; and
+`figures.jsonl`, which `python -m bench soak` writes into docs/validation.md, together with those of earlier commits.
 """
 
 import functools
@@ -23,38 +23,38 @@ _KINDS = {".py", ".c", ".html", ".js", ".css", ".h5"}
 
 def measure() -> list[Figure]:
     """What the soak of the code as it is has measured so far."""
-    kept = folder_of_the_code() / _FIGURES
-    if not kept.exists():
+    results_file = folder_of_the_code() / _FIGURES
+    if not results_file.exists():
         return []
     by_test: dict[tuple[str, str], Figure] = {}  # of a test that was run again the last
-    for entry in map(json.loads, kept.read_text().splitlines()):
-        figure = Figure(**entry["figure"])
-        by_test[entry["test"], figure.name] = figure
-    found: dict[str, Figure] = {}
+    for line in map(json.loads, results_file.read_text().splitlines()):
+        figure = Figure(**line["figure"])
+        by_test[line["test"], figure.name] = figure
+    figures: dict[str, Figure] = {}
     for figure in by_test.values():
-        other = found.get(figure.name, figure)
-        if other is not figure:
-            both = other.value, figure.value
+        earlier = figures.get(figure.name, figure)
+        if earlier is not figure:
+            both = earlier.value, figure.value
             figure = replace(figure, value=sum(both) if figure.better == "higher" else max(both))
-        found[figure.name] = figure
-    return sorted(found.values(), key=lambda figure: figure.name)
+        figures[figure.name] = figure
+    return sorted(figures.values(), key=lambda figure: figure.name)
 
 
 def passed(test: str) -> bool:
     """Whether a test, by its id, has passed on the code as it is."""
-    kept = folder_of_the_code() / "passed"
-    return kept.exists() and test in kept.read_text().splitlines()
+    passed_file = folder_of_the_code() / "passed"
+    return passed_file.exists() and test in passed_file.read_text().splitlines()
 
 
 def keep_passed(test: str) -> None:
-    """Keep that it has."""
+    """Record that it has passed."""
     _append("passed", test)
 
 
 def record(figure: Figure) -> None:
-    """Keep a figure of a soak, for the test under way; runs at reduced counts keep none.
+    """Record a figure of a soak for the current test; runs at reduced counts record none.
 
-    Figures of one name are of parts of one test: those to be `higher` are added up, of the others the largest counts.
+    Figures of one name are of parts of one test: those to be `higher` are summed, of the others the largest counts.
     """
     if SOAK:
         test = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0]
@@ -64,8 +64,8 @@ def record(figure: Figure) -> None:
 def _append(file: str, line: str) -> None:
     folder = folder_of_the_code()
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / file).open("a") as kept:
-        kept.write(f"{line}\n")
+    with (folder / file).open("a") as stream:
+        stream.write(f"{line}\n")
 
 
 @functools.cache

@@ -19,7 +19,7 @@ from underskin import Indenter, Skin, load_table, transmission
 SENSORS, PRELOADS, RADII = 41, np.linspace(0.5, 3.0, 8), (4.0, 10.0)
 RECORDINGS = SENSORS * len(PRELOADS) * len(RADII)
 SKINS = 25
-KEPT = 1_000_000 if os.environ.get("UNDERSKIN_SOAK") == "1" else 50_000
+STORED = 1_000_000 if os.environ.get("UNDERSKIN_SOAK") == "1" else 50_000
 ROUNDS = 3
 
 
@@ -28,7 +28,7 @@ def measure() -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder, servers.underskin(Path(folder)) as server:
         inverted = [_posted_and_inverted(server, campaign(lines=400)) for _ in range(ROUNDS)]
         before = server.resident_mb()
-        count = max(1, KEPT // RECORDINGS)
+        count = max(1, STORED // RECORDINGS)
         for number in range(count):
             server.post(f"/v1/campaigns?skin=palm-{number % SKINS}", campaign(lines=60, seed=number))
         stored = f"with {count * RECORDINGS:,} recordings of 60 lines kept"

@@ -1,4 +1,4 @@
-"""What a reader waits for: from the click on a campaign's page to the verdict, and for the reports of many files."""
+"""Waiting times of a reader: from the click on a campaign's page to the verdict, and for the reports of many files."""
 
 import json
 import subprocess
@@ -66,11 +66,11 @@ def _two_over_one() -> float:
         for number, file in enumerate(files):
             file.write_text(json.dumps(_campaign(number)))
         folders = {workers: Path(folder) / str(workers) for workers in (1, 2)}
-        rounds = [[_seconds(files, *one) for one in folders.items()] for _ in range(ROUNDS)]
-        one, two = (sorted(place.iterdir()) for place in folders.values())
-        if [file.read_bytes() for file in one] != [file.read_bytes() for file in two]:
+        rounds = [[_seconds(files, *arguments) for arguments in folders.items()] for _ in range(ROUNDS)]
+        single, double = (sorted(reports.iterdir()) for reports in folders.values())
+        if [file.read_bytes() for file in single] != [file.read_bytes() for file in double]:
             raise RuntimeError("reports depend on the number of processes")
-    return median(alone for alone, _ in rounds) / median(both for _, both in rounds)
+    return median(single_s for single_s, _ in rounds) / median(double_s for _, double_s in rounds)
 
 
 def _seconds(files: list[Path], workers: int, folder: Path) -> float:

@@ -1,6 +1,6 @@
-"""For the site: files of the repository that the pages link to are copied into it, and the links lead to the copies.
+"""For the site: copies files of the repository to which pages link into it, and redirects the links to the copies.
 
-A hook of MkDocs (mkdocs.yml), which takes pages from `docs/` alone.
+A hook of MkDocs (mkdocs.yml), which takes pages only from `docs/`.
 """
 
 import os

@@ -1,4 +1,5 @@
-"""Campaigns to diagnose: from a file, drawn by the virtual rig, or made; small, so that any process can get them."""
+"""Campaigns to diagnose: from a file, drawn by the virtual rig, or made; small, so that they can be sent to any
+process."""
 
 import json
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from rig.wide_tails import USUAL, WIDE
 
 
 class Case(Protocol):
-    """A campaign to diagnose, by a name of its own."""
+    """A campaign to diagnose, with a unique name."""
 
     @property
     def name(self) -> str:
@@ -44,7 +45,7 @@ class FileCase:
 
 @dataclass(frozen=True)
 class DrawnCase:
-    """Random experiment `number` of a seed on the virtual rig; `what` it hides is drawn too where it is None."""
+    """Random experiment `number` of a seed on the virtual rig; what it hides (`what`) is drawn too if None."""
 
     seed: int
     number: int

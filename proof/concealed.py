@@ -1,7 +1,7 @@
-"""Campaigns of a rig that this project has never seen, in the folder that UNDERSKIN_CAMPAIGNS names.
+"""Campaigns of a rig unknown to this project, in the folder of UNDERSKIN_CAMPAIGNS.
 
-`open` comes with its truth and is judged here. Of `sealed` reports are written for others to judge; nothing here, and
-nothing in the diagnosis, is fitted to them.
+`open` comes with its truth and is judged here. For `sealed` only reports are written, for others to judge; nothing here
+or in the diagnosis is fitted to them.
 """
 
 import json
@@ -12,20 +12,20 @@ from typing import Any
 
 from proof.cases import FileCase
 from proof.judge import Judged, judge
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.stored import Work, reports
 from underskin.cli.diagnose import write_report
 
 
 def judge_open(work: Work, campaigns: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Every open campaign beside its truth."""
+    """Every open campaign with its truth."""
     truths = json.loads((campaigns / "open-truth.json").read_text(encoding="utf-8"))
     cases = _cases(campaigns / "open", work)
     judged = [
-        judge(case.name, report, {**(truth := truths[case.name]), "effects": one_name_each(truth["effects"])})
+        judge(case.name, report, {**(truth := truths[case.name]), "effects": distinct_names(truth["effects"])})
         for case, report in zip(cases, reports(work, cases, progress), strict=True)
     ]
-    return {"judged": [asdict(entry) for entry in judged]}
+    return {"judged": [asdict(judgement) for judgement in judged]}
 
 
 def report_sealed(work: Work, campaigns: Path, folder: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def _cases(folder: Path, work: Work) -> Sequence[FileCase]:
 def judged_of(result: Mapping[str, Any]) -> list[Judged]:
     """The judged reports of a stored result."""
     return [
-        Judged(**{**entry, "truth": tuple(entry["truth"]), "answer": tuple(entry["answer"]),
-                  "held_out": entry["held_out"] and tuple(entry["held_out"])})
-        for entry in result["judged"]
+        Judged(**{**fields, "truth": tuple(fields["truth"]), "answer": tuple(fields["answer"]),
+                  "held_out": fields["held_out"] and tuple(fields["held_out"])})
+        for fields in result["judged"]
     ]  # fmt: skip

@@ -23,7 +23,7 @@ _SDS_OF_95 = 1.96
 
 
 def judge_coverage(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """What each campaign's report states of d33."""
+    """The statement on d33 of each campaign's report."""
     return _judge(work, SEED, min(work.count or COUNT, COUNT), progress)
 
 
@@ -34,15 +34,15 @@ def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], Non
     return {
         "seed": seed,
         "judged": [
-            held(case, report) | {"shows": bool(known["identifiable"])}
-            for case, known, report in zip(cases, truths, answers, strict=True)
+            held(case, report) | {"shows": bool(case_truth["identifiable"])}
+            for case, case_truth, report in zip(cases, truths, answers, strict=True)
         ],
     }
 
 
 def held(case: DrawnCase, report: Mapping[str, Any]) -> dict[str, Any]:
-    """Whether the interval holds the true d33; `off` is by how many of its standard deviations the value is off. None
-    where no d33 is stated."""
+    """Whether the interval contains the true d33; `off`: deviation of the value in its standard deviations. None
+    without a stated d33."""
     description = case.description
     stated, skin = report.get("d33"), description["skin"]
     true, array = skin["d33_pc_per_n"], skin["array"]
@@ -54,7 +54,7 @@ def held(case: DrawnCase, report: Mapping[str, Any]) -> dict[str, Any]:
         "name": case.name,
         "hidden": sorted(description["effects"]),
         "verdict": report["verdict"],
-        "named": [entry["name"] for entry in report["mechanisms"]],
+        "named": [mechanism["name"] for mechanism in report["mechanisms"]],
         "sensors": array["columns"] * array["rows"],
         "quotable": bool(stated and stated["quotable"]),
         "held": None if stated is None else bool(stated["low"] <= true <= stated["high"]),
@@ -64,15 +64,18 @@ def held(case: DrawnCase, report: Mapping[str, Any]) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    given = seeds.parser("coverage", __doc__).parse_args(arguments)
+    arguments_given = seeds.parser("coverage", __doc__).parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
-        result = _judge(Work(Path(folder)), given.seed, given.count, lambda *_: None)
+        result = _judge(Work(Path(folder)), arguments_given.seed, arguments_given.count, lambda *_: None)
     print(by_subset(result["judged"]))
-    for entry in result["judged"]:
-        if entry["held"] is False:
-            hidden, named = (" + ".join(entry[key]) or "nothing" for key in ("hidden", "named"))
-            off = f"{entry['off']:+.1f} deviations"
-            print(f"{entry['name']}: {hidden}; {entry['verdict']}, {named}; {entry['sensors']} sensors, off by {off}")
+    for judgement in result["judged"]:
+        if judgement["held"] is False:
+            hidden, named = (" + ".join(judgement[key]) or "nothing" for key in ("hidden", "named"))
+            off = f"{judgement['off']:+.1f} deviations"
+            print(
+                f"{judgement['name']}: {hidden}; {judgement['verdict']}, {named}; "
+                f"{judgement['sensors']} sensors, off by {off}"
+            )
 
 
 if __name__ == "__main__":

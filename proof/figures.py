@@ -25,7 +25,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def calibration_and_size(judged: Sequence[Judged], path: Path) -> Path:
-    """Stated probability against how often it was right, and accuracy against the effect's size."""
+    """Stated probability against frequency of right answers, and accuracy against the effect's size."""
     with mpl.rc_context(fname=_STYLE):
         figure = Figure(figsize=(7.6, 3.4), layout="constrained")
         left, right = figure.subplots(1, 2)
@@ -35,7 +35,7 @@ def calibration_and_size(judged: Sequence[Judged], path: Path) -> Path:
 
 
 def _calibration(axes: Axes, judged: Sequence[Judged]) -> None:
-    result = calibration([entry.probability for entry in judged], [entry.right for entry in judged])
+    result = calibration([judgement.probability for judgement in judged], [judgement.right for judgement in judged])
     middle, value = np.array(result.stated), np.array(result.right)
     axes.plot([0, 1], [0, 1], "k:", linewidth=0.8)
     errors = np.maximum(
@@ -52,13 +52,15 @@ def _sizes(axes: Axes, judged: Sequence[Judged]) -> None:
     for offset, (kind, style) in enumerate(kinds.items()):
         places, shares = [], []
         for number, (low, high) in enumerate(pairwise(SIZES)):
-            inside = [entry.right for entry in judged if entry.kind == kind and low <= entry.size < high]
+            inside = [
+                judgement.right for judgement in judged if judgement.kind == kind and low <= judgement.size < high
+            ]
             if inside:
                 places.append(number + 0.12 * (offset - 1))
                 shares.append(share(inside))
         if shares:
-            value = np.array([entry.value for entry in shares])
-            low_end, high_end = np.array([entry.interval for entry in shares]).T
+            value = np.array([bin_share.value for bin_share in shares])
+            low_end, high_end = np.array([bin_share.interval for bin_share in shares]).T
             errors = np.maximum([value - low_end, high_end - value], 0)
             axes.errorbar(places, value, errors, fmt=style, capsize=2, label=kind, markersize=4)
     names = [f"{low:g}–{high:g}" if np.isfinite(high) else f"> {low:g}" for low, high in pairwise(SIZES)]
@@ -73,17 +75,17 @@ def _sizes(axes: Axes, judged: Sequence[Judged]) -> None:
 
 
 def confusion(judged: Sequence[Judged], path: Path) -> Path:
-    """What was hidden against what was named, of all but pairs; what no report named has no column."""
+    """Hidden against named effects, without pairs; what no report named has no column."""
     with mpl.rc_context({"axes.grid": False, "font.size": 6.5}, fname=_STYLE):
-        rows = [entry for entry in judged if len(entry.truth) < 2]
-        truths = sorted({entry.truth for entry in rows}, key=lambda names: (len(names), names))
+        rows = [judgement for judgement in judged if len(judgement.truth) < 2]
+        truths = sorted({judgement.truth for judgement in rows}, key=lambda names: (len(names), names))
         answers = [
             *truths,
-            *sorted({entry.answer for entry in rows} - set(truths), key=lambda names: (len(names), names)),
+            *sorted({judgement.answer for judgement in rows} - set(truths), key=lambda names: (len(names), names)),
         ]
         counts = np.zeros((len(truths), len(answers)), dtype=int)
-        for entry in rows:
-            counts[truths.index(entry.truth), answers.index(entry.answer)] += 1
+        for judgement in rows:
+            counts[truths.index(judgement.truth), answers.index(judgement.answer)] += 1
         figure = Figure(figsize=(1.9 + 0.24 * len(answers), 2.4 + 0.2 * len(truths)), layout="constrained")
         axes = figure.subplots()
         share_of_row = counts / counts.sum(axis=1, keepdims=True)
@@ -99,24 +101,24 @@ def confusion(judged: Sequence[Judged], path: Path) -> Path:
 
 def before_and_after(campaigns: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Held-out error of the base model and of the explanation, beside the noise floor, for real recordings."""
-    entries = [entry for entry in campaigns if _held_out(entry)]
+    entries = [campaign for campaign in campaigns if _held_out(campaign)]
     with mpl.rc_context(fname=_STYLE):
         figure = Figure(figsize=(7.6, 0.9 + 0.25 * len(entries)), layout="constrained")
         axes = figure.subplots()
-        for place, entry in enumerate(reversed(entries)):
-            fit = entry["report"]["fit"]
+        for index, campaign in enumerate(reversed(entries)):
+            fit = campaign["report"]["fit"]
             values = fit["before"]["heldout_rmse_percent"], fit["after"]["heldout_rmse_percent"]
-            axes.plot(values, [place, place], "-", color="0.7", zorder=1)
+            axes.plot(values, [index, index], "-", color="0.7", zorder=1)
             marks = zip((*values, fit["noise_floor_percent"]), ("o", "o", "|"), ("C3", "C0", "k"), strict=True)
             for value, marker, colour in marks:
-                axes.plot([value], [place], marker, color=colour, markersize=9 if marker == "|" else 6)
-        axes.set_yticks(range(len(entries)), [entry["name"] for entry in reversed(entries)])
+                axes.plot([value], [index], marker, color=colour, markersize=9 if marker == "|" else 6)
+        axes.set_yticks(range(len(entries)), [campaign["name"] for campaign in reversed(entries)])
         axes.set(
             xscale="log", xlabel="error on held-out data, percent: red base model, blue explained, bar noise floor"
         )
         return save(figure, path)
 
 
-def _held_out(entry: Mapping[str, Any]) -> bool:
-    fit = entry["report"]["fit"]
+def _held_out(campaign: Mapping[str, Any]) -> bool:
+    fit = campaign["report"]["fit"]
     return bool(fit and fit["before"]["heldout_rmse_percent"] is not None)

@@ -23,7 +23,7 @@ from scipy.stats import qmc
 from proof.cases import DrawnCase
 from proof.ideal_laws import Supposition, suppositions
 from proof.judge import UNKNOWN as UNKNOWN_ANSWER
-from proof.names import one_name_each
+from proof.names import distinct_names
 from rig.draw import CATALOGUED, SHARES, UNKNOWN, drawn, record
 from rig.effects import Values, of
 from rig.errors import RigError
@@ -43,7 +43,8 @@ _PICKUP_WIDTH_HZ = 1.5
 
 @dataclass(frozen=True)
 class _Amplitudes:
-    """The amplitude of each recording given the shape: estimate and variance (rows,), and the remainder of ln p."""
+    """The amplitude of each recording given the shape: estimate and variance (rows,), and the remaining part of ln
+    p."""
 
     estimate: Floats
     variance: Floats
@@ -58,7 +59,7 @@ class Likelihood:
         self.noise = recorded.response.experiment.noise
 
     def __call__(self, effects: dict[str, Values]) -> float:
-        """The logarithm, −∞ where the rig cannot carry the effects out."""
+        """The log-likelihood, −∞ if the rig cannot carry the effects out."""
         try:
             return self._log(effects)
         except (RigError, ValueError, FloatingPointError):
@@ -88,15 +89,15 @@ class Likelihood:
                 logsumexp(self._at(_SCALES, mean, scatter, amplitudes).sum(axis=0)) - np.log(len(_SCALES))
             )
         sensors, index = np.unique(response.plan.sensor, return_inverse=True)
-        each = np.zeros((len(sensors), len(_WIDE)))
-        np.add.at(each, index, self._at(_WIDE, mean, scatter, amplitudes))
-        top = each.max(axis=1, keepdims=True)
+        log_terms = np.zeros((len(sensors), len(_WIDE)))
+        np.add.at(log_terms, index, self._at(_WIDE, mean, scatter, amplitudes))
+        top = log_terms.max(axis=1, keepdims=True)
         coarse = _SCALES[::10]
         weight = np.exp(-0.5 * ((_WIDE - coarse[:, None]) / spread) ** 2) * (
             (_WIDE[1] - _WIDE[0]) / (spread * _ROOT_2PI)
         )
-        whole = np.log(np.maximum(np.exp(each - top) @ weight.T, 1e-300)) + top
-        return amplitudes.rest + float(logsumexp(whole.sum(axis=0)) - np.log(len(coarse)))
+        log_sum = np.log(np.maximum(np.exp(log_terms - top) @ weight.T, 1e-300)) + top
+        return amplitudes.rest + float(logsumexp(log_sum.sum(axis=0)) - np.log(len(coarse)))
 
     def _at(self, scales: Floats, mean: Floats, scatter: Floats, amplitudes: _Amplitudes) -> Floats:
         """ln p of each recording at each ln d33."""
@@ -140,19 +141,23 @@ def diagnosed(case: DrawnCase) -> dict[str, Any]:
     sets = _sets(tuple(truth))
     ranges = of_frf(description)
     laws = {names: suppositions(names, ranges) for names in sets}
-    supposed = [entry for entries in laws.values() for entry in entries if _starts_at(entry, truth)]
-    coarse = [(entry, *_best_of(entry, likelihood, truth)) for entry in supposed]
-    coarse.sort(key=lambda entry: -entry[2])
+    supposed = [supposition for entries in laws.values() for supposition in entries if _starts_at(supposition, truth)]
+    coarse = [(supposition, *_best_of(supposition, likelihood, truth)) for supposition in supposed]
+    coarse.sort(key=lambda supposition: -supposition[2])
     hidden = _answer(tuple(sorted(truth)))
-    rivals = [entry for entry in coarse if _answer(entry[0].names) != hidden]
-    chosen = {id(entry): entry for entry in (*coarse[:_REFINED], *rivals[:_RIVALS])}
-    starts = [(entry, place) for entry, place, _ in chosen.values()]
-    starts += [(entry, place) for entry, *_ in coarse if (place := entry.place_of(truth)) is not None]
-    tried = [_integrated(entry, likelihood, place) for entry, place in starts]
+    rivals = [supposition for supposition in coarse if _answer(supposition[0].names) != hidden]
+    chosen = {id(supposition): supposition for supposition in (*coarse[:_REFINED], *rivals[:_RIVALS])}
+    starts = [(supposition, coordinates) for supposition, coordinates, _ in chosen.values()]
+    starts += [
+        (supposition, coordinates)
+        for supposition, *_ in coarse
+        if (coordinates := supposition.positions_of(truth)) is not None
+    ]
+    tried = [_integrated(supposition, likelihood, coordinates) for supposition, coordinates in starts]
     evidence: dict[tuple[str, ...], float] = {}
-    for entry in tried:
-        names = entry.supposed.names
-        evidence[names] = max(evidence.get(names, -np.inf), entry.log_evidence)
+    for fit in tried:
+        names = fit.supposed.names
+        evidence[names] = max(evidence.get(names, -np.inf), fit.log_evidence)
     weight: dict[tuple[str, ...], list[float]] = {}
     for names, value in evidence.items():
         weight.setdefault(_answer(names), []).append(value - np.log(len(laws[names])) + sets[names])
@@ -169,46 +174,46 @@ def _starts_at(supposed: Supposition, truth: Mapping[str, Values]) -> bool:
     """Whether a pair has the law and the sign of the true effect that it shares; a single may have any."""
     if len(supposed.names) < 2:
         return True
-    known = np.isfinite(supposed.place_of_shared(truth))
-    shared = [entry.effect in truth for entry in supposed.coordinates]
-    return bool(known[shared].all())
+    shared_known = np.isfinite(supposed.positions_of_shared(truth))
+    shared = [coordinate.effect in truth for coordinate in supposed.coordinates]
+    return bool(shared_known[shared].all())
 
 
 def _answer(names: tuple[str, ...]) -> tuple[str, ...]:
-    return (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else one_name_each(names)
+    return (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else distinct_names(names)
 
 
 def _over_rivals(tried: list[Tried], truth: tuple[str, ...]) -> float:
     """2 ln p of the truth's best less that of the best of any other answer."""
-    true = [entry.log_likelihood for entry in tried if _answer(entry.supposed.names) == truth]
-    rivals = [entry.log_likelihood for entry in tried if _answer(entry.supposed.names) != truth]
+    true = [fit.log_likelihood for fit in tried if _answer(fit.supposed.names) == truth]
+    rivals = [fit.log_likelihood for fit in tried if _answer(fit.supposed.names) != truth]
     return round(2 * (max(true) - max(rivals)), 2)
 
 
 def _sets(truth: tuple[str, ...]) -> dict[tuple[str, ...], float]:
-    """The sets that are supposed, sorted, with the logarithm of their priors: the shares that the rig draws."""
+    """The hypotheses (sorted sets) with the logarithm of their priors: the shares that the rig draws."""
     singles, pairs = len(CATALOGUED), len(CATALOGUED) * (len(CATALOGUED) - 1) / 2
     sets: dict[tuple[str, ...], float] = {(): np.log(SHARES["none"])}
     sets |= {(name,): np.log(SHARES["single"] / singles) for name in CATALOGUED}
     sets |= {(name,): np.log(SHARES["unknown"] / len(UNKNOWN)) for name in UNKNOWN}
     if len(truth) == 2:
         for name in truth:
-            for other in CATALOGUED:
-                if other != name:
-                    first, second = sorted((name, other))
+            for catalogued in CATALOGUED:
+                if catalogued != name:
+                    first, second = sorted((name, catalogued))
                     sets[first, second] = np.log(SHARES["pair"] / pairs)
     return sets
 
 
 def _best_of(supposed: Supposition, likelihood: Likelihood, truth: Mapping[str, Values]) -> tuple[Floats, float]:
-    """The best of evenly spread places (Halton), effects that are true held at their true values, and ln p there."""
-    known = supposed.place_of_shared(truth)
-    free = np.isnan(known)
+    """The best of evenly spread points (Halton), with true effects held at their true values, and ln p there."""
+    shared_known = supposed.positions_of_shared(truth)
+    free = np.isnan(shared_known)
     if not free.any():
-        return known, likelihood(supposed.effects(known))
-    places = np.tile(known, (_COARSE.get(int(free.sum()), 64), 1))
+        return shared_known, likelihood(supposed.effects(shared_known))
+    places = np.tile(shared_known, (_COARSE.get(int(free.sum()), 64), 1))
     places[:, free] = qmc.Halton(int(free.sum()), scramble=False).random(len(places) + 1)[1:]
-    values = [likelihood(supposed.effects(place)) for place in places]
+    values = [likelihood(supposed.effects(coordinates)) for coordinates in places]
     best = int(np.argmax(values))
     return places[best], values[best]
 
@@ -217,8 +222,8 @@ def _integrated(supposed: Supposition, likelihood: Likelihood, start: Floats) ->
     """The best near a start, and ln ∫ p over the unit cube by Laplace's method there; no wider than the cube."""
     size = len(supposed.coordinates)
 
-    def loss(place: Floats) -> float:
-        return -likelihood(supposed.effects(place)) if np.all((place >= 0) & (place <= 1)) else np.inf
+    def loss(coordinates: Floats) -> float:
+        return -likelihood(supposed.effects(coordinates)) if np.all((coordinates >= 0) & (coordinates <= 1)) else np.inf
 
     start = np.clip(start, 0.0, 1.0)
     if not size or not np.isfinite(loss(start)):
@@ -246,7 +251,7 @@ def _integrated(supposed: Supposition, likelihood: Likelihood, start: Floats) ->
 
 
 def _step(loss: Any, best: Floats, least: float, axis: Floats) -> float:
-    """How far the loss takes to grow by a half, into the cube."""
+    """The distance into the cube over which the loss grows by one half."""
     sign = -1.0 if float(best @ axis) > 0.5 else 1.0
     step = 1e-4
     while step < 0.4 and loss(best + sign * step * axis) - least < 0.5:

@@ -1,8 +1,8 @@
-"""How well an ideal diagnosis could tell which skin of a fleet departs.
+"""How well an ideal diagnosis could find the departing skin of a fleet.
 
-It owns the rig's equations and noise, and knows that no mechanism acts: what the recordings of a skin say of ln E, ln h
-and ln d33 is normal about the truth, with the covariance of Fisher's information there. What it does not know is what
-no recording of one skin tells: the make's mean and spread. For these it has the priors of the diagnosis.
+It owns the rig's equations and noise, and knows that no mechanism acts: the likelihood of ln E, ln h and ln d33 of a
+skin is normal about the truth, with the covariance of Fisher's information there. Mean and spread of the batch, which
+recordings of one skin do not determine, have the priors of the diagnosis.
 """
 
 import numpy as np
@@ -14,25 +14,32 @@ from underskin.diagnosis.several.fleet import SPREADS
 from underskin.diagnosis.several.population import FAR, QUANTITIES, REGULAR, Batch, State, populations
 from underskin.units import Floats
 
-_DECLARED = (0.02, 0.01, 1.5)  # deviations of the make's logarithms about what is declared; of d33, about the truth
+_DECLARED = (
+    0.02,
+    0.01,
+    1.5,
+)  # standard deviations of the batch's logarithms about the declared values; of d33, about the truth
 
 
 def departures(joint: Joint) -> dict[str, float]:
-    """Of each skin the probability that it departs, at what its recordings are expected to say."""
+    """The probability that each skin departs, at the expected values of its recordings."""
     skins = [_states(document) for document in joint.documents]
     experiment = joint.documents[0].experiment
     declared = [experiment.skin.youngs_modulus_mpa, experiment.skin.thickness_mm, experiment.skin.d33_pc_per_n]
-    make = Batch(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
-    found = populations(skins, [make], SPREADS)
-    return {document.skin: 1 - own[REGULAR] for document, own in zip(joint.documents, found.departures, strict=True)}
+    batch = Batch(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
+    fitted = populations(skins, [batch], SPREADS)
+    return {
+        document.skin: 1 - class_probabilities[REGULAR]
+        for document, class_probabilities in zip(joint.documents, fitted.departures, strict=True)
+    }
 
 
 def _states(document: JointDocument) -> list[State]:
     truth = np.log([document.true_modulus_mpa, document.true_thickness_mm, document.experiment.skin.d33_pc_per_n])
     precision: Floats = np.linalg.inv(skin_covariance(document)).astype(np.float64)
-    said = Gaussian.of(truth, precision, 0.0)
+    estimate = Gaussian.of(truth, precision, 0.0)
     further = np.diag(np.square(FAR))
     return [
-        State(REGULAR, said, np.zeros(len(FAR))),
-        *(State(name, said, row) for name, row in zip(QUANTITIES, further, strict=True)),
+        State(REGULAR, estimate, np.zeros(len(FAR))),
+        *(State(name, estimate, row) for name, row in zip(QUANTITIES, further, strict=True)),
     ]

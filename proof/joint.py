@@ -1,7 +1,7 @@
-"""Several kinds of recordings, several dates, several skins: what is told together, and what from the parts alone.
+"""Several kinds of recordings, several dates, several skins: results from all data together and from the parts.
 
-Joint campaigns of the virtual rig (`rig.joint`), each diagnosed together and from its parts: FRFs without the curves
-beside them, the last date alone, each skin alone.
+Joint campaigns of the virtual rig (`rig.joint`), each diagnosed together and from its parts: FRFs without the curves,
+the last date only, each skin by itself.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +24,7 @@ Report = Mapping[str, Any]
 
 
 def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each joint campaign what was hidden, and what is told together and apart."""
+    """For each joint campaign what was hidden, and the results from all data and from the parts."""
     cases = [(number, WHAT[number % len(WHAT)]) for number in range(min(work.count or COUNT, COUNT))]
     version = f"{diagnosing()} {sources('rig')}"
     return {"seed": SEED, "judged": of_each(work, cases, partial(_judged, work, version), progress)}
@@ -33,51 +33,58 @@ def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, A
 def _judged(work: Work, version: str, case: tuple[int, str]) -> dict[str, Any]:
     number, what = case
     key = digest_of(["joint", SEED, number, what, version])
-    return stored(work.folder / "joint", key, partial(_one, number, what))
+    return stored(work.folder / "joint", key, partial(_judged_answer, number, what))
 
 
-def _one(number: int, what: str) -> dict[str, Any]:
+def _judged_answer(number: int, what: str) -> dict[str, Any]:
     documents, truth = drawn_joint(SEED, number, what)
-    hidden = [entry for entry in truth["hidden"] if entry["identifiable"]]
-    head = {"name": truth["name"], "what": what, "hidden": [entry["effect"] for entry in truth["hidden"]]}
-    told = {"dates": _dates, "skins": _skins}.get(what, _kinds)(documents, truth, hidden)
+    hidden = [effect for effect in truth["hidden"] if effect["identifiable"]]
+    head = {"name": truth["name"], "what": what, "hidden": [effect["effect"] for effect in truth["hidden"]]}
+    judgement = {"dates": _dates, "skins": _skins}.get(what, _kinds)(documents, truth, hidden)
     if what == "skins":
         ideal = departures(joint_campaigns(SEED, number, what))
-        told["ideal"] = sorted(skin for skin, probability in ideal.items() if probability > _STATED)
-    return {**head, **told}
+        judgement["ideal"] = sorted(skin for skin, probability in ideal.items() if probability > _STATED)
+    return {**head, **judgement}
 
 
 def _kinds(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
     (document,) = documents
-    alone = {**document, "recordings": [one for one in document["recordings"] if one.get("kind", "frf") == "frf"]}
-    both = {"together": diagnosed(document), "alone": diagnosed(alone)}
-    expected = {entry["effect"] for entry in hidden}
-    told_apart = {entry["effect"] for entry in hidden if (entry["chi2_gain_modulus_free"] or 0.0) > _VISIBLE} & set(
-        _ERRORS
-    )
-    told_apart |= {entry["effect"] for entry in hidden if entry["effect"] == "modulus_error"}
+    frf_document = {
+        **document,
+        "recordings": [recording for recording in document["recordings"] if recording.get("kind", "frf") == "frf"],
+    }
+    both = {"together": diagnosed(document), "alone": diagnosed(frf_document)}
+    expected = {hidden_effect["effect"] for hidden_effect in hidden}
+    distinguishable = {
+        hidden_effect["effect"]
+        for hidden_effect in hidden
+        if (hidden_effect["chi2_gain_modulus_free"] or 0.0) > _VISIBLE
+    } & set(_ERRORS)
+    distinguishable |= {
+        hidden_effect["effect"] for hidden_effect in hidden if hidden_effect["effect"] == "modulus_error"
+    }
     modulus = truth["documents"][0]["youngs_modulus_mpa"]
-    kind = next(one["kind"] for one in document["recordings"] if one.get("kind", "frf") != "frf")
+    kind = next(recording["kind"] for recording in document["recordings"] if recording.get("kind", "frf") != "frf")
     stated = [
-        entry
-        for entry in both["together"].get("by_kind", ())
-        if (entry["kind"], entry["parameter"]) == (kind, "youngs_modulus")
+        of_kind
+        for of_kind in both["together"].get("by_kind", ())
+        if (of_kind["kind"], of_kind["parameter"]) == (kind, "youngs_modulus")
     ]
     return {
         "identifiable": bool(truth["skins"][0]["modulus_identifiable"]),
-        "apart": sorted(told_apart),
+        "apart": sorted(distinguishable),
         "right": {name: set(answer(report)) == expected for name, report in both.items()},
-        "named": {name: sorted(told_apart & _present(report)) for name, report in both.items()},
+        "named": {name: sorted(distinguishable & _present(report)) for name, report in both.items()},
         "answers": {name: [report["verdict"], list(answer(report))] for name, report in both.items()},
-        "modulus_held": [bool(entry["low"] <= modulus <= entry["high"]) for entry in stated],
+        "modulus_held": [bool(interval["low"] <= modulus <= interval["high"]) for interval in stated],
         "contradicted": bool(both["together"].get("contradictions")),
     }
 
 
 def _present(report: Report) -> set[str]:
-    """What is in every surviving set."""
-    return {entry["mechanisms"][0] for entry in report.get("presence", ())
-            if len(entry["mechanisms"]) == 1 and entry["probability"] >= _SURE}  # fmt: skip
+    """The mechanisms that are in every surviving set."""
+    return {group["mechanisms"][0] for group in report.get("presence", ())
+            if len(group["mechanisms"]) == 1 and group["probability"] >= _SURE}  # fmt: skip
 
 
 def _together(readings: Sequence[underskin.Reading]) -> underskin.Report:
@@ -85,7 +92,7 @@ def _together(readings: Sequence[underskin.Reading]) -> underskin.Report:
 
 
 def _fleet(readings: Sequence[underskin.Reading]) -> underskin.Report:
-    return underskin.diagnose_fleet({str(one.campaign.skin.id): [one] for one in readings}, "drawn joint")
+    return underskin.diagnose_fleet({str(reading.campaign.skin.id): [reading] for reading in readings}, "drawn joint")
 
 
 def _campaign(readings: Sequence[underskin.Reading]) -> underskin.Report:
@@ -98,10 +105,10 @@ DIAGNOSED = {"compression": _campaign, "indentation": _campaign, "dates": _toget
 
 def _dates(documents: Sequence[dict[str, Any]], _truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
     together = diagnosed_by(_together, documents)
-    changed = [entry for entry in hidden if entry["since"]]
-    scopes = {entry["name"]: entry["scope"] for entry in together["mechanisms"]}
-    expected = {entry["effect"] for entry in hidden}
-    since = [entry["since"] in _dates_of(entry["effect"], together) for entry in changed]
+    changed = [hidden_effect for hidden_effect in hidden if hidden_effect["since"]]
+    scopes = {mechanism["name"]: mechanism["scope"] for mechanism in together["mechanisms"]}
+    expected = {hidden_effect["effect"] for hidden_effect in hidden}
+    since = [hidden_effect["since"] in _dates_of(hidden_effect["effect"], together) for hidden_effect in changed]
     return {
         "right": {"together": set(scopes) == expected, "alone": set(answer(diagnosed(documents[-1]))) == expected},
         "since": since,
@@ -111,39 +118,46 @@ def _dates(documents: Sequence[dict[str, Any]], _truth: Report, hidden: Sequence
 
 
 def _dates_of(effect: str, together: Report) -> set[str | None]:
-    """The dates since which it is said to be there, by itself or as one of the group that a change of level may be."""
-    groups = [set(entry["mechanisms"]) for entry in together["presence"]]
+    """The dates from which the effect is stated to act, by itself or as one of a group that may explain a change of
+    level."""
+    groups = [set(surviving_group["mechanisms"]) for surviving_group in together["presence"]]
     dates = set()
-    for entry in together["mechanisms"]:
-        stated = {entry["name"]}
-        if "statement" in entry:
+    for mechanism in together["mechanisms"]:
+        stated = {mechanism["name"]}
+        if "statement" in mechanism:
             stated = stated.union(
-                *(group for group in groups if entry["name"] in group and "sensors" not in entry["scope"])
+                *(group for group in groups if mechanism["name"] in group and "sensors" not in mechanism["scope"])
             )
         if effect in stated:
-            dates.add(entry["scope"].get("since"))
+            dates.add(mechanism["scope"].get("since"))
     return dates
 
 
 def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
     fleet = diagnosed_by(_fleet, documents)
-    hidden_in = {entry["departs"] for entry in truth["hidden"] if entry["departs"]}
-    d33 = {entry["skin"]: entry for entry in next(
-        (one["skins"] for one in fleet.get("population") or () if one["parameter"] == "d33"), [])}  # fmt: skip
-    known = {entry["skin"]: next(iter(entry["d33_pc_per_n"].values())) for entry in truth["documents"]}
+    hidden_in = {hidden_effect["departs"] for hidden_effect in truth["hidden"] if hidden_effect["departs"]}
+    populations = fleet.get("population") or ()
+    values: list[Report] = next(
+        (population["skins"] for population in populations if population["parameter"] == "d33"), []
+    )
+    d33 = {value["skin"]: value for value in values}
+    true_d33 = {document["skin"]: next(iter(document["d33_pc_per_n"].values())) for document in truth["documents"]}
     return {
         "departs": sorted(hidden_in),
-        "identifiable": sorted(entry["departs"] for entry in hidden if entry["departs"]),
+        "identifiable": sorted(hidden_effect["departs"] for hidden_effect in hidden if hidden_effect["departs"]),
         "stated": sorted(departing(fleet)),
-        "d33_held": [d33[skin]["low"] <= value <= d33[skin]["high"] for skin, value in known.items() if skin in d33],
+        "d33_held": [d33[skin]["low"] <= value <= d33[skin]["high"] for skin, value in true_d33.items() if skin in d33],
     }
 
 
 def departing(fleet: Report) -> set[str]:
-    """Skins, of one campaign each, that depart by the report: in a quantity, or by a mechanism that others lack."""
-    stated = {one["skin"] for entry in fleet.get("population") or () for one in entry["departures"]}
-    for entry in fleet["mechanisms"]:
-        skins = entry.get("scope", {}).get("skins", ())
+    """Skins, of one campaign each, that depart according to the report: in a quantity, or by a mechanism that others
+    lack."""
+    stated = {
+        departure["skin"] for population in fleet.get("population") or () for departure in population["departures"]
+    }
+    for mechanism in fleet["mechanisms"]:
+        skins = mechanism.get("scope", {}).get("skins", ())
         if len(skins) < len(fleet.get("campaigns", ())):
             stated.update(skins)
     return stated

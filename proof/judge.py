@@ -15,7 +15,7 @@ QUIET = ("no_mismatch", "insufficient_data")
 
 @dataclass(frozen=True)
 class Judged:
-    """One report beside its truth."""
+    """One report with its truth."""
 
     name: str
     truth: tuple[str, ...]  # sorted; empty where nothing is missing
@@ -75,7 +75,7 @@ def shown(names: tuple[str, ...]) -> str:
 
 
 def unnamed_over_noise(report: Mapping[str, Any]) -> float | None:
-    """The error held out with the unnamed law, over what noise alone would give."""
+    """The held-out error with the unlisted law, over that of noise alone."""
     law, fit = report.get("unnamed"), report["fit"]
     if law is None or not fit or not fit["noise_floor_percent"]:
         return None

@@ -1,8 +1,9 @@
-"""Every mechanism left out of the catalogue in turn: what the grammar of unnamed laws makes of campaigns that hide it.
+"""Every mechanism excluded from the catalogue in turn: what the grammar of unlisted laws finds in campaigns that
+hide it.
 
-Campaigns of the virtual rig with one effect are diagnosed twice, with the whole catalogue and without the mechanism
-that is hidden in them. The axes are those on which the mechanism says that its effect shows, the entries those of its
-stage.
+Campaigns of the virtual rig with one effect are diagnosed twice, with the complete catalogue and without the hidden
+mechanism. A law has the right axis if the mechanism's effect depends on it, and the right quantity if it is one of the
+mechanism's stage.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,7 +12,7 @@ from typing import Any
 
 from proof.cases import DrawnCase
 from proof.judge import unnamed_over_noise
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.own_rig import truth
 from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, reports, sources, stored
 from underskin.mechanisms.base import Stage
@@ -37,22 +38,22 @@ _AXES: Mapping[str, tuple[str, ...]] = {  # of the grammar, that say the same as
 
 
 def judge_left_out(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each campaign what was hidden, whether it shows, and both diagnoses."""
+    """For each campaign what was hidden, whether it is visible, and both diagnoses."""
     cases = [DrawnCase(SEED, number, "single") for number in range(min(work.count or COUNT, COUNT))]
     truths = of_each(work, cases, partial(truth, work, sources("rig")), _silent)
     shown = [
         (case, effect)
-        for case, known in zip(cases, truths, strict=True)
-        for effect in one_name_each(known["effects"])
-        if known["identifiable"] and effect in CATALOGUE
+        for case, case_truth in zip(cases, truths, strict=True)
+        for effect in distinct_names(case_truth["effects"])
+        if case_truth["identifiable"] and effect in CATALOGUE
     ]
-    whole = reports(work, [case for case, _ in shown], _silent)
+    full_reports = reports(work, [case for case, _ in shown], _silent)
     without = of_each(work, shown, partial(_without, work, diagnosing()), progress)
     return {
         "drawn": len(cases),
         "judged": [
             {"name": case.name, "hidden": hidden, **compared(hidden, named, unnamed)}
-            for (case, hidden), named, unnamed in zip(shown, whole, without, strict=True)
+            for (case, hidden), named, unnamed in zip(shown, full_reports, without, strict=True)
         ],
     }
 
@@ -69,17 +70,17 @@ def _without(work: Work, version: str, case: tuple[DrawnCase, str]) -> dict[str,
 
 
 def compared(hidden: str, named: Mapping[str, Any], unnamed: Mapping[str, Any]) -> dict[str, Any]:
-    """Where the law enters and what it follows; and errors held out, over the noise of what was held out.
+    """The quantity and the axis of the law; and held-out errors over the noise of the held-out data.
 
     Laws are held out in thirds along their axis, mechanisms by the largest groups, so only multiples of the noise can
     be compared.
     """
     law = unnamed.get("unnamed")
     mechanism = CATALOGUE[hidden]
-    follows = {axis for one in mechanism.axes for axis in _AXES.get(one, (one,))}
+    follows = {axis for axis_name in mechanism.axes for axis in _AXES.get(axis_name, (axis_name,))}
     return {
         "verdict": unnamed["verdict"],
-        "named_instead": [entry["name"] for entry in unnamed["mechanisms"]],
+        "named_instead": [mechanism_named["name"] for mechanism_named in unnamed["mechanisms"]],
         "law": None if law is None else {key: law[key] for key in ("acts_on", "axis", "form")},
         "axis_right": law is not None and law["axis"] in follows,
         "entry_right": law is not None and law["acts_on"] in _ENTRIES.get(mechanism.stage, ()),

@@ -5,6 +5,6 @@ from collections.abc import Iterable
 from underskin.mechanisms.registry import current_name
 
 
-def one_name_each(names: Iterable[str]) -> tuple[str, ...]:
-    """A set of mechanisms, sorted, in which a law has one name, whatever older reports and rigs call it."""
+def distinct_names(names: Iterable[str]) -> tuple[str, ...]:
+    """A sorted set of mechanisms under their current names, whatever older reports and rigs call them."""
     return tuple(sorted({current_name(name) for name in names}))

@@ -1,4 +1,4 @@
-"""The diagnosis under other priors than its own, while a context lasts: for tests of what depends on them."""
+"""The diagnosis under other priors than its own, within a context: for tests of what depends on them."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ class Priors:
 
 @contextmanager
 def other_priors(priors: Priors) -> Iterator[None]:
-    """Diagnose under these priors; the diagnosis's own are put back afterwards, whatever happens."""
+    """Diagnose under these priors; the diagnosis's own are always restored."""
     scatter = {id(plateau): dict(vars(plateau)) for plateau in (GAIN_PRIOR, POSITION_PRIOR)}
     sets = dict(PRIORS)
     try:
@@ -34,8 +34,8 @@ def other_priors(priors: Priors) -> Iterator[None]:
             vars(plateau).update(vars(_wider(plateau, priors.scatter)))
         for mechanism in CATALOGUE.values():
             vars(mechanism)["parameters_with"] = partial(_parameters, mechanism, priors.strengths)
-        left = (1 - priors.nothing) / (1 - sets[_NOTHING])
-        PRIORS.update({name: priors.nothing if name == _NOTHING else left * share for name, share in sets.items()})
+        remaining = (1 - priors.nothing) / (1 - sets[_NOTHING])
+        PRIORS.update({name: priors.nothing if name == _NOTHING else remaining * share for name, share in sets.items()})
         yield
     finally:
         for plateau in (GAIN_PRIOR, POSITION_PRIOR):
@@ -53,11 +53,11 @@ def _wider(plateau: Plateau, factor: float) -> Plateau:
 
 
 def _parameters(mechanism: Mechanism, factor: float, *arguments: Any) -> tuple[Parameter, ...]:
-    """A mechanism's parameters, with so many times as wide priors of strengths."""
-    own = type(mechanism).parameters_with(mechanism, *arguments)
+    """A mechanism's parameters, with priors of strengths wider by this factor."""
+    parameters = type(mechanism).parameters_with(mechanism, *arguments)
     return tuple(
-        replace(entry, prior=HeavyTailed(entry.prior.mean, factor * entry.prior.sd))
-        if isinstance(entry.prior, HeavyTailed)
-        else entry
-        for entry in own
+        replace(parameter, prior=HeavyTailed(parameter.prior.mean, factor * parameter.prior.sd))
+        if isinstance(parameter.prior, HeavyTailed)
+        else parameter
+        for parameter in parameters
     )

@@ -34,21 +34,23 @@ def quiet(count: int | None = None) -> list[DrawnCurves]:
 
 
 def judge_curves(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """The mixture's campaigns beside their truth."""
+    """The mixture's campaigns with their truth."""
     return _judge(work, mixture(work.count), progress)
 
 
 def judge_quiet_curves(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """The quiet campaigns beside their truth."""
+    """The quiet campaigns with their truth."""
     return _judge(work, quiet(work.count), progress)
 
 
 def _judge(work: Work, cases: list[DrawnCurves], progress: Callable[[int, int], None]) -> dict[str, Any]:
     truths = of_each(work, cases, partial(truth, work, sources("rig")), progress)
     answers = reports(work, cases, progress)
-    judged = [judge(case.name, report, known) for case, report, known in zip(cases, answers, truths, strict=True)]
+    judged = [
+        judge(case.name, report, case_truth) for case, report, case_truth in zip(cases, answers, truths, strict=True)
+    ]
     return {
-        "judged": [asdict(entry) for entry in judged],
+        "judged": [asdict(judgement) for judgement in judged],
         "truths": truths,
         "stated": [_stated(report) for report in answers],
     }
@@ -56,8 +58,8 @@ def _judge(work: Work, cases: list[DrawnCurves], progress: Callable[[int, int], 
 
 def _stated(report: Mapping[str, Any]) -> dict[str, Any]:
     """The modulus and the work of adhesion with their intervals, as far as a report has them: none if it failed."""
-    parameters = [entry for mechanism in report["mechanisms"] for entry in mechanism.get("parameters", ())]
-    work = [entry for entry in parameters if entry["name"] == "work_of_adhesion"]
+    parameters = [parameter for mechanism in report["mechanisms"] for parameter in mechanism.get("parameters", ())]
+    work = [parameter for parameter in parameters if parameter["name"] == "work_of_adhesion"]
     modulus = report["fit"]["after"].get("youngs_modulus") if report["fit"] else None
     return {"youngs_modulus": modulus, "work_of_adhesion": work[0] if work else None}
 

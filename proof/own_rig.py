@@ -1,7 +1,7 @@
 """Campaigns of this project's virtual rig, which shares no code with the diagnosis: a mixture, and quiet ones.
 
-The mixture hides nothing, one effect, two, or physics that no catalogue has, from subtle to strong; the quiet ones hide
-nothing at all. Both are fixed by the seed.
+The mixture hides nothing, one effect, two, or physics in no catalogue, from subtle to strong; the quiet ones hide
+nothing. Both are fixed by the seed.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ def judge_mixture(work: Work, progress: Callable[[int, int], None]) -> dict[str,
 
 
 def judge_quiet(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Campaigns with nothing missing; what they need besides is drawn anew, so none is one of the mixture's."""
+    """Campaigns without hidden effects; all else is drawn anew, so none is one of the mixture's."""
     return _judge(work, [DrawnCase(SEED + 1, number, "none") for number in range(work.count or QUIET)], progress)
 
 
@@ -34,7 +34,8 @@ def _judge(work: Work, cases: list[DrawnCase], progress: Callable[[int, int], No
     results = reports(work, cases, progress)
     return {
         "judged": [
-            asdict(judge(case.name, report, known)) for case, report, known in zip(cases, results, truths, strict=True)
+            asdict(judge(case.name, report, case_truth))
+            for case, report, case_truth in zip(cases, results, truths, strict=True)
         ]
     }
 

@@ -17,7 +17,7 @@ def write_page(parts: Mapping[str, Mapping[str, Any]], docs: Path) -> list[Path]
     written[0].write_text(document(parts), encoding="utf-8")
     if "mixture" in parts:
         judged = judged_of(parts["mixture"])
-        visible = [entry for entry in judged if entry.visible]
+        visible = [judgement for judgement in judged if judgement.visible]
         written.append(figures.calibration_and_size(visible, folder / "proof-calibration.svg"))
         written.append(figures.confusion(visible, folder / "proof-confusion.svg"))
     if "recordings" in parts:

@@ -1,4 +1,4 @@
-"""Phrases that several sections of the page share: shares with their intervals, medians, and lists of misses."""
+"""Phrases shared by several sections of the page: shares with intervals, medians, and lists of misses."""
 
 from collections.abc import Collection, Sequence
 
@@ -20,7 +20,7 @@ def percent(share: Share) -> str:
 
 def right(judged: Sequence[Judged]) -> str:
     """The share of right answers."""
-    return percent(share([entry.right for entry in judged]))
+    return percent(share([judgement.right for judgement in judged]))
 
 
 def median_of(values: Sequence[float]) -> str:
@@ -36,9 +36,11 @@ def median_of(values: Sequence[float]) -> str:
 def misses(judged: Sequence[Judged], identifiable: Collection[str] = ()) -> str:
     """A table of the answers that are not right."""
     rows = [
-        [entry.name, shown(entry.truth), shown(entry.answer), entry.verdict, f"{entry.probability:.2f}",
-         "identifiable" if entry.name in identifiable else "visible" if entry.visible else "no", f"{entry.size:.1f}"]
-        for entry in judged if not entry.right
+        [judgement.name, shown(judgement.truth), shown(judgement.answer), judgement.verdict,
+         f"{judgement.probability:.2f}",
+         "identifiable" if judgement.name in identifiable else "visible" if judgement.visible else "no",
+         f"{judgement.size:.1f}"]
+        for judgement in judged if not judgement.right
     ]  # fmt: skip
     if not rows:
         return "No misses.\n"

@@ -73,8 +73,14 @@ def recorded() -> Iterator[Recorded]:
 
 
 def _document(name: str, skin: dict[str, Any], recordings: list[dict[str, Any]]) -> dict[str, Any]:
-    whole = {"poisson_ratio": 0.5, "youngs_modulus_mpa": None, **skin}
-    return {"schema": "campaign/1", "name": name, "units_checked": True, "skin": whole, "recordings": recordings}
+    skin_document = {"poisson_ratio": 0.5, "youngs_modulus_mpa": None, **skin}
+    return {
+        "schema": "campaign/1",
+        "name": name,
+        "units_checked": True,
+        "skin": skin_document,
+        "recordings": recordings,
+    }
 
 
 def _curve(
@@ -171,7 +177,7 @@ def _numbers(path: Path, delimiter: str, columns: int) -> Floats:
     rows = []
     for line in path.read_text(encoding="latin-1").splitlines():
         try:
-            numbers = [float(entry or 0) for entry in line.split(delimiter)[:columns]]
+            numbers = [float(cell or 0) for cell in line.split(delimiter)[:columns]]
         except ValueError:
             continue
         if len(numbers) == columns and any(numbers):

@@ -1,4 +1,4 @@
-"""The parts of the proof: each is made by itself and stored as one document, from which the page is written."""
+"""The parts of the proof: each is made separately and stored as one document, from which the page is written."""
 
 import json
 import os
@@ -26,8 +26,8 @@ from proof.cases import DrawnCase, MadeCase
 from proof.stored import Work, of_diagnosis, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
 
-Tell = Callable[[int, int], None]
-Part = Callable[[Work, Tell], dict[str, Any]]
+OnProgress = Callable[[int, int], None]
+Part = Callable[[Work, OnProgress], dict[str, Any]]
 _JUDGE = "proof/judge.py"
 SEALED = Path(__file__).parent / "sealed"
 
@@ -39,27 +39,27 @@ def data_folder(setting: str) -> Path:
     return Path(os.environ[setting])
 
 
-def _open(work: Work, progress: Tell) -> dict[str, Any]:
+def _open(work: Work, progress: OnProgress) -> dict[str, Any]:
     return concealed.judge_open(work, data_folder("UNDERSKIN_CAMPAIGNS"), progress)
 
 
-def _sealed(work: Work, progress: Tell) -> dict[str, Any]:
+def _sealed(work: Work, progress: OnProgress) -> dict[str, Any]:
     return concealed.report_sealed(work, data_folder("UNDERSKIN_CAMPAIGNS"), SEALED, progress)
 
 
-def _recordings(work: Work, progress: Tell) -> dict[str, Any]:
+def _recordings(work: Work, progress: OnProgress) -> dict[str, Any]:
     entries = list(real.recorded())[: work.count]
-    place = data_folder("UNDERSKIN_RECORDINGS")
-    reported = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in entries], progress)
+    folder = data_folder("UNDERSKIN_RECORDINGS")
+    reported = reports(work, [MadeCase(recorded.name, recorded.make(folder)) for recorded in entries], progress)
     return {
         "campaigns": [
-            {"name": entry.name, "stated": entry.stated, "report": report}
-            for entry, report in zip(entries, reported, strict=True)
+            {"name": recorded.name, "stated": recorded.stated, "report": report}
+            for recorded, report in zip(entries, reported, strict=True)
         ]
     }
 
 
-def _paper(work: Work, progress: Tell) -> dict[str, Any]:
+def _paper(work: Work, progress: OnProgress) -> dict[str, Any]:
     cases = [MadeCase(name, document) for name, document in paper_array.worlds().items()]
     return {
         "campaigns": [
@@ -69,7 +69,7 @@ def _paper(work: Work, progress: Tell) -> dict[str, Any]:
     }
 
 
-def _ceiling(work: Work, progress: Tell) -> dict[str, Any]:
+def _ceiling(work: Work, progress: OnProgress) -> dict[str, Any]:
     cases = [DrawnCase(own_rig.SEED, number) for number in range(work.count or own_rig.MIXTURE)]
     version = sources("rig", "proof/ideal*.py")
     answers = of_each(work, cases, _Ideal(work.folder / "ceiling", version), progress)
@@ -112,7 +112,7 @@ PARTS: dict[str, Part] = {
 }
 
 
-def work_out(name: str, work: Work, folder: Path, progress: Tell) -> None:
+def work_out(name: str, work: Work, folder: Path, progress: OnProgress) -> None:
     """Make one part and store it in the folder of results."""
     result = {"sources": of_diagnosis(), "judged_by": sources(_JUDGE), **PARTS[name](work, progress)}
     folder.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 from proof import seeds
 from proof.cases import DrawnCase
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.stored import Work, diagnosing, digest_of, of_each, sources, stored
 from proof.text_wide import is_miss
 from proof.true_starts import with_true_values
@@ -53,24 +53,26 @@ def compared(case: DrawnCase) -> Result:
     is not; None where nothing can be concluded from the campaign, or it does not support what is hidden."""
     description = case.description
     effects = description["effects"]
-    hidden = one_name_each(effects)
+    hidden = distinct_names(effects)
     head: Result = {"name": case.name, "truth": list(hidden)}
-    begun = searched(case.document())
-    if begun is None:
+    problem_and_search = searched(case.document())
+    if problem_and_search is None:
         return {**head, "lost": None}
-    problem, found = begun
+    problem, selection = problem_and_search
     try:
         truth = refitted(problem, hidden, effects)
     except Unsupported:
         return {**head, "lost": None}
-    showing = [entry for entry in found.explanations if found.is_supported(entry)]
-    best = max(showing, key=found.log_weight)
-    own = next((entry for entry in found.explanations if set(entry.names) == set(hidden)), None)
+    showing = [explanation for explanation in selection.explanations if selection.is_supported(explanation)]
+    best = max(showing, key=selection.log_weight)
+    fit_of_truth = next(
+        (explanation for explanation in selection.explanations if set(explanation.names) == set(hidden)), None
+    )
     return {
         **head,
         "found": sorted(best.names),
-        "lost": found.log_weight(truth) - found.log_weight(best),
-        "lost_own": None if own is None else truth.log_evidence - own.log_evidence,
+        "lost": selection.log_weight(truth) - selection.log_weight(best),
+        "lost_own": None if fit_of_truth is None else truth.log_evidence - fit_of_truth.log_evidence,
     }
 
 
@@ -82,8 +84,8 @@ def searched(document: Result) -> tuple[FittingProblem, Search] | None:
     inspected = inspect(campaign, table)
     if inspected.lacking:
         return None
-    problem, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
-    return problem, search(problem, known)
+    problem, frf = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
+    return problem, search(problem, frf)
 
 
 def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, Any]) -> Explanation:
@@ -92,32 +94,36 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
     Raises Unsupported.
     """
     ordered = tuple(name for name in problem.lines.mechanisms.named if name in names)
-    (begun,) = problem.explain([Request(ordered)])
-    assert begun is not None  # alone, no fit is hopeless
-    requests = [Request(ordered, larger=with_true_values(begun, effects))]
+    (first,) = problem.explain([Request(ordered)])
+    assert first is not None  # without alternatives, no fit is pruned
+    requests = [Request(ordered, larger=with_true_values(first, effects))]
     if len(ordered) > 1:
-        alone = problem.explain([Request((name,)) for name in ordered])
-        requests += [Request(ordered, parent) for parent in alone if parent is not None]
+        single_fits = problem.explain([Request((name,)) for name in ordered])
+        requests += [Request(ordered, parent) for parent in single_fits if parent is not None]
     again = [problem.explain([request])[0] for request in requests]
-    each = integrated([begun, *(entry for entry in again if entry is not None)])
-    return max(each, key=lambda entry: entry.log_evidence)
+    integrated_fits = integrated([first, *(explanation for explanation in again if explanation is not None)])
+    return max(integrated_fits, key=lambda explanation: explanation.log_evidence)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = seeds.parser("search_misses", __doc__)
     parser.add_argument("--first", type=int, default=0, help="number of the first campaign")
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     judged = []
-    for number in range(given.first, given.first + given.count):
-        entry = compared(DrawnCase(given.seed, number, _HIDES[number % len(_HIDES)], WIDE))
-        if entry["lost"] is None:
+    for number in range(options.first, options.first + options.count):
+        miss = compared(DrawnCase(options.seed, number, _HIDES[number % len(_HIDES)], WIDE))
+        if miss["lost"] is None:
             continue
-        judged.append(entry)
-        if is_miss(entry):
-            own = "never fitted" if entry["lost_own"] is None else f"its own fit {entry['lost_own']:.1f} nats worse"
-            hidden, found = (" + ".join(entry[key]) or "nothing" for key in ("truth", "found"))
-            print(f"{entry['name']}: {hidden}; found {found}, {entry['lost']:.1f} nats lost ({own})", flush=True)
+        judged.append(miss)
+        if is_miss(miss):
+            lost_in_words = (
+                "never fitted" if miss["lost_own"] is None else f"its own fit {miss['lost_own']:.1f} nats worse"
+            )
+            hidden, answer = (" + ".join(miss[key]) or "nothing" for key in ("truth", "found"))
+            print(
+                f"{miss['name']}: {hidden}; found {answer}, {miss['lost']:.1f} nats lost ({lost_in_words})", flush=True
+            )
     print(f"misses by search: {sum(map(is_miss, judged))} of {len(judged)}")
 
 

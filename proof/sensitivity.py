@@ -40,25 +40,25 @@ def judge_sensitivity(work: Work, progress: Callable[[int, int], None]) -> dict[
 
 def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], None]) -> dict[str, Any]:
     cases = [DrawnCase(seed, number, _HIDES[number % len(_HIDES)], WIDE) for number in range(count)]
-    each = [(name, case) for name in VARIANTS for case in cases]
-    judged = of_each(work, each, partial(_judged, work, f"{diagnosing()} {sources('rig')}"), progress)
-    under = {name: judged[place * count : (place + 1) * count] for place, name in enumerate(VARIANTS)}
+    pairs = [(name, case) for name in VARIANTS for case in cases]
+    judged = of_each(work, pairs, partial(_judged, work, f"{diagnosing()} {sources('rig')}"), progress)
+    under = {name: judged[index * count : (index + 1) * count] for index, name in enumerate(VARIANTS)}
     return {"seed": seed, "count": count, "judged": under}
 
 
-def _judged(work: Work, version: str, given: tuple[str, DrawnCase]) -> dict[str, Any]:
+def _judged(work: Work, version: str, variant_and_case: tuple[str, DrawnCase]) -> dict[str, Any]:
     """Whether the answer is right, a false alarm, and whether d33 is held."""
-    name, case = given
+    name, case = variant_and_case
     key = digest_of([case.name, name, version])
     report = stored(work.folder / "priors", key, partial(_report, name, case))
-    known = truth(work, sources("rig"), case)
-    entry = judge(case.name, report, known)
+    case_truth = truth(work, sources("rig"), case)
+    judgement = judge(case.name, report, case_truth)
     return {
         "name": case.name,
-        "hidden": list(entry.truth),
-        "visible": entry.visible,
-        "right": entry.right,
-        "alarm": entry.verdict not in QUIET,
+        "hidden": list(judgement.truth),
+        "visible": judgement.visible,
+        "right": judgement.right,
+        "alarm": judgement.verdict not in QUIET,
         "held": held(case, report)["held"],
     }
 
@@ -70,9 +70,9 @@ def _report(name: str, case: DrawnCase) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    given = seeds.parser("sensitivity", __doc__).parse_args(arguments)
+    options = seeds.parser("sensitivity", __doc__).parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
-        print(by_priors(_judge(Work(Path(folder)), given.seed, given.count, lambda *_: None)["judged"]))
+        print(by_priors(_judge(Work(Path(folder)), options.seed, options.count, lambda *_: None)["judged"]))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from proof.slip_rivals import LevelRivals, left_of_conjugated, over_one_sign
+from proof.slip_rivals import LevelRivals, conjugated_residual, over_one_sign
 from rig.recorded import RecordedLines
 from underskin.findings.codes import Reason
 from underskin.mechanisms.unlisted.axes import recording_order
@@ -24,7 +24,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Case:
-    """A campaign of the rig, what is known of it, and the scatter of each recording's level (recordings,)."""
+    """A campaign of the rig, its known properties, and the scatter of each recording's level (recordings,)."""
 
     campaign: Campaign
     recorded: RecordedLines
@@ -32,7 +32,7 @@ class Case:
 
     @cached_property
     def rivals(self) -> LevelRivals:
-        """What else may move the levels."""
+        """Other causes that can change the levels."""
         return LevelRivals(self.recorded, self.scatter)
 
     @property
@@ -47,14 +47,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Slip:
-    """The campaign with a slip, the χ² that it adds, and how much of it no other cause explains (None: all)."""
+    """The campaign with a slip, the χ² that it adds, and the part of it that no other cause explains (None: all)."""
 
     campaign: Campaign
     chi2: float
     over_rivals: float | None = None
 
 
-Make = Callable[[Case, np.random.Generator], Slip | None]
+MakeSlip = Callable[[Case, np.random.Generator], Slip | None]
 
 
 def _scaled(case: Case, logarithm: Floats) -> Slip:
@@ -63,16 +63,16 @@ def _scaled(case: Case, logarithm: Floats) -> Slip:
     weight = np.where(np.isfinite(weight), weight, 0.0)
     mean = float((weight * logarithm).sum() / weight.sum())
     factors = np.exp(logarithm)
-    entries = [_times(entry, float(factor)) for entry, factor in zip(case.entries, factors, strict=True)]
+    entries = [_times(recording, float(factor)) for recording, factor in zip(case.entries, factors, strict=True)]
     chi2 = float((weight * (logarithm - mean) ** 2).sum())
-    return Slip(case.with_entries(entries), chi2, min(chi2, case.rivals.left_of(logarithm)))
+    return Slip(case.with_entries(entries), chi2, min(chi2, case.rivals.least_residual(logarithm)))
 
 
-def _times(entry: FrfRecording, factor: float, conjugate: float = 1.0) -> FrfRecording:
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    real, imaginary = factor * entry.frf_re_pc_per_n, factor * conjugate * entry.frf_im_pc_per_n
-    return replace(entry, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+def _times(recording: FrfRecording, factor: float, conjugate: float = 1.0) -> FrfRecording:
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    real, imaginary = factor * recording.frf_re_pc_per_n, factor * conjugate * recording.frf_im_pc_per_n
+    return replace(recording, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
 
 
 def _some(case: Case, random: np.random.Generator, share: float) -> Mask:
@@ -80,11 +80,11 @@ def _some(case: Case, random: np.random.Generator, share: float) -> Mask:
 
 
 def _sensors(case: Case) -> list[str]:
-    return list(dict.fromkeys(entry.sensor for entry in case.entries))
+    return list(dict.fromkeys(recording.sensor for recording in case.entries))
 
 
 def labels(case: Case, random: np.random.Generator) -> Slip | None:
-    """Two sensors' labels exchanged in all recordings; the places stay."""
+    """Two sensors' labels exchanged in all recordings; the positions stay."""
     return _exchanged(case, random, 0.0)
 
 
@@ -99,22 +99,22 @@ def _exchanged(case: Case, random: np.random.Generator, since: float) -> Slip | 
         return None
     first, second = random.choice(names, 2, replace=False).tolist()
     late = recording_order(case.entries) >= since * len(case.entries)
-    turned = np.array([entry.sensor in (first, second) for entry in case.entries]) & late
+    turned = np.array([recording.sensor in (first, second) for recording in case.entries]) & late
     if not turned.any():
         return None
     entries = [
-        replace(entry, sensor=second if entry.sensor == first else first) if wrong else entry
-        for entry, wrong in zip(case.entries, turned, strict=True)
+        replace(recording, sensor=second if recording.sensor == first else first) if wrong else recording
+        for recording, wrong in zip(case.entries, turned, strict=True)
     ]
     wrong = case.with_entries(entries)
     if case.entries[0].position_mm is not None:
         return Slip(wrong, _of_places(case, turned))
-    each = _of_gains(case, turned, first, second) if since else (0.0, 0.0)
-    return Slip(wrong, sum(each), min(each))  # a step of either sensor alone, of any size, leaves the other one's
+    gains = _of_gains(case, turned, first, second) if since else (0.0, 0.0)
+    return Slip(wrong, sum(gains), min(gains))  # a step of either sensor, of any size, leaves the other one's
 
 
 def _of_places(case: Case, turned: Mask) -> float:
-    """Σ |FRF|² over its scatter: the wrong sensor would show next to nothing."""
+    """Σ |FRF|² over its variance: the wrong sensor would show almost nothing."""
     return float((np.minimum(case.scatter, 1.0)[turned] ** -2.0).sum())
 
 
@@ -123,40 +123,47 @@ def _of_gains(case: Case, turned: Mask, first: str, second: str) -> tuple[float,
     gains = case.recorded.response.sensor_gains
     ids = [sensor.id for sensor in case.campaign.skin.sensors]
     step = float(np.log(gains[ids.index(first)] / gains[ids.index(second)]))
-    labels = np.array([entry.sensor for entry in case.entries])
-    given = np.where(turned, np.where(labels == first, second, first), labels)
+    labels = np.array([recording.sensor for recording in case.entries])
+    written_as = np.where(turned, np.where(labels == first, second, first), labels)
 
     def scattered(name: str) -> float:
-        own = (given == name) & np.isfinite(case.scatter)
-        weight = case.scatter[own] ** -2.0
-        other = turned[own].astype(float)
-        return float(step**2 * (weight * (other - np.average(other, weights=weight)) ** 2).sum()) if own.any() else 0.0
+        of_sensor = (written_as == name) & np.isfinite(case.scatter)
+        weight = case.scatter[of_sensor] ** -2.0
+        was_turned = turned[of_sensor].astype(float)
+        return (
+            float(step**2 * (weight * (was_turned - np.average(was_turned, weights=weight)) ** 2).sum())
+            if of_sensor.any()
+            else 0.0
+        )
 
     return scattered(first), scattered(second)
 
 
-def conjugated(share: float) -> Make:
+def conjugated(share: float) -> MakeSlip:
     """FRFs in the other sign convention."""
 
-    def make(case: Case, random: np.random.Generator) -> Slip | None:
+    def make_slip(case: Case, random: np.random.Generator) -> Slip | None:
         turned = _some(case, random, share)
         if not turned.any() or (share < 1 and 2 * turned.sum() >= len(turned)):
             return None
         entries = [
-            _times(entry, 1.0, -1.0) if wrong else entry for entry, wrong in zip(case.entries, turned, strict=True)
+            _times(recording, 1.0, -1.0) if wrong else recording
+            for recording, wrong in zip(case.entries, turned, strict=True)
         ]
         phase = 4 * case.recorded.exact.imag**2 / case.recorded.line_variance
         chi2 = float(phase[turned].sum())
-        rivals = left_of_conjugated(case.recorded) if turned.all() else over_one_sign(case.recorded, turned, share)
+        rivals = conjugated_residual(case.recorded) if turned.all() else over_one_sign(case.recorded, turned, share)
         return Slip(case.with_entries(entries), chi2, min(chi2, rivals))
 
-    return make
+    return make_slip
 
 
 def polarity(case: Case, random: np.random.Generator) -> Slip | None:
     """Reversed at random in about a third of the recordings."""
     turned = _some(case, random, 1 / 3)
-    entries = [_times(entry, -1.0) if wrong else entry for entry, wrong in zip(case.entries, turned, strict=True)]
+    entries = [
+        _times(recording, -1.0) if wrong else recording for recording, wrong in zip(case.entries, turned, strict=True)
+    ]
     return Slip(case.with_entries(entries), _of_places(case, turned)) if turned.any() else None
 
 
@@ -166,7 +173,7 @@ def weak(case: Case, random: np.random.Generator) -> Slip | None:
     if len(names) < 2:
         return None
     name = str(random.choice(names))
-    return _scaled(case, np.array([np.log(0.1) * (entry.sensor == name) for entry in case.entries]))
+    return _scaled(case, np.array([np.log(0.1) * (recording.sensor == name) for recording in case.entries]))
 
 
 def dead(case: Case, random: np.random.Generator) -> Slip | None:
@@ -176,38 +183,38 @@ def dead(case: Case, random: np.random.Generator) -> Slip | None:
         return None
     name = str(random.choice(names))
     floor = case.recorded.response.experiment.noise.floor_pc_per_n
-    entries, own = [], np.array([entry.sensor == name for entry in case.entries])
-    for entry, off in zip(case.entries, own, strict=True):
-        size = len(np.asarray(entry.frequency_hz))
+    entries, of_sensor = [], np.array([recording.sensor == name for recording in case.entries])
+    for recording, off in zip(case.entries, of_sensor, strict=True):
+        size = len(np.asarray(recording.frequency_hz))
         noise = floor * random.normal(size=(2, size))
-        entries.append(replace(entry, frf_re_pc_per_n=noise[0], frf_im_pc_per_n=noise[1]) if off else entry)
-    return Slip(case.with_entries(entries), _of_places(case, own))
+        entries.append(replace(recording, frf_re_pc_per_n=noise[0], frf_im_pc_per_n=noise[1]) if off else recording)
+    return Slip(case.with_entries(entries), _of_places(case, of_sensor))
 
 
-def warm_up(amplitude: float) -> Make:
+def warm_up(amplitude: float) -> MakeSlip:
     """The first recordings' gain 1 + A e^(−j/τ); a fall only where no load cycles are noted."""
 
-    def make(case: Case, random: np.random.Generator) -> Slip | None:
-        if amplitude > 0 and all(entry.load_cycles is not None for entry in case.entries):
+    def make_slip(case: Case, random: np.random.Generator) -> Slip | None:
+        if amplitude > 0 and all(recording.load_cycles is not None for recording in case.entries):
             return None  # `ageing` explains it as well
         order = recording_order(case.entries)
         return _scaled(case, np.log(1 + amplitude * np.exp(-order / float(random.uniform(1.0, 4.0)))))
 
-    return make
+    return make_slip
 
 
-def factor(value: float) -> Make:
-    """A third of the recordings at a factor: peak-to-peak or rms for peak."""
+def factor(value: float) -> MakeSlip:
+    """A third of the recordings multiplied by a factor: peak-to-peak or rms instead of peak."""
 
-    def make(case: Case, random: np.random.Generator) -> Slip | None:
+    def make_slip(case: Case, random: np.random.Generator) -> Slip | None:
         off = _some(case, random, 1 / 3)
         return None if 2 * off.sum() >= len(off) else _scaled(case, np.log(value) * off)
 
-    return make
+    return make_slip
 
 
 # Each slip, and the reasons of findings that name it.
-SLIPS: Mapping[str, tuple[Make, tuple[Reason, ...]]] = {
+SLIPS: Mapping[str, tuple[MakeSlip, tuple[Reason, ...]]] = {
     "labels exchanged": (labels, (Reason.LABELS_EXCHANGED,)),
     "cables exchanged": (cables, (Reason.CABLES_EXCHANGED, Reason.LABELS_EXCHANGED)),
     "all conjugated": (conjugated(1.0), (Reason.ALL_CONJUGATED,)),

@@ -33,18 +33,19 @@ _SPREAD, _SENSOR, _MODULUS, _THICKNESS = 0.25, 0.01, 0.02, 0.01  # standard devi
 _STEP = 1e-3
 _DELAY = "timing_delay"
 _LADDER: Values = {"law": "ladder"}
-_ONE_STEP: Values = {"law": "step"}
-# Effects that turn the phase: what is fitted of each, and its law.
+_STEP_LAW: Values = {"law": "step"}
+# Effects that turn the phase: the fitted parameter of each, and its law.
 _TURNING: tuple[tuple[str, tuple[str, ...], Values], ...] = (
     ("amplifier_high_pass", ("corner_hz",), {}),
     ("sensor_relaxation", ("exponent",), _LADDER),
-    ("sensor_relaxation", ("step", "corner_hz"), _ONE_STEP),
+    ("sensor_relaxation", ("step", "corner_hz"), _STEP_LAW),
     ("contact_resonance", ("tip_mass_g", "damping"), {}),
 )
 
 
 class LevelRivals:
-    """The changes of the recordings' ln level that other causes can make, and how much of a slip's they leave."""
+    """The changes of the recordings' ln level that other causes can make, and how much of a slip's changes they
+    leave unexplained."""
 
     def __init__(self, recorded: RecordedLines, scatter: Floats) -> None:
         response = recorded.response
@@ -55,19 +56,19 @@ class LevelRivals:
         self.spread = _SPREAD * sensor
         self.rivals = list(_rivals(response))
 
-    def left_of(self, logarithm: Floats) -> float:
-        """χ² that the best of them leaves of changes of ln level (recordings,)."""
-        left = self._left(self.free)
-        spread = self._left(np.column_stack([self.free, self.spread]))
-        found = [float(logarithm @ left @ logarithm), float(logarithm @ spread @ logarithm)]
+    def least_residual(self, logarithm: Floats) -> float:
+        """The least χ² that they leave of changes of ln level (recordings,)."""
+        projector = self._projector(self.free)
+        spread = self._projector(np.column_stack([self.free, self.spread]))
+        residuals = [float(logarithm @ projector @ logarithm), float(logarithm @ spread @ logarithm)]
         for rival in self.rivals:
-            along, size = float(rival @ left @ logarithm), float(rival @ left @ rival)
+            along, size = float(rival @ projector @ logarithm), float(rival @ projector @ rival)
             share = float(np.clip(along / size, 0.0, _STRONGER)) if size > 0 else 0.0
-            found.append(found[0] - 2 * share * along + share**2 * size)
-        return min(found)
+            residuals.append(residuals[0] - 2 * share * along + share**2 * size)
+        return min(residuals)
 
-    def _left(self, columns: Floats) -> Floats:
-        """The matrix of the χ² that columns of normal coefficients leave; the first's is free."""
+    def _projector(self, columns: Floats) -> Floats:
+        """The matrix of the χ² left by columns with normal coefficients; the first column's is free."""
         weighted = self.weight[:, None] * columns
         penalty = np.diag([0.0, *np.ones(columns.shape[1] - 1)])
         inner = np.linalg.solve(columns.T @ weighted + penalty, weighted.T)
@@ -77,8 +78,8 @@ class LevelRivals:
 def _change(response: TrueResponse, name: str) -> Floats:
     """∂ ln level/∂ ln of a declared value (recordings,)."""
     skin = response.experiment.skin
-    other = replace(skin, **{name: getattr(skin, name) * (1 + _STEP)})
-    changed = replace(response, experiment=replace(response.experiment, skin=other))
+    stepped = replace(skin, **{name: getattr(skin, name) * (1 + _STEP)})
+    changed = replace(response, experiment=replace(response.experiment, skin=stepped))
     return (_level(changed) - _level(response)) / _STEP
 
 
@@ -101,15 +102,15 @@ def _rivals(response: TrueResponse) -> Iterator[Floats]:
                 break
 
 
-def left_of_conjugated(recorded: RecordedLines) -> float:
-    """χ² that the best unconjugated phase leaves of the conjugated FRFs."""
+def conjugated_residual(recorded: RecordedLines) -> float:
+    """The least χ² that an unconjugated phase leaves of the conjugated FRFs."""
     ranges = of_frf(dict(recorded.response.experiment.document))
     of_filters = _OfFilters(recorded)
-    found = [of_filters.least((), {}, ranges[_DELAY]["delay_us"], [])]
+    chi2 = [of_filters.least((), {}, ranges[_DELAY]["delay_us"], [])]
     for name, parameters, law in _TURNING:
         bounds = [ranges[name][parameter] for parameter in parameters]
-        found.append(of_filters.least((name, *parameters), law, ranges[_DELAY]["delay_us"], bounds))
-    return min(found)
+        chi2.append(of_filters.least((name, *parameters), law, ranges[_DELAY]["delay_us"], bounds))
+    return min(chi2)
 
 
 class _OfFilters:
@@ -131,14 +132,14 @@ class _OfFilters:
     ) -> float:
         """χ² of a gain, a delay of either sign up to the longest, and an effect within the bounds of its parameters."""
         name, parameters = effect[:1], effect[1:]
-        low = np.array([0.5, -delay[1], *(np.log(one) for one, _ in bounds)])
-        high = np.array([2.0, delay[1], *(np.log(other) for _, other in bounds)])
+        low = np.array([0.5, -delay[1], *(np.log(lower) for lower, _ in bounds)])
+        high = np.array([2.0, delay[1], *(np.log(upper) for _, upper in bounds)])
 
         def residual(fit: Floats) -> Floats:
             on = {name[0]: {**law, **dict(zip(parameters, np.exp(fit[2:]).tolist(), strict=True))}} if name else {}
             late = np.exp(-2e-6j * np.pi * self.frequency * fit[1])
-            left = np.sqrt(self.weight) * (self.wanted - fit[0] * self._filtered(on) * late)
-            return np.concatenate([left.real.ravel(), left.imag.ravel()])
+            misfit = np.sqrt(self.weight) * (self.wanted - fit[0] * self._filtered(on) * late)
+            return np.concatenate([misfit.real.ravel(), misfit.imag.ravel()])
 
         starts = [low + share * (high - low) for share in (0.2, 0.8)] if bounds else [(low + high) / 2]
         for start in starts:

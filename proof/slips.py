@@ -36,7 +36,7 @@ _SLIPS = {reason for _, reasons in SLIPS.values() for reason in reasons}
 
 
 def judge_slips(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each campaign what is named without a slip, and with each."""
+    """For each campaign what is named without a slip, and with each."""
     numbers = list(range(min(work.count or COUNT, COUNT)))
     return {"seed": SEED, "judged": _judge(work, SEED, numbers, progress)}
 
@@ -48,7 +48,7 @@ def _judge(work: Work, seed: int, numbers: Sequence[int], progress: Callable[[in
 
 def _judged(work: Work, seed: int, version: str, number: int) -> dict[str, Any]:
     key = digest_of(["slips", seed, number, version])
-    return stored(work.folder / "slips", key, partial(of_one, seed, number))
+    return stored(work.folder / "slips", key, partial(judged_campaign, seed, number))
 
 
 def _description(seed: int, number: int) -> dict[str, Any]:
@@ -61,18 +61,18 @@ def document(seed: int, number: int) -> dict[str, Any]:
     return campaign(record(_description(seed, number)))
 
 
-def of_one(seed: int, number: int) -> dict[str, Any]:
-    """One campaign: what is named in it without a slip, and of each visible or committed slip what is named."""
+def judged_campaign(seed: int, number: int) -> dict[str, Any]:
+    """One campaign: what is named in it without a slip, and with each visible or committed slip."""
     sigma = load_table()
     description = _description(seed, number)
     recorded = record(description)
     made, _ = from_dict(campaign(recorded))
     case = _case(made, recorded, sigma)
     committed = {}
-    for place, (slip, (make, reasons)) in enumerate(SLIPS.items()):
+    for index, (slip, (make, reasons)) in enumerate(SLIPS.items()):
         if number >= _FIRST and slip not in _SELDOM:
             continue
-        done = make(case, np.random.default_rng([number, place]))
+        done = make(case, np.random.default_rng([number, index]))
         if done is None:
             continue
         named = _named(done.campaign, sigma)
@@ -96,16 +96,16 @@ def _named(made: Campaign, sigma: SigmaTable) -> set[Reason]:
 
 def _case(made: Campaign, recorded: RecordedLines, sigma: SigmaTable) -> Case:
     """With the scatter of each recording's level: gain, position and lines."""
-    own = levels(made, frf_recordings(made), sigma)
+    own_levels = levels(made, frf_recordings(made), sigma)
     relative = recorded.line_variance / np.maximum(np.abs(recorded.exact) ** 2, 1e-300)
     scatter = np.full(len(recorded.exact), np.inf)
     lines = 1 / (1 / relative).sum(axis=1)
     noise = recorded.response.experiment.noise
-    scatter[own.index] = np.sqrt(noise.gain**2 + _of_place(recorded.response) + lines)[own.index]
+    scatter[own_levels.index] = np.sqrt(noise.gain**2 + _of_positions(recorded.response) + lines)[own_levels.index]
     return Case(made, recorded, scatter)
 
 
-def _of_place(response: TrueResponse) -> Floats:
+def _of_positions(response: TrueResponse) -> Floats:
     """The variance of ln level from the scatter of places (recordings,)."""
     size = response.experiment.noise.position_mm
     if size == 0:
@@ -117,10 +117,10 @@ def _of_place(response: TrueResponse) -> Floats:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    given = seeds.parser("slips", __doc__).parse_args(arguments)
+    options = seeds.parser("slips", __doc__).parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
-        judged = _judge(Work(Path(folder)), given.seed, range(given.count), lambda *_: None)
-    print(slips({"seed": given.seed, "judged": judged}))
+        judged = _judge(Work(Path(folder)), options.seed, range(options.count), lambda *_: None)
+    print(slips({"seed": options.seed, "judged": judged}))
 
 
 if __name__ == "__main__":

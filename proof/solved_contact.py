@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from proof.cases import MadeCase
-from proof.names import one_name_each
+from proof.names import distinct_names
 from proof.stored import Work, digest_of, of_each, reports, sources, stored
 from rig.solved.campaign import document, drawn
 from rig.solved.worlds import PLAIN
@@ -39,10 +39,10 @@ def judge_solved(work: Work, progress: Callable[[int, int], None]) -> dict[str, 
     """Each campaign's truth, the report's answer, and how they compare."""
     numbers = list(range(min(work.count or COUNT, COUNT)))
     made = of_each(work, numbers, partial(_made, work.folder / "solved", sources("rig")), progress)
-    told = reports(work, [MadeCase(one["campaign"]["name"], one["campaign"]) for one in made], progress)
+    answers = reports(work, [MadeCase(solved["campaign"]["name"], solved["campaign"]) for solved in made], progress)
     judged = [
-        {"name": one["campaign"]["name"], **compared(one["truth"], report)}
-        for one, report in zip(made, told, strict=True)
+        {"name": solved["campaign"]["name"], **compared(solved["truth"], report)}
+        for solved, report in zip(made, answers, strict=True)
     ]
     return {"seed": SEED, "judged": judged}
 
@@ -101,20 +101,23 @@ def _visible(truth: Truth) -> bool:
 def _names(report: Report) -> tuple[str, ...]:
     if report["verdict"] not in ("explained", "ambiguous"):
         return ()
-    return one_name_each(one["name"] for one in report["mechanisms"])
+    return distinct_names(mechanism["name"] for mechanism in report["mechanisms"])
 
 
 def rows(judged: Sequence[Judgement]) -> dict[str, list[Judgement]]:
     """The campaigns by effect, by whether the effect shows, and all."""
-    found = {effect: [one for one in judged if one["effect"] == effect] for effect in sorted(_effects(judged))}
-    found["effect shows"] = [one for one in judged if one["visible"]]
-    unseen = [one for one in judged if not one["visible"] and one["effect"] != PLAIN]
-    found["effect does not show"] = unseen
-    found["of these, d33 moved"] = [one for one in unseen if abs(one["plain_world_off"]) > _MOVES]
-    found["all but these"] = [one for one in judged if one not in found["of these, d33 moved"]]
-    found["all"] = list(judged)
-    return found
+    subsets = {
+        effect: [judgement for judgement in judged if judgement["effect"] == effect]
+        for effect in sorted(_effects(judged))
+    }
+    subsets["effect shows"] = [judgement for judgement in judged if judgement["visible"]]
+    unseen = [judgement for judgement in judged if not judgement["visible"] and judgement["effect"] != PLAIN]
+    subsets["effect does not show"] = unseen
+    subsets["of these, d33 moved"] = [judgement for judgement in unseen if abs(judgement["plain_world_off"]) > _MOVES]
+    subsets["all but these"] = [judgement for judgement in judged if judgement not in subsets["of these, d33 moved"]]
+    subsets["all"] = list(judged)
+    return subsets
 
 
 def _effects(judged: Sequence[Judgement]) -> set[str]:
-    return {one["effect"] for one in judged}
+    return {judgement["effect"] for judgement in judged}

@@ -75,26 +75,26 @@ def calibration(probabilities: Sequence[float], right: Sequence[bool], draws: in
         Simulated tools.
     """
     stated, hit = np.array(probabilities, dtype=float), np.array(right, dtype=float)
-    place = np.minimum((stated * BINS).astype(int), BINS - 1)
-    used = np.unique(place)
-    members = [place == number for number in used]
+    bin_index = np.minimum((stated * BINS).astype(int), BINS - 1)
+    used = np.unique(bin_index)
+    members = [bin_index == number for number in used]
     chance = np.random.default_rng(1).random((draws, len(stated))) < stated
     errors = [_error(members, stated, row) for row in chance.astype(float)]
     shares = [Share(int(hit[member].sum()), int(member.sum())) for member in members]
     low, high = np.quantile(errors, [0.025, 0.975])
     return Calibration(
-        count=tuple(entry.count for entry in shares),
+        count=tuple(bin_share.count for bin_share in shares),
         stated=tuple(float(stated[member].mean()) for member in members),
-        right=tuple(entry.value for entry in shares),
-        low=tuple(entry.interval[0] for entry in shares),
-        high=tuple(entry.interval[1] for entry in shares),
+        right=tuple(bin_share.value for bin_share in shares),
+        low=tuple(bin_share.interval[0] for bin_share in shares),
+        high=tuple(bin_share.interval[1] for bin_share in shares),
         error=_error(members, stated, hit),
         chance_range=(float(low), float(high)),
     )
 
 
 def chance_of_so_few(probabilities: Sequence[float], hits: int) -> float:
-    """P(X ≤ hits) of the number X of right answers where each is right with its stated probability."""
+    """P(X ≤ hits) of the number X of right answers if each is right with its stated probability."""
     count = np.ones(1)  # the distribution of X
     for probability in probabilities:
         count = np.convolve(count, [1 - probability, probability])

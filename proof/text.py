@@ -73,7 +73,7 @@ def document(parts: Mapping[str, Result]) -> str:
 
 def _concealed(result: Result) -> str:
     judged = judged_of(result)
-    visible = [entry for entry in judged if entry.visible]
+    visible = [judgement for judgement in judged if judgement.visible]
     return f"""\
 ## Campaigns of a rig that this project has never seen
 
@@ -85,19 +85,22 @@ Of {len(judged)} open campaigns {len(visible)} are identifiable. Right among the
 
 def _sealed(result: Result) -> str:
     counts = Counter[str](result["verdicts"])
-    said = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    counts_in_words = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
     return f"""\
 Of the sealed campaigns, whose truth is not known here, {len(result["verdicts"])} reports lie in `proof/sealed/`, for
-others to judge. Their verdicts: {said}. Nothing was fitted to them.
+others to judge. Their verdicts: {counts_in_words}. Nothing was fitted to them.
 """
 
 
 def _mixture(result: Result, ceiling: Result | None) -> str:
     judged = judged_of(result)
-    visible = [entry for entry in judged if entry.visible]
-    parts = {kind: [entry for entry in visible if entry.kind == kind] for kind in ("none", "single", "pair", "unknown")}
+    visible = [judgement for judgement in judged if judgement.visible]
+    parts = {
+        kind: [judgement for judgement in visible if judgement.kind == kind]
+        for kind in ("none", "single", "pair", "unknown")
+    }
     parts["all"] = visible
-    drawn = Counter(entry.kind for entry in judged) + Counter(all=len(judged))
+    drawn = Counter(judgement.kind for judgement in judged) + Counter(all=len(judged))
     rows = [[kind, str(drawn[kind]), right(entries), _ideal(entries, ceiling), right(_identifiable(entries, ceiling))]
             for kind, entries in parts.items()]  # fmt: skip
     return f"""\
@@ -120,7 +123,7 @@ among the rivals: for near-twins (a moving edge and a finite amplitude at one am
 {_held_out(visible)}
 ### Every miss
 
-{misses(judged, {entry.name for entry in _identifiable(visible, ceiling)})}"""
+{misses(judged, {judgement.name for judgement in _identifiable(visible, ceiling)})}"""
 
 
 _CEILING = """\
@@ -133,7 +136,9 @@ its true values, so it never overlooks it. Its likelihood treats the scatter of 
 
 def _ideal(judged: Sequence[Judged], ceiling: Result | None) -> str:
     answers = ceiling["answers"] if ceiling else {}
-    right = [tuple(answers[entry.name]["answer"]) == entry.truth for entry in judged if entry.name in answers]
+    right = [
+        tuple(answers[judgement.name]["answer"]) == judgement.truth for judgement in judged if judgement.name in answers
+    ]
     return percent(share(right)) if right else "not run"
 
 
@@ -141,29 +146,33 @@ def _identifiable(judged: Sequence[Judged], ceiling: Result | None) -> list[Judg
     """Those of the visible that an ideal diagnoser could name; of those it was run on."""
     answers = ceiling["answers"] if ceiling else {}
     gains = {name: answer["chi2_over_rivals"] for name, answer in answers.items()}
-    return [entry for entry in judged if entry.name in gains and (not entry.truth or gains[entry.name] > THRESHOLD)]
+    return [
+        judgement
+        for judgement in judged
+        if judgement.name in gains and (not judgement.truth or gains[judgement.name] > THRESHOLD)
+    ]
 
 
 def _confused(judged: Sequence[Judged]) -> str:
     header = ["hidden", "count", "right", "left open", "part of it", "other mechanisms", "unexplained", "nothing"]
     rows = []
     for kind in ("none", "single", "pair", "unknown"):
-        entries = [entry for entry in judged if entry.kind == kind]
-        counts = Counter(_outcome(entry) for entry in entries)
+        entries = [judgement for judgement in judged if judgement.kind == kind]
+        counts = Counter(_outcome(judgement) for judgement in entries)
         rows.append([kind, str(len(entries)), *(str(counts[name]) for name in header[2:])])
     return table(header, rows)
 
 
-def _outcome(entry: Judged) -> str:
-    if entry.right:
+def _outcome(judgement: Judged) -> str:
+    if judgement.right:
         return "right"
-    if entry.left_open:
+    if judgement.left_open:
         return "left open"
-    if entry.verdict in QUIET:
+    if judgement.verdict in QUIET:
         return "nothing"
-    if entry.verdict == "unexplained":
+    if judgement.verdict == "unexplained":
         return "unexplained"
-    return "part of it" if set(entry.truth) & set(entry.answer) else "other mechanisms"
+    return "part of it" if set(judgement.truth) & set(judgement.answer) else "other mechanisms"
 
 
 def _probabilities(judged: Sequence[Judged], visible: Sequence[Judged], identifiable: Sequence[Judged]) -> str:
@@ -171,7 +180,9 @@ def _probabilities(judged: Sequence[Judged], visible: Sequence[Judged], identifi
     for name, entries in (("identifiable", identifiable), ("visible", visible), ("all", judged)):
         if not entries:
             continue
-        result = calibration([entry.probability for entry in entries], [entry.right for entry in entries])
+        result = calibration(
+            [judgement.probability for judgement in entries], [judgement.right for judgement in entries]
+        )
         low, high = result.chance_range
         inside = "inside" if result.error <= high else "outside"
         rows.append([name, str(len(entries)), f"{result.error:.3f}", f"{low:.3f}–{high:.3f}", inside])
@@ -184,7 +195,7 @@ the range is that of 4000 simulated tools that state the same probabilities and 
 
 
 def _held_out(judged: Sequence[Judged]) -> str:
-    ratios = [entry.held_out[0] / entry.held_out[1] for entry in judged if entry.held_out]
+    ratios = [judgement.held_out[0] / judgement.held_out[1] for judgement in judged if judgement.held_out]
     if not ratios:
         return ""
     return (
@@ -195,7 +206,7 @@ def _held_out(judged: Sequence[Judged]) -> str:
 
 def _quiet(result: Result) -> str:
     judged = judged_of(result)
-    alarms = [entry for entry in judged if entry.verdict not in QUIET]
+    alarms = [judgement for judgement in judged if judgement.verdict not in QUIET]
     return f"""\
 ### False alarms
 

@@ -21,10 +21,14 @@ _KINDS = ("single", "pair", "unknown")
 def curves(result: Result) -> str:
     """Of the campaigns that hide something."""
     judged = judged_of(result)
-    visible = [entry for entry in judged if entry.one_visible]
-    both = [entry for entry in judged if entry.visible]
+    visible = [judgement for judgement in judged if judgement.one_visible]
+    both = [judgement for judgement in judged if judgement.visible]
     rows = [
-        [kind, str(sum(entry.kind == kind for entry in judged)), *(_right(part, kind) for part in (visible, both))]
+        [
+            kind,
+            str(sum(judgement.kind == kind for judgement in judged)),
+            *(_right(part, kind) for part in (visible, both)),
+        ]
         for kind in _KINDS
     ]
     rows.append(["all", str(len(judged)), right(visible), right(both)])
@@ -54,7 +58,7 @@ pair of which each member does.
 def quiet_curves(result: Result) -> str:
     """Of the campaigns that hide nothing."""
     judged = judged_of(result)
-    alarms = [entry for entry in judged if entry.verdict not in QUIET]
+    alarms = [judgement for judgement in judged if judgement.verdict not in QUIET]
     return f"""\
 ### False alarms on raw curves
 
@@ -67,17 +71,17 @@ verdict other than `no_mismatch` or `insufficient_data` in {percent(Share(len(al
 
 
 def _right(judged: Sequence[Judged], kind: str) -> str:
-    return right([entry for entry in judged if entry.kind == kind])
+    return right([judgement for judgement in judged if judgement.kind == kind])
 
 
 def _sure(parts: Mapping[str, Sequence[Judged]]) -> str:
     """How often answers stated with more than 0.9 are right, and how probable it is that so few are."""
     rows = []
     for words, judged in parts.items():
-        sure = [entry for entry in judged if entry.probability > _SURE]
+        sure = [judgement for judgement in judged if judgement.probability > _SURE]
         if sure:
-            stated = [entry.probability for entry in sure]
-            chance = chance_of_so_few(stated, sum(entry.right for entry in sure))
+            stated = [judgement.probability for judgement in sure]
+            chance = chance_of_so_few(stated, sum(judgement.right for judgement in sure))
             rows.append([words, f"{np.mean(stated):.3f}", right(sure), f"{chance:.3f}"])
     header = [f"stated with more than {_SURE:g}", "mean stated", "right", "so few or fewer by chance"]
     return table(header, rows) if rows else ""
@@ -86,17 +90,21 @@ def _sure(parts: Mapping[str, Sequence[Judged]]) -> str:
 def _calibration(judged: Sequence[Judged]) -> str:
     if not judged:
         return ""
-    told = calibration([entry.probability for entry in judged], [entry.right for entry in judged])
-    low, high = told.chance_range
+    result = calibration([judgement.probability for judgement in judged], [judgement.right for judgement in judged])
+    low, high = result.chance_range
     return (
-        f"Expected calibration error of the identifiable: {told.error:.3f}; a perfectly calibrated tool would have "
+        f"Expected calibration error of the identifiable: {result.error:.3f}; a perfectly calibrated tool would have "
         f"{low:.3f} to {high:.3f}."
     )
 
 
 def _over_the_floor(judged: Sequence[Judged]) -> str:
     """How errors held out compare with noise where a law is named rightly."""
-    named = [entry.held_out for entry in judged if entry.right and entry.kind in ("single", "pair") and entry.held_out]
+    named = [
+        judgement.held_out
+        for judgement in judged
+        if judgement.right and judgement.kind in ("single", "pair") and judgement.held_out
+    ]
     ratios = [error / floor for error, floor in named if floor > 0]
     if not ratios:
         return ""
@@ -113,11 +121,11 @@ def _values(result: Result, judged: Sequence[Judged]) -> str:
         ("modulus, all right answers", "youngs_modulus", _modulus),
     ):
         errors, held = [], []
-        for entry, truth, stated in zip(judged, result["truths"], result["stated"], strict=True):
-            value, known = stated[name], true(truth)
-            if entry.right and value is not None and known is not None:
-                errors.append(100 * abs(value["value"] / known - 1))
-                held.append(value["low"] <= known <= value["high"])
+        for judgement, truth, stated in zip(judged, result["truths"], result["stated"], strict=True):
+            value, true_value = stated[name], true(truth)
+            if judgement.right and value is not None and true_value is not None:
+                errors.append(100 * abs(value["value"] / true_value - 1))
+                held.append(value["low"] <= true_value <= value["high"])
         if errors:
             rows.append([words, str(len(errors)), median_of(errors), percent(share(held))])
     if not rows:

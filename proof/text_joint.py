@@ -10,21 +10,25 @@ from proof.statistics import share
 Result = Mapping[str, Any]
 
 
-BESIDE_CURVES = ("compression", "indentation")
+WITH_CURVES = ("compression", "indentation")
 
 
-def told_apart(entries: Sequence[Result], how: str) -> list[bool]:
+def distinguished(entries: Sequence[Result], how: str) -> list[bool]:
     """Of campaigns that hide an error of E, of h or stiffening, identifiable, whether each is told apart `how`: from
     the FRFs `alone`, or `together` with curves."""
-    return [entry["named"][how] == entry["apart"] for entry in entries if entry["apart"] and entry["identifiable"]]
+    return [
+        judgement["named"][how] == judgement["apart"]
+        for judgement in entries
+        if judgement["apart"] and judgement["identifiable"]
+    ]
 
 
 def joint(result: Result) -> str:
     """Of joint campaigns what is told together and apart."""
     judged = result["judged"]
-    kinds = [entry for entry in judged if entry["what"] in BESIDE_CURVES]
-    dates = [entry for entry in judged if entry["what"] == "dates"]
-    skins = [entry for entry in judged if entry["what"] == "skins"]
+    kinds = [judgement for judgement in judged if judgement["what"] in WITH_CURVES]
+    dates = [judgement for judgement in judged if judgement["what"] == "dates"]
+    skins = [judgement for judgement in judged if judgement["what"] == "skins"]
     return f"""\
 ## Kinds, dates and skins together
 
@@ -42,28 +46,28 @@ own equations tell from an error of E are counted.
 def _of_kinds(entries: Sequence[Result]) -> str:
     rows = []
     for what, called in zip(
-        (BESIDE_CURVES[:1], BESIDE_CURVES[1:], BESIDE_CURVES),
+        (WITH_CURVES[:1], WITH_CURVES[1:], WITH_CURVES),
         ("FRFs and a block", "FRFs and indentations", "both"),
         strict=True,
     ):
-        own = [entry for entry in entries if entry["what"] in what]
-        row = [called, str(len(own))]
+        of_these = [judgement for judgement in entries if judgement["what"] in what]
+        row = [called, str(len(of_these))]
         for how in ("alone", "together"):
-            row += [_of([entry["right"][how] for entry in own]), _of(told_apart(own, how))]
-        held = [one for entry in own for one in entry["modulus_held"]]
-        rows.append([*row, _of(held), str(sum(entry["contradicted"] for entry in own))])
-    of_each = ["right, FRFs alone", "told apart, FRFs alone", "right, together", "told apart, together"]
-    head = ["kinds", "campaigns", *of_each, "E of the curves held by its interval", "said to contradict"]
+            row += [_of([judgement["right"][how] for judgement in of_these]), _of(distinguished(of_these, how))]
+        held = [is_held for judgement in of_these for is_held in judgement["modulus_held"]]
+        rows.append([*row, _of(held), str(sum(judgement["contradicted"] for judgement in of_these))])
+    heads = ["right, FRFs alone", "told apart, FRFs alone", "right, together", "told apart, together"]
+    head = ["kinds", "campaigns", *heads, "E of the curves held by its interval", "said to contradict"]
     return table(head, rows)
 
 
 def _of_dates(entries: Sequence[Result]) -> str:
-    since = [one for entry in entries for one in entry["since"]]
-    quiet = [entry["false"] for entry in entries if not entry["since"]]
+    since = [is_right for judgement in entries for is_right in judgement["since"]]
+    quiet = [judgement["false"] for judgement in entries if not judgement["since"]]
     return (
         f"Of {len(entries)} pairs of dates the set of mechanisms is right together in "
-        f"{_of([entry['right']['together'] for entry in entries])}, from the last date alone in "
-        f"{_of([entry['right']['alone'] for entry in entries])}; what changed is named with its date, a change "
+        f"{_of([judgement['right']['together'] for judgement in entries])}, from the last date alone in "
+        f"{_of([judgement['right']['alone'] for judgement in entries])}; what changed is named with its date, a change "
         f"of level as one of the mechanisms that would make it, in {_of(since)}; "
         f"where nothing that shows changed, a change is stated in {_of(quiet)}.\n"
     )
@@ -71,19 +75,19 @@ def _of_dates(entries: Sequence[Result]) -> str:
 
 def _of_skins(entries: Sequence[Result]) -> str:
     """An ideal diagnosis that owns the rig's equations names the departing skin too, or not: `ideal`."""
-    odd = [entry for entry in entries if entry["departs"]]
-    named = [set(entry["departs"]) <= set(entry["stated"]) for entry in odd]
-    visible = [one for entry, one in zip(odd, named, strict=True) if entry["identifiable"]]
-    told = [set(entry["departs"]) <= set(entry["ideal"]) for entry in odd]
-    ideal = [one for one, able in zip(named, told, strict=True) if able]
-    false = [bool(set(entry["stated"]) - set(entry["departs"])) for entry in entries]
-    held = [one for entry in entries for one in entry["d33_held"]]
+    odd = [judgement for judgement in entries if judgement["departs"]]
+    named = [set(judgement["departs"]) <= set(judgement["stated"]) for judgement in odd]
+    visible = [is_named for judgement, is_named in zip(odd, named, strict=True) if judgement["identifiable"]]
+    decidable = [set(judgement["departs"]) <= set(judgement["ideal"]) for judgement in odd]
+    ideal = [is_named for is_named, able in zip(named, decidable, strict=True) if able]
+    false = [bool(set(judgement["stated"]) - set(judgement["departs"])) for judgement in entries]
+    held = [is_held for judgement in entries for is_held in judgement["d33_held"]]
     return (
         f"Of {len(entries)} fleets of three to six skins {len(odd)} have one that departs in E, thickness or d33. It "
         f"is named in {_of(visible)} of those in which that shows. An ideal diagnosis, which owns the rig's equations "
-        f"and noise but not the make's mean and spread, names {_of(told)} of all; of these the departing skin is named "
-        f"in {_of(ideal)}. Another skin is said to depart in {_of(false)} of the fleets; the pooled d33 is held by its "
-        f"interval in {_of(held)}.\n"
+        f"and noise but not the make's mean and spread, names {_of(decidable)} of all; of these the departing skin is "
+        f"named in {_of(ideal)}. Another skin is said to depart in {_of(false)} of the fleets; the pooled d33 is held "
+        f"by its interval in {_of(held)}.\n"
     )
 
 

@@ -15,42 +15,44 @@ def _number(value: Any) -> str:
 
 def _named(report: Result) -> str:
     parts = []
-    for entry in report["mechanisms"]:
+    for mechanism in report["mechanisms"]:
         values = ", ".join(
             f"{p['name']} {_number(p['value'])} {p['unit'].strip('-')} [{_number(p['low'])} to {_number(p['high'])}]"
-            for p in entry.get("parameters", ())  # none where a diagnosis failed
+            for p in mechanism.get("parameters", ())  # none where a diagnosis failed
         )
-        parts.append(f"{entry['name']} ({values})" if values else entry["name"])
+        parts.append(f"{mechanism['name']} ({values})" if values else mechanism["name"])
     return "; ".join(parts) or "–"
 
 
 def _rivals(report: Result) -> str:
     return "; ".join(
-        f"{shown(tuple(entry['mechanisms']))} {entry['probability']:.2f}" for entry in report["alternatives"][:3]
+        f"{shown(tuple(alternative['mechanisms']))} {alternative['probability']:.2f}"
+        for alternative in report["alternatives"][:3]
     ) or "–"  # fmt: skip
 
 
 def _moduli(fit: Result | None) -> str:
     """Young's modulus of the base model and of the explanation, where curves tell it."""
     moduli = [fit[part].get("youngs_modulus") for part in ("before", "after")] if fit else []
-    return " → ".join(_number(entry["value"]) for entry in moduli if entry) or "–"
+    return " → ".join(_number(modulus["value"]) for modulus in moduli if modulus) or "–"
 
 
 def recordings(result: Result) -> str:
     """Diagnoses of real recordings."""
     rows = []
-    for entry in result["campaigns"]:
-        report, fit = entry["report"], entry["report"]["fit"]
+    for campaign in result["campaigns"]:
+        report, fit = campaign["report"], campaign["report"]["fit"]
         errors = (fit["before"]["heldout_rmse_percent"], fit["after"]["heldout_rmse_percent"],
                   fit["noise_floor_percent"]) if fit else (None, None, None)  # fmt: skip
         plain = [fit[part]["rmse_percent"] for part in ("before", "after")] if fit else [None, None]
-        rows.append([entry["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report), _rivals(report),
-                     _moduli(fit), " → ".join(map(_number, plain)),
+        rows.append([campaign["name"], f"{report['verdict']} {report['probability']:.2f}", _named(report),
+                     _rivals(report), _moduli(fit), " → ".join(map(_number, plain)),
                      " → ".join(_number(value) for value in errors[:2]) + f" ({_number(errors[2])})"])  # fmt: skip
     stated = table(
-        ["campaign", "what the diagnosis was told"], [[entry["name"], entry["stated"]] for entry in result["campaigns"]]
+        ["campaign", "what the diagnosis was told"],
+        [[campaign["name"], campaign["stated"]] for campaign in result["campaigns"]],
     )
-    where = "\n".join(f"- **{entry['name']}**: {_said(entry['report'])}" for entry in result["campaigns"])
+    where = "\n".join(f"- **{campaign['name']}**: {_sentence(campaign['report'])}" for campaign in result["campaigns"])
     header = [
         "campaign", "verdict", "named", "rivals", "E before → after, MPa",
         "least squares, in sample, before → after, %",
@@ -74,7 +76,7 @@ What each report says, in its own words:
 """
 
 
-def _said(report: Result) -> str:
+def _sentence(report: Result) -> str:
     """A report's statement without the laws, and where it locates the misfit."""
     sentences = report["statement"].split(". ")
     chosen = sentences if report["verdict"] == "unexplained" else sentences[:1]
@@ -83,11 +85,11 @@ def _said(report: Result) -> str:
 
 def _findings(result: Result) -> str:
     """The statements of the sources beside the diagnoses."""
-    reports = {entry["name"]: entry["report"] for entry in result["campaigns"]}
+    reports = {campaign["name"]: campaign["report"] for campaign in result["campaigns"]}
 
     def naming(prefix: str, mechanism: str) -> str:
         chosen = [report for name, report in reports.items() if name.startswith(prefix)]
-        named = [mechanism in {entry["name"] for entry in report["mechanisms"]} for report in chosen]
+        named = [mechanism in {stated["name"] for stated in report["mechanisms"]} for report in chosen]
         beneath = [mechanism in report["fit"]["mechanisms"] for report in chosen]
         further = sum(beneath) - sum(named)
         return f"{sum(named)} of {len(named)}" + (f", and {further} beneath what is unexplained" if further else "")
@@ -95,7 +97,7 @@ def _findings(result: Result) -> str:
     def tied(prefix: str, mechanism: str) -> str:
         chosen = [report for name, report in reports.items() if name.startswith(prefix)]
         listed = [
-            any(mechanism in (entry["mechanism"], entry["confounded_with"]) for entry in report["not_identifiable"])
+            any(mechanism in (pair["mechanism"], pair["confounded_with"]) for pair in report["not_identifiable"])
             for report in chosen
         ]
         return f"{sum(listed)} of {len(listed)}"
@@ -118,13 +120,13 @@ def _findings(result: Result) -> str:
 def paper_array(result: Result) -> str:
     """Diagnoses of the paper's array."""
     rows = [
-        [entry["name"], f"{entry['report']['verdict']} {entry['report']['probability']:.2f}", _named(entry["report"]),
-         _rivals(entry["report"])]
-        for entry in result["campaigns"]
+        [campaign["name"], f"{campaign['report']['verdict']} {campaign['report']['probability']:.2f}",
+         _named(campaign["report"]), _rivals(campaign["report"])]
+        for campaign in result["campaigns"]
     ]  # fmt: skip
-    reports = {entry["name"]: entry["report"] for entry in result["campaigns"]}
+    reports = {campaign["name"]: campaign["report"] for campaign in result["campaigns"]}
     array = reports["array"]
-    undecidable = [entry["axis"] for entry in array["location"]["axes"] if entry["p_value"] is None]
+    undecidable = [axis["axis"] for axis in array["location"]["axes"] if axis["p_value"] is None]
     planned = (array["next_experiment"] or {}).get("statement", "none, since one set holds most of the probability")
     return f"""\
 ## The paper's array
@@ -148,7 +150,7 @@ that experiment in both worlds, diagnosed together with the array's recordings.
 
 def _too_sure(array: Result) -> str:
     """Whether the report on the array leaves the question open, as it should."""
-    pairs = [{entry["mechanism"], entry["confounded_with"]} for entry in array["not_identifiable"]]
+    pairs = [{pair["mechanism"], pair["confounded_with"]} for pair in array["not_identifiable"]]
     listed = "lists" if {"preload_dependent_d33", "ageing"} in pairs else "does not list"
     tied = f"It {listed} the two as confounded."
     if array["verdict"] != "explained":

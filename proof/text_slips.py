@@ -12,14 +12,14 @@ Result = Mapping[str, Any]
 
 
 def slips(result: Result) -> str:
-    """How many of each slip are named, and what is named where there is none."""
+    """How many of each slip are named, and what is named without a slip."""
     judged = result["judged"]
-    of_each: dict[str, list[Result]] = {}
-    for entry in judged:
-        for slip, committed in entry["slips"].items():
-            of_each.setdefault(slip, []).append(committed)
-    rows = [[slip, *_row(committed)] for slip, committed in of_each.items()]
-    single = sum(bool(entry["hidden"]) for entry in judged)
+    by_slip: dict[str, list[Result]] = {}
+    for judgement in judged:
+        for slip, committed in judgement["slips"].items():
+            by_slip.setdefault(slip, []).append(committed)
+    rows = [[slip, *_row(committed)] for slip, committed in by_slip.items()]
+    single = sum(bool(judgement["hidden"]) for judgement in judged)
     return f"""\
 ## Slips of a lab
 
@@ -33,7 +33,7 @@ recordings conjugated must differ from one course of phase without knowledge of 
 with the slip's own code; the screening alone is called.
 
 {table(["slip", "named, of the visible", "named, of the identifiable"], rows)}
-Without a slip, one was named in {percent(share([bool(entry["false"]) for entry in judged]))}.
+Without a slip, one was named in {percent(share([bool(judgement["false"]) for judgement in judged]))}.
 
 {_false(judged)}
 Identifiable slips that were not named:
@@ -43,26 +43,30 @@ Identifiable slips that were not named:
 
 def _row(committed: Sequence[Result]) -> list[str]:
     return [
-        percent(share([one["named"] for one in committed if one["chi2"] > THRESHOLD])),
-        percent(share([one["named"] for one in committed if one["over_rivals"] > THRESHOLD])),
+        percent(share([slip["named"] for slip in committed if slip["chi2"] > THRESHOLD])),
+        percent(share([slip["named"] for slip in committed if slip["over_rivals"] > THRESHOLD])),
     ]
 
 
 def _false(judged: Sequence[Result]) -> str:
-    rows = [[entry["name"], _hidden(entry), ", ".join(entry["false"])] for entry in judged if entry["false"]]
+    rows = [
+        [judgement["name"], _hidden(judgement), ", ".join(judgement["false"])]
+        for judgement in judged
+        if judgement["false"]
+    ]
     return table(["campaign", "hidden", "named without a slip"], rows) if rows else ""
 
 
 def _missed(judged: Sequence[Result]) -> str:
     rows = [
-        [entry["name"], _hidden(entry), slip, f"{one['chi2']:.0f}", f"{one['over_rivals']:.0f}",
-         ", ".join(one["as"]) or "nothing"]
-        for entry in judged for slip, one in entry["slips"].items()
-        if one["over_rivals"] > THRESHOLD and not one["named"]
+        [judgement["name"], _hidden(judgement), slip, f"{of_slip['chi2']:.0f}", f"{of_slip['over_rivals']:.0f}",
+         ", ".join(of_slip["as"]) or "nothing"]
+        for judgement in judged for slip, of_slip in judgement["slips"].items()
+        if of_slip["over_rivals"] > THRESHOLD and not of_slip["named"]
     ]  # fmt: skip
     header = ["campaign", "hidden", "slip", "χ²", "χ² left by other causes", "named"]
     return table(header, rows) if rows else "None.\n"
 
 
-def _hidden(entry: Result) -> str:
-    return " + ".join(entry["hidden"]) or "nothing"
+def _hidden(judgement: Result) -> str:
+    return " + ".join(judgement["hidden"]) or "nothing"

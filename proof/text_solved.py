@@ -13,11 +13,11 @@ from rig.solved.worlds import PLAIN
 
 
 def solved_contact(result: Mapping[str, Any]) -> str:
-    """What is named and what is quoted where finite elements made the campaigns."""
+    """What is named and what is quoted for campaigns made by finite elements."""
     judged = result["judged"]
-    confident = [one for one in judged if one["class"] != HONEST]
-    shows = [one["class"] != HONEST for one in judged if one["visible"]]
-    plain = [one["class"] == RIGHT for one in judged if one["effect"] == PLAIN]
+    confident = [judgement for judgement in judged if judgement["class"] != HONEST]
+    visible = [judgement["class"] != HONEST for judgement in judged if judgement["visible"]]
+    plain = [judgement["class"] == RIGHT for judgement in judged if judgement["effect"] == PLAIN]
     body = [[name, *_counts(some), *_quoted(some)] for name, some in rows(judged).items() if some]
     return f"""\
 ## Campaigns made by solving the contact
@@ -30,18 +30,18 @@ more than the tolerances is a row of its own: no interval can know of it.
 
 {table(["effect", "campaigns", *CLASSES, "quoted d33 inside", "rms error"], body)}
 Plain world named: {percent(share(plain))}. Confident statements that are wrong:
-{percent(share([one["class"] == WRONG for one in confident]))}. Where the effect shows, stated with confidence:
-{percent(share(shows))}.
+{percent(share([stated["class"] == WRONG for stated in confident]))}. Where the effect shows, stated with confidence:
+{percent(share(visible))}.
 """
 
 
 def _counts(some: Sequence[Judgement]) -> list[str]:
-    return [str(len(some)), *(str(sum(one["class"] == grade for one in some)) for grade in CLASSES)]
+    return [str(len(some)), *(str(sum(judgement["class"] == grade for judgement in some)) for grade in CLASSES)]
 
 
 def _quoted(some: Sequence[Judgement]) -> list[str]:
-    quoted = [one for one in some if one["quoted"]]
+    quoted = [judgement for judgement in some if judgement["quoted"]]
     if not quoted:
         return ["none quoted", ""]
-    off = np.array([one["off"] for one in quoted])
-    return [percent(share([one["inside"] for one in quoted])), f"{100 * np.sqrt(np.mean(off**2)):.1f} %"]
+    off = np.array([judgement["off"] for judgement in quoted])
+    return [percent(share([judgement["inside"] for judgement in quoted])), f"{100 * np.sqrt(np.mean(off**2)):.1f} %"]

@@ -10,14 +10,14 @@ from rig.draw import UNKNOWN
 
 Result = Mapping[str, Any]
 
-LOST = 1.0  # nats of evidence times prior by which a hidden set must be better than what was found to be a miss
+LOST = 1.0  # nats of evidence times prior by which a hidden set must exceed the best set found to be a miss
 _VERDICTS = ("explained", "ambiguous", "unexplained", "no_mismatch", "insufficient_data")
 
 
 def coverage(result: Result) -> str:
     """How often the interval of d33 holds the true value."""
     judged = result["judged"]
-    stated = [entry for entry in judged if entry["held"] is not None]
+    stated = [judgement for judgement in judged if judgement["held"] is not None]
     return f"""\
 ## The stated d33, where scatter and strengths go beyond the priors
 
@@ -33,45 +33,51 @@ rig's equations, with d33 free.
 
 
 def that_show(entries: Sequence[Result]) -> list[Result]:
-    """All but those that hide physics outside the catalogue which no recording of theirs can tell from another d33."""
-    return [entry for entry in entries if entry["shows"] or not set(entry["hidden"]) & set(UNKNOWN)]
+    """All campaigns except those that hide physics outside the catalogue which none of their recordings can
+    distinguish from another d33."""
+    return [judgement for judgement in entries if judgement["shows"] or not set(judgement["hidden"]) & set(UNKNOWN)]
 
 
 def by_subset(judged: Sequence[Result]) -> str:
     """The share held: in all, by what is hidden and by verdict, where quotable, by number of sensors."""
-    stated = [entry for entry in judged if entry["held"] is not None]
-    outside = [entry for entry in stated if set(entry["hidden"]) & set(UNKNOWN)]
+    stated = [judgement for judgement in judged if judgement["held"] is not None]
+    outside = [judgement for judgement in stated if set(judgement["hidden"]) & set(UNKNOWN)]
     subsets = {"all": stated, "nothing or effects of the catalogue hidden": [e for e in stated if e not in outside]}
     subsets["physics outside the catalogue hidden"] = outside
-    subsets["the same, where it shows"] = [entry for entry in outside if entry["shows"]]
-    subsets["the same, where it does not"] = [entry for entry in outside if not entry["shows"]]
+    subsets["the same, where it shows"] = [judgement for judgement in outside if judgement["shows"]]
+    subsets["the same, where it does not"] = [judgement for judgement in outside if not judgement["shows"]]
     subsets["all but these"] = that_show(stated)
     for verdict in _VERDICTS:
-        subsets[f"`{verdict}`"] = [entry for entry in stated if entry["verdict"] == verdict]
-    agreeing = [entry for entry in stated if entry["verdict"] == "no_mismatch"]
-    subsets["`no_mismatch`, nothing hidden"] = [entry for entry in agreeing if not entry["hidden"]]
+        subsets[f"`{verdict}`"] = [judgement for judgement in stated if judgement["verdict"] == verdict]
+    agreeing = [judgement for judgement in stated if judgement["verdict"] == "no_mismatch"]
+    subsets["`no_mismatch`, nothing hidden"] = [judgement for judgement in agreeing if not judgement["hidden"]]
     subsets["`no_mismatch`, effects of the catalogue hidden"] = [
-        entry for entry in agreeing if entry["hidden"] and entry not in outside
+        judgement for judgement in agreeing if judgement["hidden"] and judgement not in outside
     ]
     subsets["`no_mismatch`, physics outside the catalogue hidden"] = [e for e in agreeing if e in outside]
-    subsets["quotable"] = [entry for entry in stated if entry["quotable"]]
-    subsets["one sensor"] = [entry for entry in stated if entry["sensors"] == 1]
-    subsets["two sensors"] = two = [entry for entry in stated if entry["sensors"] == 2]
+    subsets["quotable"] = [judgement for judgement in stated if judgement["quotable"]]
+    subsets["one sensor"] = [judgement for judgement in stated if judgement["sensors"] == 1]
+    subsets["two sensors"] = two = [judgement for judgement in stated if judgement["sensors"] == 2]
     subsets["two sensors, nothing or effects of the catalogue hidden"] = [e for e in two if e not in outside]
     subsets["two sensors, all but what does not show outside the catalogue"] = that_show(two)
-    subsets["more sensors"] = [entry for entry in stated if entry["sensors"] > 2]
-    rows = [[name, percent(share([entry["held"] for entry in own]))] for name, own in subsets.items() if own]
+    subsets["more sensors"] = [judgement for judgement in stated if judgement["sensors"] > 2]
+    rows = [
+        [name, percent(share([judgement["held"] for judgement in subset]))]
+        for name, subset in subsets.items()
+        if subset
+    ]
     return table(["campaigns", "d33 held by its 95 % interval"], rows)
 
 
 def search_misses(result: Result) -> str:
     """How often the search overlooked the hidden set."""
-    judged = [entry for entry in result["judged"] if entry["lost"] is not None]
-    missed = [entry for entry in judged if is_miss(entry)]
+    judged = [judgement for judgement in result["judged"] if judgement["lost"] is not None]
+    missed = [judgement for judgement in judged if is_miss(judgement)]
     rows = [
-        [entry["name"], *(" + ".join(entry[key]) or "nothing" for key in ("truth", "found")), f"{entry['lost']:.1f}",
-         "not fitted" if entry["lost_own"] is None else f"{entry['lost_own']:.1f}"]
-        for entry in missed
+        [judgement["name"], *(" + ".join(judgement[key]) or "nothing" for key in ("truth", "found")),
+         f"{judgement['lost']:.1f}",
+         "not fitted" if judgement["lost_own"] is None else f"{judgement['lost_own']:.1f}"]
+        for judgement in missed
     ]  # fmt: skip
     header = ["campaign", "hidden", "found", "nats lost", "nats that the hidden set's own fit was worse"]
     return f"""\
@@ -81,18 +87,18 @@ def search_misses(result: Result) -> str:
 {result["seed"]}). The set of what is hidden is fitted again, from a grid over all its parameters, from each member
 alone and from the rig's own values. The search misses it where its evidence times prior is then more than {LOST:g} nat
 above that of the best set that was found. Of those that support what is hidden, that is so in
-{percent(share([is_miss(entry) for entry in judged]))}.
+{percent(share([is_miss(judgement) for judgement in judged]))}.
 
 {table(header, rows) if rows else ""}"""
 
 
-def is_miss(entry: Result) -> bool:
+def is_miss(judgement: Result) -> bool:
     """Whether the hidden set would have led."""
-    return entry["lost"] is not None and bool(entry["lost"] > LOST)
+    return judgement["lost"] is not None and bool(judgement["lost"] > LOST)
 
 
 def sensitivity(result: Result) -> str:
-    """What other priors make of the same campaigns."""
+    """The results for the same campaigns under other priors."""
     return f"""\
 ## Other priors
 
@@ -108,8 +114,8 @@ def by_priors(judged: Mapping[str, Sequence[Result]]) -> str:
     """Share right, false alarms and coverage of d33 under each of the priors."""
     rows = []
     for name, entries in judged.items():
-        visible = [entry["right"] for entry in entries if entry["visible"] and entry["hidden"]]
-        alarms = [entry["alarm"] for entry in entries if not entry["hidden"]]
-        kept = [entry["held"] for entry in entries if entry["held"] is not None]
-        rows.append([name, *(percent(share(values)) for values in (visible, alarms, kept))])
+        visible = [judgement["right"] for judgement in entries if judgement["visible"] and judgement["hidden"]]
+        alarms = [judgement["alarm"] for judgement in entries if not judgement["hidden"]]
+        coverage_of_d33 = [judgement["held"] for judgement in entries if judgement["held"] is not None]
+        rows.append([name, *(percent(share(values)) for values in (visible, alarms, coverage_of_d33))])
     return table(["priors", "right", "false alarms", "d33 held by its 95 % interval"], rows)

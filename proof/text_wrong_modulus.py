@@ -17,12 +17,12 @@ _CLOSE = math.log(1.1)
 def wrong_modulus(result: Result) -> str:
     """Whether the error is named or grouped, and how well its factor is found."""
     judged = result["judged"]
-    visible = [entry for entry in judged if entry["visible"]]
+    visible = [judgement for judgement in judged if judgement["visible"]]
     parts = {
-        "FRFs alone": [entry for entry in visible if entry["what"] == "frf"],
-        "beside a block": [entry for entry in visible if entry["what"] == "compression"],
-        "beside indentations": [entry for entry in visible if entry["what"] == "indentation"],
-        "contacts beyond the tables as declared": [entry for entry in visible if entry["beyond"]],
+        "FRFs alone": [judgement for judgement in visible if judgement["what"] == "frf"],
+        "beside a block": [judgement for judgement in visible if judgement["what"] == "compression"],
+        "beside indentations": [judgement for judgement in visible if judgement["what"] == "indentation"],
+        "contacts beyond the tables as declared": [judgement for judgement in visible if judgement["beyond"]],
         "all": visible,
     }
     of_factor = ["interval holds the factor, of the named", "within 10 %, of the determined", "of these named"]
@@ -46,53 +46,54 @@ Not named or grouped, of the visible:
 
 
 def _row(entries: Sequence[Result]) -> list[str]:
-    determined = [entry for entry in entries if entry["determined"]]
+    determined = [judgement for judgement in entries if judgement["determined"]]
     return [
-        percent(share([_is_told(entry) for entry in entries])),
-        percent(share([entry["held"] for entry in entries if entry["named"]])),
-        percent(share([_is_close(entry) for entry in determined])),
-        percent(share([_is_close(entry) for entry in determined if entry["named"]])),
+        percent(share([_is_named(judgement) for judgement in entries])),
+        percent(share([judgement["held"] for judgement in entries if judgement["named"]])),
+        percent(share([_is_close(judgement) for judgement in determined])),
+        percent(share([_is_close(judgement) for judgement in determined if judgement["named"]])),
     ]
 
 
-def _is_told(entry: Result) -> bool:
-    return bool(entry["named"] or entry["grouped"])
+def _is_named(judgement: Result) -> bool:
+    return bool(judgement["named"] or judgement["grouped"])
 
 
-def _is_close(entry: Result) -> bool:
-    return bool(entry["named"] and entry["off"] < _CLOSE)
+def _is_close(judgement: Result) -> bool:
+    return bool(judgement["named"] and judgement["off"] < _CLOSE)
 
 
 def _of_contacts(entries: Sequence[Result]) -> str:
-    beyond = [entry for entry in entries if entry["beyond"]]
-    total = sum(entry["beyond"] for entry in beyond)
-    left_out = sum(entry["left_out"] for entry in beyond)
+    beyond = [judgement for judgement in entries if judgement["beyond"]]
+    total = sum(judgement["beyond"] for judgement in beyond)
+    excluded = sum(judgement["left_out"] for judgement in beyond)
     return (
-        f"By the declared E {total} contacts of {len(beyond)} campaigns lie beyond the tables; {total - left_out} of "
+        f"By the declared E {total} contacts of {len(beyond)} campaigns lie beyond the tables; {total - excluded} of "
         f"them were kept.\n"
     )
 
 
 def _of_d33(entries: Sequence[Result]) -> str:
     groups = {
-        "the stated d33": [entry["d33_off"] for entry in entries if entry["d33_off"] is not None],
-        "a quotable one": [entry["d33_off"] for entry in entries if entry["d33_quotable"]],
+        "the stated d33": [judgement["d33_off"] for judgement in entries if judgement["d33_off"] is not None],
+        "a quotable one": [judgement["d33_off"] for judgement in entries if judgement["d33_quotable"]],
     }
-    said = [
+    parts = [
         f"{called} is off by {100 * np.expm1(np.median(values)):.1f} % in the median and by "
         f"{100 * np.expm1(np.quantile(values, 0.9)):.1f} % in one of ten ({len(values)} campaigns)"
         for called, values in groups.items()
         if values
     ]
-    text = "; ".join(said)
+    text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}.\n" if text else ""
 
 
 def _missed(entries: Sequence[Result]) -> str:
     rows = [
-        [entry["name"], entry["what"], f"{entry['factor']:.3g}", ", ".join(entry["companions"]) or "–",
-         f"{entry['sd_ln_modulus']:.2g}", f"{entry['answer'][0]}: {', '.join(entry['answer'][1]) or 'nothing'}"]
-        for entry in entries if not _is_told(entry)
+        [judgement["name"], judgement["what"], f"{judgement['factor']:.3g}", ", ".join(judgement["companions"]) or "–",
+         f"{judgement['sd_ln_modulus']:.2g}",
+         f"{judgement['answer'][0]}: {', '.join(judgement['answer'][1]) or 'nothing'}"]
+        for judgement in entries if not _is_named(judgement)
     ]  # fmt: skip
     if not rows:
         return "None.\n"

@@ -1,4 +1,4 @@
-"""Where fits of the diagnosis begin if they know what the virtual rig hides: its parameters in the catalogue's terms.
+"""Starting points of fits that know what the virtual rig hides: its parameters in the catalogue's terms.
 
 The rig's laws are not the catalogue's, so these are starts and not answers.
 """
@@ -65,17 +65,19 @@ def true_values(effect: str, values: Values) -> dict[str, float]:
     """The catalogue's parameters of an effect of the rig, by name."""
     if effect in _TRANSLATED:
         return _TRANSLATED[effect](values)
-    return {own: float(values[theirs]) for theirs, own in _RENAMED.get(effect, {}).items()}
+    return {parameter: float(values[theirs]) for theirs, parameter in _RENAMED.get(effect, {}).items()}
 
 
-def with_true_values(begun: Explanation, effects: Mapping[str, Values]) -> Explanation:
+def with_true_values(initial: Explanation, effects: Mapping[str, Values]) -> Explanation:
     """An explanation moved to the true values; parameters without a counterpart stay where they are."""
-    known = {name: value for effect, values in effects.items() for name, value in true_values(effect, values).items()}
-    moved = begun.point.fit.copy()
-    for place, parameter in enumerate(begun.model.parameters[: begun.best.hypothesis.mechanism_parameter_count]):
-        if parameter.name in known:
-            moved[place] = _coordinate(parameter, known[parameter.name])
-    return replace(begun, best=replace(begun.best, point=replace(begun.point, fit=moved)))
+    true_parameters = {
+        name: value for effect, values in effects.items() for name, value in true_values(effect, values).items()
+    }
+    moved = initial.point.fit.copy()
+    for index, parameter in enumerate(initial.model.parameters[: initial.best.hypothesis.mechanism_parameter_count]):
+        if parameter.name in true_parameters:
+            moved[index] = _coordinate(parameter, true_parameters[parameter.name])
+    return replace(initial, best=replace(initial.best, point=replace(initial.point, fit=moved)))
 
 
 def _coordinate(parameter: Parameter, value: float) -> float:

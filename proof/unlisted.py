@@ -35,8 +35,8 @@ def judge_quiet_unlisted(work: Work, progress: Callable[[int, int], None]) -> di
 
 def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], None], *, quiet: bool) -> dict[str, Any]:
     folder = work.folder / f"unlisted-{seed}-{count}-{sources('rig')}"
-    known = folder / "truth.json"
-    truths = json.loads(known.read_text()) if known.exists() else write(seed, count, folder, quiet)
+    truth_file = folder / "truth.json"
+    truths = json.loads(truth_file.read_text()) if truth_file.exists() else write(seed, count, folder, quiet)
     cases = [FileCase(folder / f"{name}.json") for name in truths]
     answers = reports(work, cases, progress)
     return {
@@ -47,13 +47,17 @@ def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], Non
 
 def judged(name: str, truth: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
     """One campaign: its truth, and what its report says."""
-    law, told = truth.get("law"), report.get("unnamed")
+    law, stated_law = truth.get("law"), report.get("unnamed")
     placed = shaped = False
-    if law is not None and told is not None:
-        placed = told["acts_on"] in {law["acts_on"], *truth["acts_on_also"]}
-        placed = placed and told["axis"] in {law["axis"], *truth["axis_also"]}
-        shaped = placed and told["form"] in {law["form"], *truth["form_also"]}
-    nothing = sum(one["probability"] for one in report["alternatives"] if one["mechanisms"] == ["nothing_missing"])
+    if law is not None and stated_law is not None:
+        placed = stated_law["acts_on"] in {law["acts_on"], *truth["acts_on_also"]}
+        placed = placed and stated_law["axis"] in {law["axis"], *truth["axis_also"]}
+        shaped = placed and stated_law["form"] in {law["form"], *truth["form_also"]}
+    nothing = sum(
+        alternative["probability"]
+        for alternative in report["alternatives"]
+        if alternative["mechanisms"] == ["nothing_missing"]
+    )
     nothing = report["probability"] if report["verdict"] in ("no_mismatch", "insufficient_data") else nothing
     if report["verdict"] == FAILED:  # which counts as wrong
         nothing = float(law is not None)
@@ -77,11 +81,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = seeds.parser("unlisted", __doc__)
     parser.add_argument("--quiet", action="store_true", help="hide nothing")
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         work = Work(Path(folder))
-        result = _judge(work, given.seed, given.count, lambda *_: None, quiet=given.quiet)
-    print((alarms if given.quiet else hidden)(result))
+        result = _judge(work, options.seed, options.count, lambda *_: None, quiet=options.quiet)
+    print((alarms if options.quiet else hidden)(result))
 
 
 if __name__ == "__main__":

@@ -21,13 +21,13 @@ _ERROR = "modulus_error"
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8
 _DETERMINED = 0.05  # standard deviation of ln E
-_LEFT_OUT, _KEPT = "out_of_domain", "contacts_kept"
+_OUT_OF_DOMAIN, _CONTACTS_KEPT = "out_of_domain", "contacts_kept"
 
 Report = Mapping[str, Any]
 
 
 def judge_wrong_modulus(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Of each campaign what was declared, what is answered, and how far it is off."""
+    """For each campaign the declared modulus, the answer, and its error."""
     numbers = range(min(work.count or COUNT, COUNT))
     version = f"{diagnosing()} {sources('rig')}"
     return {"seed": SEED, "judged": of_each(work, list(numbers), partial(_judged, work, version), progress)}
@@ -35,10 +35,10 @@ def judge_wrong_modulus(work: Work, progress: Callable[[int, int], None]) -> dic
 
 def _judged(work: Work, version: str, number: int) -> dict[str, Any]:
     key = digest_of(["wrong modulus", SEED, number, version])
-    return stored(work.folder / "wrong_modulus", key, partial(of_one, SEED, number))
+    return stored(work.folder / "wrong_modulus", key, partial(judged_campaign, SEED, number))
 
 
-def of_one(seed: int, number: int) -> dict[str, Any]:
+def judged_campaign(seed: int, number: int) -> dict[str, Any]:
     """One campaign, diagnosed and judged."""
     document, truth = drawn_wrong_modulus(seed, number)
     return {"name": truth["name"], **compared(diagnosed(document), truth)}
@@ -46,14 +46,18 @@ def of_one(seed: int, number: int) -> dict[str, Any]:
 
 def compared(report: Report, truth: Report) -> dict[str, Any]:
     """A report beside the truth of a campaign whose declared modulus is wrong."""
-    (gain,) = (entry["chi2_gain_joint"] for entry in truth["hidden"] if entry["effect"] == _ERROR)
+    (gain,) = (
+        hidden_effect["chi2_gain_joint"] for hidden_effect in truth["hidden"] if hidden_effect["effect"] == _ERROR
+    )
     sd = truth["documents"][0]["sd_ln_modulus_frf"]
-    found = _found(report)
+    found = _reported_error(report)
     d33, beyond = report["d33"], _beyond(truth["as_declared"])
     return {
         "what": truth["what"],
         "factor": truth["factor"],
-        "companions": [entry["effect"] for entry in truth["hidden"] if entry["effect"] != _ERROR],
+        "companions": [
+            hidden_effect["effect"] for hidden_effect in truth["hidden"] if hidden_effect["effect"] != _ERROR
+        ],
         "visible": gain is None or gain > _VISIBLE,  # None: the rig cannot calculate contacts as declared
         "determined": sd < _DETERMINED or truth["what"] != FRF,
         "sd_ln_modulus": truth["skins"][0]["sd_ln_modulus_joint"],
@@ -64,24 +68,29 @@ def compared(report: Report, truth: Report) -> dict[str, Any]:
         "held": found is not None and found["low"] <= truth["factor"] <= found["high"],
         "off": None if found is None else abs(math.log(found["value"] / truth["factor"])),
         "beyond": beyond,
-        "left_out": _left_out(report, beyond),
+        "left_out": _contacts_excluded(report, beyond),
         "recordings": len(truth["as_declared"]["a_over_h"]),
         "d33_off": None if d33 is None else abs(math.log(d33["value"] / _d33(truth))),
         "d33_quotable": d33 is not None and d33["quotable"],
     }
 
 
-def _left_out(report: Report, beyond: int) -> int:
-    """How many of the contacts `beyond` the tables as declared were left out: all, where the report tells of none kept;
-    else those that it names."""
+def _contacts_excluded(report: Report, beyond: int) -> int:
+    """How many of the contacts `beyond` the tables as declared were excluded: all, if the report does not say that
+    some were kept; else those that it names."""
     findings = report["findings"]
-    named = sum(entry["code"] == _LEFT_OUT and "left out" in entry["statement"] for entry in findings)
-    return min(beyond, named) if any(entry["code"] == _KEPT for entry in findings) else beyond
+    named = sum(finding["code"] == _OUT_OF_DOMAIN and "left out" in finding["statement"] for finding in findings)
+    return min(beyond, named) if any(finding["code"] == _CONTACTS_KEPT for finding in findings) else beyond
 
 
-def _found(report: Report) -> dict[str, Any] | None:
+def _reported_error(report: Report) -> dict[str, Any] | None:
     """The factor as a report states it."""
-    parameters = [entry for one in report["mechanisms"] if one["name"] == _ERROR for entry in one["parameters"]]
+    parameters = [
+        parameter
+        for mechanism in report["mechanisms"]
+        if mechanism["name"] == _ERROR
+        for parameter in mechanism["parameters"]
+    ]
     return dict(parameters[0]) if parameters else None
 
 
@@ -91,8 +100,8 @@ def _beyond(contacts: Mapping[str, list[float]]) -> int:
 
     domain = load_table().domain
     largest = [domain[name][1] for name in ("a_over_h", "load_parameter")]
-    each = zip(contacts["a_over_h"], contacts["load_parameter"], strict=True)
-    return sum(radius > largest[0] or load > largest[1] for radius, load in each)
+    contact_values = zip(contacts["a_over_h"], contacts["load_parameter"], strict=True)
+    return sum(radius > largest[0] or load > largest[1] for radius, load in contact_values)
 
 
 def _d33(truth: Report) -> float:

@@ -1,4 +1,5 @@
-"""Checks of an experiment's description: each returns the value or raises RigError with field, value and allowed."""
+"""Checks of an experiment's description: each returns the value or raises RigError with field, value and allowed
+values."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,18 +15,18 @@ _UNITS = {
 
 
 def in_unit(field: str) -> str:
-    """The unit that a field's name ends with, after a space; nothing where it has none."""
+    """The unit at the end of a field's name, after a space; empty if it has none."""
     name = field.split("[")[0].rsplit(".", 1)[-1]
     return next((f" {unit}" for ending, unit in _UNITS.items() if f"_{name}".endswith(ending)), "")
 
 
-def mapping(field: str, value: Any, known: Sequence[str]) -> Mapping[str, Any]:
+def mapping(field: str, value: Any, allowed: Sequence[str]) -> Mapping[str, Any]:
     """A mapping whose names are all known."""
     if not isinstance(value, Mapping):
         raise RigError(field, value, "must be a mapping of names to values")
     for name in value:
-        if name not in known:
-            raise RigError(f"{field}.{name}", value[name], f"unknown; known: {', '.join(known)}")
+        if name not in allowed:
+            raise RigError(f"{field}.{name}", value[name], f"unknown; known: {', '.join(allowed)}")
     return value
 
 
@@ -38,7 +39,7 @@ def number(field: str, value: Any, low: float, high: float) -> float:
     return float(value)
 
 
-def whole(field: str, value: Any, low: int, high: int) -> int:
+def integer(field: str, value: Any, low: int, high: int) -> int:
     """A whole number from low to high."""
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise RigError(field, value, f"must be a whole number, {low} to {high}")
@@ -50,7 +51,7 @@ def numbers(field: str, value: Any, low: float, high: float) -> tuple[float, ...
     entries = value if isinstance(value, list | tuple) else [value]
     if not entries:
         raise RigError(field, value, "must hold at least one number")
-    return tuple(number(f"{field}[{index}]", entry, low, high) for index, entry in enumerate(entries))
+    return tuple(number(f"{field}[{index}]", element, low, high) for index, element in enumerate(entries))
 
 
 def pair(field: str, value: Any, low: float, high: float) -> tuple[float, float]:
@@ -67,7 +68,7 @@ def text(field: str, value: Any) -> str:
     return value
 
 
-def one_of(field: str, value: Any, allowed: Sequence[str]) -> str:
+def choice(field: str, value: Any, allowed: Sequence[str]) -> str:
     """One of the texts."""
     if value not in allowed:
         raise RigError(field, value, f"must be one of {', '.join(allowed)}")

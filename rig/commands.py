@@ -58,12 +58,12 @@ def draw(
     from rig.drawn_campaign import HIDES, JOINT, documents_and_truth
 
     possible = TAILS if kind == FRF else (USUAL,)
-    given = (
+    arguments = (
         ("--kind", kind, tuple(HIDES)),
         ("--what", what, (None, *HIDES.get(kind, ()))),
         ("--tails", tails, possible),
     )
-    for option, value, allowed in given:
+    for option, value, allowed in arguments:
         if value not in allowed:
             names = ", ".join(name for name in allowed if name)
             raise typer.BadParameter(f"{value!r}: must be one of {names}", param_hint=option)

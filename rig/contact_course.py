@@ -1,9 +1,9 @@
-"""The course of a contact in time: stage, sphere and viscoelastic body, step by step.
+"""The evolution of a contact in time: stage, sphere and viscoelastic body, step by step.
 
 The stage's far end is at X(t), 0 where the surfaces touch, and gives by its compliance C:  X = δ + C F. Each ring x of
 the contact (`sphere`) remembers its own history from the moment it joined,
     f(x, t) = ∫ E(t − s) dθ(x, s),    F = ∫₀^a f(x, t) dk(x),
-so one rule covers loading, hold and way back. With G = f(a)²/(E p²), E unrelaxed as the edge is fast:
+so one rule covers loading, hold and unloading. With G = f(a)²/(E p²), E unrelaxed as the edge is fast:
 - the edge advances where a fresh ring can carry the work of adhesion, δ > δ₀(a) − p √(w/E);
 - it recedes where the tension of the outermost ring exceeds what the work of separation holds, f(a) < −p √(w_s E);
 - between the two it rests, and the contact is a flat punch.
@@ -26,16 +26,16 @@ _STILL = 0.5  # nodes; an edge that has receded by less may advance again
 
 @dataclass(frozen=True)
 class Body:
-    """What is pressed.
+    """The pressed body.
 
     Attributes
     ----------
     law : SphereLaw
-        Of the sphere on the body with E = 1.
+        Law of the sphere on the body with E = 1.
     modulus : float
         E before relaxation [MPa].
     relaxation : Relaxation
-        Of E.
+        Relaxation of E.
     approach, separation : float
         Work of adhesion w and of separation w_s [N/mm].
     """
@@ -47,18 +47,18 @@ class Body:
     separation: float = 0.0
 
     def elastic(self, depth: float) -> float:
-        """Force [N] at a depth on the way in, before any relaxation."""
+        """Force [N] at a depth during loading, before any relaxation."""
         depths, forces = self.law.on_branch(self.approach / self.modulus)
         start = int(np.argmin(depths))
         return self.modulus * float(np.interp(depth, depths[start:], forces[start:]))
 
     def last_touch(self, compliance: float) -> float:
-        """The travel X [mm] at which the elastic contact breaks on the way back."""
+        """The travel X [mm] at which the elastic contact breaks during unloading."""
         depths, forces = self.law.on_branch(self.separation / self.modulus)
         return float(np.min(depths + compliance * self.modulus * forces))
 
 
-def course(body: Body, time: Floats, travel: Floats, compliance: float) -> tuple[Floats, Floats]:
+def contact_history(body: Body, time: Floats, travel: Floats, compliance: float) -> tuple[Floats, Floats]:
     """Depth and force of a contact while the stage moves.
 
     Parameters
@@ -90,7 +90,7 @@ def course(body: Body, time: Floats, travel: Floats, compliance: float) -> tuple
 
 
 class _Contact:
-    """A contact in the making; forces over E, compliance times E."""
+    """The state of a contact; forces over E, compliance times E."""
 
     def __init__(self, body: Body, compliance: float) -> None:
         law, pairs = body.law, body.relaxation
@@ -109,8 +109,8 @@ class _Contact:
         """Move the stage to `travel` within `seconds`."""
         elapsed = self.rate * seconds
         self.parts *= np.exp(-elapsed)[:, None]
-        kept = np.divide(-np.expm1(-elapsed), elapsed, out=np.ones_like(elapsed), where=elapsed > 0)
-        self.added = self.fraction * kept  # to the parts of every ring, for each unit of depth
+        retained = np.divide(-np.expm1(-elapsed), elapsed, out=np.ones_like(elapsed), where=elapsed > 0)
+        self.added = self.fraction * retained  # to the parts of every ring, for each unit of depth
         self.gain = float(self.added.sum())
         self.stress = self.parts.sum(axis=0)
         rings = np.diff(self.law.punch) * (self.stress[1:] + self.stress[:-1]) / 2
@@ -124,12 +124,12 @@ class _Contact:
             self._move(travel, depth)
 
     def _at(self, column: Floats) -> float:
-        """A column at the edge."""
+        """The value of a column at the contact edge."""
         node = min(int(self.edge), len(column) - 2)
         return float(column[node] + (self.edge - node) * (column[node + 1] - column[node]))
 
     def _resting_depth(self, travel: float, carried: Floats, punch: Floats, stiffer: Floats) -> Floats:
-        """The depth in balance with the stage while the edge rests, for edges (edges,)."""
+        """The depth in equilibrium with the stage while the edge rests, for edges (edges,)."""
         spring = self.compliance * stiffer
         still = travel - spring * (carried - punch * self.gain * self.depth)
         return np.asarray(still / (1 + spring * punch * self.gain))
@@ -139,7 +139,7 @@ class _Contact:
         return float(self._resting_depth(travel, *columns))
 
     def _move(self, travel: float, depth: float) -> None:
-        """Let every ring in contact, and the first beyond, follow the depth."""
+        """Let every ring in contact, and the first beyond it, follow the depth."""
         beyond = int(self.edge) + 2
         self.parts[:, :beyond] += self.added[:, None] * (depth - self.depth)
         self.force = self._at(self.law.stiffer) * (
@@ -148,7 +148,7 @@ class _Contact:
         self.depth = travel - self.compliance * self.force
 
     def _grow(self, travel: float) -> None:
-        """Advance the edge to the next radius at which the fresh ring's depth and the stage are in balance."""
+        """Advance the edge to the next radius at which the depth of the new ring and the stage are in equilibrium."""
         first, before, law = int(self.edge) + 1, self.depth, self.law
         carried, punch, missing = (self._at(column) for column in (self.carried, law.punch, self.missing))
 
@@ -179,7 +179,7 @@ class _Contact:
         self.depth, self.made, self.widest = depth, True, max(self.edge, self.widest)
 
     def _recede(self, travel: float) -> None:
-        """Draw the edge back to the widest radius that holds; where none holds, the contact breaks."""
+        """Retract the edge to the widest radius that holds; if none holds, the contact breaks."""
         inside = slice(0, int(self.edge) + 1)
         columns = (column[inside] for column in (self.carried, self.law.punch, self.law.stiffer))
         depth = self._resting_depth(travel, *columns)

@@ -21,7 +21,7 @@ from rig.solved.layer import Material, PressedLayer, Sublayer
 DATA = Path(__file__).with_name("contact_strain.npz")
 RADII = np.concatenate([[0.04, 0.08, 0.12, 0.17, 0.23, 0.3], np.arange(0.4, 2.65, 0.14)])
 LOADS = np.array([0.01, 0.08, 0.15, 0.22, 0.28, 0.34, 0.40, 0.4642])  # x
-HIGHEST_WAVENUMBER = 12.0  # what finite strain adds is smooth on the base
+HIGHEST_WAVENUMBER = 12.0  # the addition by finite strain is smooth on the base
 _FINENESS = 1.4
 _WIDER = 1.1  # the contact may be wider than the linear one by
 _DEPTHS = np.geomspace(0.25, 1.0, 7)  # the course of depths, over that of the linear contact
@@ -30,17 +30,17 @@ _SAME_FORCE = 1e-5  # relative
 
 def spectrum_at(a: float, x: float, k: Floats, fineness: float = _FINENESS) -> Floats:
     """Σ R_i/F J0(k r_i) under the force at which the linear contact has radius a, (k,)."""
-    contact, one = sphere_contact(Layer()), np.array([a])
-    scaled = float(contact.force(one, 1.0, 1.0)[0])  # F R/(E h³): both F and δ are as 1/R
+    contact, a_over_h = sphere_contact(Layer()), np.array([a])
+    scaled = float(contact.force(a_over_h, 1.0, 1.0)[0])  # F R/(E h³): both F and δ are as 1/R
     radius = np.cbrt(scaled) / x
-    force, depth = scaled / radius, float(contact.depth(one, radius, 1.0)[0])
+    force, depth = scaled / radius, float(contact.depth(a_over_h, radius, 1.0)[0])
     pressed = PressedLayer((Sublayer(1.0, Material()),), radius, _WIDER * a, fineness)
-    found = [(share * depth, pressed.press(share * depth)) for share in _DEPTHS]
-    while abs(found[-1][1] / force - 1) > _SAME_FORCE:
-        (before, low), (depth, high) = found[-2:]
+    pressed_states = [(share * depth, pressed.press(share * depth)) for share in _DEPTHS]
+    while abs(pressed_states[-1][1] / force - 1) > _SAME_FORCE:
+        (before, low), (depth, high) = pressed_states[-2:]
         depth += (force - high) * (depth - before) / (high - low)
-        found.append((depth, pressed.press(depth)))
-    return np.asarray(pressed.reaction @ j0(np.multiply.outer(pressed.r[pressed.base], k)) / found[-1][1])
+        pressed_states.append((depth, pressed.press(depth)))
+    return np.asarray(pressed.reaction @ j0(np.multiply.outer(pressed.r[pressed.base], k)) / pressed_states[-1][1])
 
 
 def coefficients(a: float) -> tuple[Floats, float]:
@@ -58,8 +58,8 @@ def main() -> None:
         solved = pool.map(coefficients, RADII, chunksize=1)
     for a, (_, residual) in zip(RADII, solved, strict=True):
         print(f"a/h {a:.2f}: largest residual of the fit {residual:.1e}")
-    kept = np.array([fitted for fitted, _ in solved]).astype(np.float32)
-    np.savez_compressed(DATA, a_over_h=RADII, coefficients=kept, rim=RIM)
+    fitted_spectra = np.array([fitted for fitted, _ in solved]).astype(np.float32)
+    np.savez_compressed(DATA, a_over_h=RADII, coefficients=fitted_spectra, rim=RIM)
 
 
 if __name__ == "__main__":

@@ -22,14 +22,14 @@ class SensorWeights:
 
     @classmethod
     def of(
-        cls, centres: Floats, own: NDArray[np.intp], position: Floats, gains: Floats, fraction: float
+        cls, centres: Floats, sensor: NDArray[np.intp], position: Floats, gains: Floats, fraction: float
     ) -> "SensorWeights":
         """The recording's own sensor and, with crosstalk, those within 1.2 pitch of it.
 
         Parameters
         ----------
         centres : (sensors, 2), mm
-        own : (rows,), the sensor of each recording
+        sensor : (rows,), index of the sensor of each recording
         position : (rows, 2), mm, of the sphere
         gains : (sensors,), true d33 of each sensor over that of the skin
         fraction : share of a neighbour's charge that is added
@@ -38,11 +38,11 @@ class SensorWeights:
         pitch = apart[apart > 0].min(initial=np.inf)
         weights = np.where((apart > 0) & (apart < _NEIGHBOUR * pitch), fraction, 0.0) * gains
         weights = weights / gains[:, None] + np.eye(len(centres))
-        used = np.flatnonzero((weights[own] != 0).any(axis=0)) if fraction else None
+        used = np.flatnonzero((weights[sensor] != 0).any(axis=0)) if fraction else None
         if used is None:
-            return cls(np.hypot(*(position - centres[own]).T)[:, None], np.ones((len(own), 1)))
+            return cls(np.hypot(*(position - centres[sensor]).T)[:, None], np.ones((len(sensor), 1)))
         distance = np.hypot(*(position[:, None] - centres[used]).transpose(2, 0, 1))
-        return cls(distance, weights[np.ix_(own, used)])
+        return cls(distance, weights[np.ix_(sensor, used)])
 
     def sigma(self, spectrum: Floats, contact: NDArray[np.intp], rt: float, thickness: float) -> Floats:
         """σ of each contributing sensor (rows, sensors); 0 where its weight is 0.

@@ -56,9 +56,9 @@ def least_chi2(
         Step for the derivatives by the zeros, in units of displacement.
     """
     fit = _Fit(law, curves, priors, zero_step)
-    point = np.zeros(1 + len(curves) * fit.each)
+    point = np.zeros(1 + len(curves) * fit.per_curve)
     point[0] = priors.log_modulus
-    point[1 :: fit.each] = zero
+    point[1 :: fit.per_curve] = zero
     chi2, damping = fit.chi2(point), _DAMPING
     if not np.isfinite(chi2):
         return np.inf, fit.predictions(point)
@@ -84,11 +84,11 @@ def least_chi2(
 class _Fit:
     def __init__(self, law: Law, curves: Sequence[Curve], priors: Priors, zero_step: float) -> None:
         self.law, self.curves, self.priors, self.zero_step = law, curves, priors, zero_step
-        self.each = 2 + len(curves[0].columns)  # parameters of a curve: zero, gain, amounts of its columns
+        self.per_curve = 2 + len(curves[0].columns)  # parameters of a curve: zero, gain, amounts of its columns
 
     def _of(self, point: Floats, number: int) -> tuple[float, float, Floats]:
-        own = point[1 + number * self.each : 1 + (number + 1) * self.each]
-        return float(own[0]), 1 + self.priors.gain * float(own[1]), own[2:]
+        of_curve = point[1 + number * self.per_curve : 1 + (number + 1) * self.per_curve]
+        return float(of_curve[0]), 1 + self.priors.gain * float(of_curve[1]), of_curve[2:]
 
     def predictions(self, point: Floats) -> list[Floats]:
         """The prediction of each curve."""
@@ -106,7 +106,7 @@ class _Fit:
             pairs = zip(self.predictions(point), self.curves, strict=True)
             total = sum(float(np.sum(((curve.force - force) / curve.deviation) ** 2)) for force, curve in pairs)
         off = (point[0] - self.priors.log_modulus) / self.priors.modulus_deviation
-        return total + float(off**2 + np.sum(point[2 :: self.each] ** 2))
+        return total + float(off**2 + np.sum(point[2 :: self.per_curve] ** 2))
 
     def normal_equations(self, point: Floats) -> tuple[Floats, Floats]:
         """Half the Hessian of χ², and minus half its gradient."""
@@ -118,10 +118,10 @@ class _Fit:
             by_zero = (self.law(number, float(point[0]), zero + self.zero_step) - here) / self.zero_step
             rows = np.stack([gain * by_modulus, gain * by_zero, self.priors.gain * here, *curve.columns])
             rows = rows / curve.deviation
-            at = [0, *range(1 + number * self.each, 1 + (number + 1) * self.each)]
+            at = [0, *range(1 + number * self.per_curve, 1 + (number + 1) * self.per_curve)]
             matrix[np.ix_(at, at)] += rows @ rows.T
             right[at] += rows @ ((curve.force - predicted) / curve.deviation)
-        gains = np.arange(2, len(point), self.each)
+        gains = np.arange(2, len(point), self.per_curve)
         matrix[gains, gains] += 1
         right[gains] -= point[gains]
         weight = self.priors.modulus_deviation**-2

@@ -46,10 +46,10 @@ _COUNTS = {
 
 def parse(document: Any) -> Experiment:
     """The experiment of a description; raises RigError that names the field, the value and what is allowed."""
-    known = ("schema", "name", "seed", "kind", "skin", "design", "lines", "drive", "curves", "noise", "effects")
-    entries = checks.mapping("experiment", document, known)
-    checks.one_of("schema", entries.get("schema"), (SCHEMA,))
-    kind = checks.one_of("kind", entries.get("kind", FRF), (FRF, INDENTATION, COMPRESSION))
+    allowed = ("schema", "name", "seed", "kind", "skin", "design", "lines", "drive", "curves", "noise", "effects")
+    entries = checks.mapping("experiment", document, allowed)
+    checks.choice("schema", entries.get("schema"), (SCHEMA,))
+    kind = checks.choice("kind", entries.get("kind", FRF), (FRF, INDENTATION, COMPRESSION))
     for name in ("lines", "drive", "design") if kind != FRF else ("curves",):
         if name in entries:
             raise RigError(name, entries[name], f"not for recordings of kind {kind}")
@@ -62,7 +62,7 @@ def parse(document: Any) -> Experiment:
         if part is not None and not part.low_hz < part.high_hz:
             raise RigError(f"{band}.high_hz", part.high_hz, f"must be above low_hz, {part.low_hz:g} Hz")
     if drive is not None:
-        checks.one_of("drive.kind", drive.kind, ("random", "sweep", "stepped_sine"))
+        checks.choice("drive.kind", drive.kind, ("random", "sweep", "stepped_sine"))
         checks.number("drive.high_hz", drive.high_hz, 0, drive.sample_rate_hz / 2.56)
         checks.number(
             "drive.samples (duration_s · sample_rate_hz)", drive.duration_s * drive.sample_rate_hz, 256, 2**24
@@ -70,13 +70,13 @@ def parse(document: Any) -> Experiment:
     skin = _skin(entries.get("skin"))
     design = _part(RecordingDesign, "design", entries.get("design", {}))
     for index, name in enumerate(design.sensors):
-        checks.one_of(f"design.sensors[{index}]", name, [sensor[0] for sensor in skin.sensors])
+        checks.choice(f"design.sensors[{index}]", name, [sensor[0] for sensor in skin.sensors])
     if kind == FRF:
         feasibility.check_skin(skin)
         feasibility.check_presses(design, skin)
     return Experiment(
         name=checks.text("name", entries.get("name")),
-        seed=checks.whole("seed", entries.get("seed", 0), 0, 2**63 - 1),
+        seed=checks.integer("seed", entries.get("seed", 0), 0, 2**63 - 1),
         kind=kind,
         skin=skin,
         design=design,
@@ -92,13 +92,13 @@ def parse(document: Any) -> Experiment:
 def _part(model: Any, prefix: str, document: Any) -> Any:
     """A dataclass from its part of the description; every field is checked by its name or its default."""
     entries = fields(model)
-    given = checks.mapping(prefix, document, [entry.name for entry in entries])
+    values_given = checks.mapping(prefix, document, [part_field.name for part_field in entries])
     values = {}
-    for entry in entries:
-        path = f"{prefix}.{entry.name}"
-        if given.get(entry.name) is not None:
-            values[entry.name] = _value(entry.name, path, given[entry.name], str(entry.type))
-        elif entry.default is MISSING:
+    for part_field in entries:
+        path = f"{prefix}.{part_field.name}"
+        if values_given.get(part_field.name) is not None:
+            values[part_field.name] = _value(part_field.name, path, values_given[part_field.name], str(part_field.type))
+        elif part_field.default is MISSING:
             raise RigError(path, None, "required")
     return model(**values)
 
@@ -106,12 +106,12 @@ def _part(model: Any, prefix: str, document: Any) -> Any:
 def _value(name: str, path: str, value: Any, kind: str) -> Any:
     if name == "offsets_mm":
         return tuple(
-            checks.pair(f"{path}[{index}]", entry, -1e3, 1e3) for index, entry in enumerate(_list(path, value))
+            checks.pair(f"{path}[{index}]", corner, -1e3, 1e3) for index, corner in enumerate(_list(path, value))
         )
     if name == "sensors":
-        return tuple(checks.text(f"{path}[{index}]", entry) for index, entry in enumerate(_list(path, value)))
+        return tuple(checks.text(f"{path}[{index}]", element) for index, element in enumerate(_list(path, value)))
     if name in _COUNTS:
-        return checks.whole(path, value, *_COUNTS[name])
+        return checks.integer(path, value, *_COUNTS[name])
     if "bool" in kind:
         return checks.flag(path, value)
     if "str" in kind:
@@ -127,15 +127,17 @@ def _list(path: str, value: Any) -> list[Any]:
 
 def _skin(document: Any) -> DeclaredSkin:
     """The skin, its sensors listed or as `array`: columns, rows and pitch_mm."""
-    names = [entry.name for entry in fields(DeclaredSkin)]
+    names = [skin_field.name for skin_field in fields(DeclaredSkin)]
     given = dict(checks.mapping("skin", document, [*names, "array"]))
     array = checks.mapping("skin.array", given.pop("array", {}), ("columns", "rows", "pitch_mm"))
     if array and "sensors" in given:
         raise RigError("skin.array", dict(array), "give either array or sensors")
     if "sensors" in given:
-        sensors = tuple(_sensor(index, entry) for index, entry in enumerate(_list("skin.sensors", given["sensors"])))
+        sensors = tuple(_sensor(index, sensor) for index, sensor in enumerate(_list("skin.sensors", given["sensors"])))
     else:
-        columns, rows = (checks.whole(f"skin.array.{name}", array.get(name, 1), 1, 64) for name in ("columns", "rows"))
+        columns, rows = (
+            checks.integer(f"skin.array.{name}", array.get(name, 1), 1, 64) for name in ("columns", "rows")
+        )
         pitch = checks.number("skin.array.pitch_mm", array.get("pitch_mm", 8.0), 0.1, 1e3)
         sensors = tuple(
             (f"s{row * columns + column + 1:02d}", pitch * column, pitch * row)

@@ -73,8 +73,8 @@ def _feasible(description: Mapping[str, Any]) -> bool:
     effects = description["effects"]
     try:
         for without in (None, *effects):
-            left = {name: values for name, values in effects.items() if name != without}
-            record_lines(parse({**description, "effects": left}))
+            remaining = {name: values for name, values in effects.items() if name != without}
+            record_lines(parse({**description, "effects": remaining}))
     except RigError:
         return False
     return True

@@ -34,7 +34,7 @@ def drawn_curves(seed: int, number: int, kind: str, what: str | None = None) -> 
 
 def _compression(random: np.random.Generator, name: str, what: str) -> dict[str, Any]:
     source = UNCATALOGUED if what == "unknown" else EFFECTS
-    known = [effect for effect in source if COMPRESSION in source[effect].kinds]
+    drawable = [effect for effect in source if COMPRESSION in source[effect].kinds]
     modulus, depth = evenly_in_log(random, 0.05, 3), 10 * evenly_in_log(random, 0.05, 0.35)
     heights = [10.0, 5.0][: int(random.integers(1, 3))]
     curves: dict[str, Any] = {
@@ -53,6 +53,12 @@ def _compression(random: np.random.Generator, name: str, what: str) -> dict[str,
     skin = {"thickness_mm": 10.0, "youngs_modulus_mpa": modulus, "sensor_radius_mm": 1.0, "d33_pc_per_n": 10.0}
     description = {"schema": SCHEMA, "name": name, "seed": int(random.integers(2**31)), "kind": COMPRESSION,
                    "skin": skin, "curves": curves}  # fmt: skip
-    names = [str(one) for one in random.choice(known, {"none": 0, "pair": 2}.get(what, 1), replace=False)]
+    names = [
+        str(name_of_effect)
+        for name_of_effect in random.choice(drawable, {"none": 0, "pair": 2}.get(what, 1), replace=False)
+    ]
     ranges = of_compressions(description)
-    return {**description, "effects": {one: drawn_parameters(random, one, ranges) for one in names}}
+    return {
+        **description,
+        "effects": {name_of_effect: drawn_parameters(random, name_of_effect, ranges) for name_of_effect in names},
+    }

@@ -29,27 +29,30 @@ _FACTORS = {"modulus_error": (1.1, 4.0), "thickness_error": (1.03, 1.3)}
 _DECLARED = {"modulus_error": "youngs_modulus_mpa", "thickness_error": "thickness_mm"}
 
 
-def beside_a_block(random: np.random.Generator, name: str, skin: str) -> Joint:
+def with_block(random: np.random.Generator, name: str, skin: str) -> Joint:
     """FRFs of a skin, and one to three compressions of a block of its elastomer."""
-    return _beside_curves(random, name, skin, COMPRESSION)
+    return _with_curves(random, name, skin, COMPRESSION)
 
 
-def beside_indentations(random: np.random.Generator, name: str, skin: str) -> Joint:
+def with_indentations(random: np.random.Generator, name: str, skin: str) -> Joint:
     """FRFs of a skin, and one to four raw curves of a sphere pressed into it."""
-    return _beside_curves(random, name, skin, INDENTATION)
+    return _with_curves(random, name, skin, INDENTATION)
 
 
-def _beside_curves(random: np.random.Generator, name: str, skin: str, kind: str) -> Joint:
+def _with_curves(random: np.random.Generator, name: str, skin: str, kind: str) -> Joint:
     names = _names(random, kind)
     description = frf_description(random, name, skin, names or {str(random.choice(CATALOGUED))})
     ranges = of_frf(description)
-    effects = {one: drawn_parameters(random, one, ranges) for one in sorted(names)}
+    effects = {effect: drawn_parameters(random, effect, ranges) for effect in sorted(names)}
     off = sorted(set(_FACTORS) & set(effects))
-    for one in off:
-        effects[one] = {"factor": _log(random, *_FACTORS[one]) ** float(random.choice([-1, 1]))}
-        design_for_both(description["skin"], one, effects[one]["factor"])
+    for name_of_effect in off:
+        effects[name_of_effect] = {"factor": _log(random, *_FACTORS[name_of_effect]) ** float(random.choice([-1, 1]))}
+        design_for_both(description["skin"], name_of_effect, effects[name_of_effect]["factor"])
     skin_declared = description["skin"]
-    true = skin_declared | {_DECLARED[one]: skin_declared[_DECLARED[one]] * effects[one]["factor"] for one in off}
+    true = skin_declared | {
+        _DECLARED[name_of_effect]: skin_declared[_DECLARED[name_of_effect]] * effects[name_of_effect]["factor"]
+        for name_of_effect in off
+    }
     described = block_description if kind == COMPRESSION else indentation_description
     pressed = parse(described(random, name, true, effects))
     lines = record_lines(parse({**description, "effects": effects}))
@@ -57,8 +60,9 @@ def _beside_curves(random: np.random.Generator, name: str, skin: str, kind: str)
     together = {**lines.response.on, **pressed.effects}  # those of curves may have more parameters
     gains = tuple(float(gain) for gain in lines.response.sensor_gains)
     hidden = [
-        Hidden(one, values, gains=gains if one == "sensor_spread" else ()) for one, values in together.items()
-    ]  # fmt: skip
+        Hidden(name_of_effect, values, gains=gains if name_of_effect == "sensor_spread" else ())
+        for name_of_effect, values in together.items()
+    ]
     return Joint(name, kind, (JointDocument(lines, curves),), tuple(hidden))
 
 
@@ -66,7 +70,7 @@ def _names(random: np.random.Generator, kind: str) -> set[str]:
     """Effects on the FRFs; those of the elastomer act on its curves too."""
     names: set[str] = set()
     if random.random() < 0.5:
-        names |= {str(one) for one in random.choice(_OFF, 1 if random.random() < 0.75 else 2, replace=False)}
+        names |= {str(effect) for effect in random.choice(_OFF, 1 if random.random() < 0.75 else 2, replace=False)}
     if random.random() < (0.4 if kind == INDENTATION else 0.1):
         names.add("adhesion")
     if random.random() < 0.3:

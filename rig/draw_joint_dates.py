@@ -33,7 +33,7 @@ def two_dates(random: np.random.Generator, name: str, skin: str) -> Joint:
     first = frf_description(random, name, skin, lasting | needed or {str(random.choice(COMPANIONS))})
     first["design"].pop("cycles_per_recording", None)
     ranges = of_frf(first)
-    first["effects"] = {one: drawn_parameters(random, one, ranges) for one in sorted(lasting)}
+    first["effects"] = {effect: drawn_parameters(random, effect, ranges) for effect in sorted(lasting)}
     start = date(2021, 3, 1)
     later = start + timedelta(days=int(random.integers(30, 600)))
     second = deepcopy(first)
@@ -46,9 +46,9 @@ def two_dates(random: np.random.Generator, name: str, skin: str) -> Joint:
     gains = _spread(random, first)
     factor = np.ones_like(gains)
     if change in ("one_sensor", "all_sensors"):
-        factor = _ageing(random, first, second, one=change == "one_sensor")
+        factor = _ageing(random, first, second, single=change == "one_sensor")
     lines = [record_lines(parse(first), gains), record_lines(parse(second), gains * factor)]
-    documents = tuple(JointDocument(one) for one in lines)
+    documents = tuple(JointDocument(document) for document in lines)
     return Joint(name, "dates", documents, _hidden(documents, gains, factor, later.isoformat()))
 
 
@@ -56,9 +56,10 @@ def _hidden(documents: tuple[JointDocument, ...], gains: Floats, factor: Floats,
     """What lasts, and what appears on the later date."""
     before, after = (document.experiment.effects for document in documents)
     hidden = [
-        Hidden(one, values, (0, 1), _floats(gains) if one == "sensor_spread" else ()) for one, values in before.items()
+        Hidden(effect, values, (0, 1), _floats(gains) if effect == "sensor_spread" else ())
+        for effect, values in before.items()
     ]
-    hidden += [Hidden(one, values, (1,), since=later) for one, values in after.items() if one not in before]
+    hidden += [Hidden(effect, values, (1,), since=later) for effect, values in after.items() if effect not in before]
     if np.any(factor != 1):
         ids = [sensor[0] for sensor in documents[0].experiment.skin.sensors]
         aged = tuple(ids[index] for index in np.flatnonzero(factor != 1))
@@ -77,10 +78,10 @@ def _spread(random: np.random.Generator, description: dict[str, Any]) -> Floats:
     return np.exp(sd * random.normal(size=len(parse(description).skin.sensors)))
 
 
-def _ageing(random: np.random.Generator, first: dict[str, Any], second: dict[str, Any], *, one: bool) -> Floats:
+def _ageing(random: np.random.Generator, first: dict[str, Any], second: dict[str, Any], *, single: bool) -> Floats:
     """The factor on d33 of each sensor on the second date: of one sensor that both dates record, or of all."""
     plans = [recordings(parse(description)) for description in (first, second)]
     both = np.intersect1d(plans[0].sensor, plans[1].sensor)
     factor = np.ones(len(parse(first).skin.sensors))
-    factor[random.choice(both) if one else slice(None)] = _log(random, *_AGED)
+    factor[random.choice(both) if single else slice(None)] = _log(random, *_AGED)
     return factor

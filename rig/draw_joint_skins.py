@@ -20,9 +20,9 @@ _SD = (0.01, 0.1)
 _LEAST_SDS = 4.0  # by which E or d33 departs
 
 
-def skins_of_one_make(random: np.random.Generator, name: str, make: str) -> Joint:
+def skins_of_one_batch(random: np.random.Generator, name: str, batch: str) -> Joint:
     """FRFs of three to six skins of one make, one of them with few recordings; the make's E is declared for all."""
-    common = frf_description(random, name, make, {"modulus_error", str(random.choice(CATALOGUED))})
+    common = frf_description(random, name, batch, {"modulus_error", str(random.choice(CATALOGUED))})
     skin, sds = common["skin"], {"modulus_error": _log(random, *_SD), D33_DEPARTURE: _log(random, *_SD)}
     departure = str(random.choice(list(_DEPARTURES), p=list(_DEPARTURES.values())))
     count = 3 if random.random() < _THREE else int(random.choice(_SKINS))
@@ -38,7 +38,7 @@ def skins_of_one_make(random: np.random.Generator, name: str, make: str) -> Join
         departs = departure if number == odd else "nothing"
         description = _skin(random, common, population, departs, size)
         description["name"] = f"{name}, skin {number + 1}"
-        description["skin"]["id"] = f"{make}-{number + 1}"
+        description["skin"]["id"] = f"{batch}-{number + 1}"
         if number == few:
             description["design"]["most_recordings"] = int(random.integers(3, 7))
         descriptions.append(description)

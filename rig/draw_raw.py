@@ -22,7 +22,8 @@ _SIGNED = {"force_drift": "n_per_root_s", "thermal_drift": "drift_mm", "nonlinea
 
 
 def effect_names(random: np.random.Generator, what: str) -> list[str]:
-    """What an experiment hides: none, single, pair or unknown; ν < 1/2 shows on a layer alone, so it comes with one."""
+    """The hidden effects of an experiment: none, single, pair or unknown; ν < 1/2 is visible only on a layer, so it
+    comes with one."""
     if what == "none":
         return []
     if what == "unknown":
@@ -113,9 +114,9 @@ def _strength(
     if name == "contact_creep":
         values = {"fraction": _log(random, 0.05, 0.6), "time_s": seconds * _log(random, 0.05, 5)}
         if random.random() < 0.4:
-            left = 0.9 - values["fraction"]
+            largest = 0.9 - values["fraction"]
             later = values["time_s"] * _log(random, 5, 50)
-            values |= {"fraction_2": left * float(random.uniform(0.2, 0.8)), "time_2_s": later}
+            values |= {"fraction_2": largest * float(random.uniform(0.2, 0.8)), "time_2_s": later}
         return values
     if name == "strain_stiffening":
         law = str(random.choice(["linear", "limited"]))

@@ -12,7 +12,7 @@ from rig.truth import truth_of_curves, truth_of_lines
 from rig.wide_tails import USUAL
 
 JOINT = "joint"
-HIDES: dict[str, tuple[str, ...]] = {  # kinds, and what may be asked for of each
+HIDES: dict[str, tuple[str, ...]] = {  # kinds, and the possible requests for each
     FRF: tuple(SHARES),
     INDENTATION: tuple(SHARES),
     COMPRESSION: tuple(SHARES),
@@ -23,8 +23,8 @@ Documents = tuple[list[dict[str, Any]], dict[str, Any]]
 
 
 def documents_and_truth(seed: int, number: int, kind: str, what: str | None, tails: str = USUAL) -> Documents:
-    """The campaigns (`campaign/1`) of random experiment `number` of a seed, of kind joint several, and the truth; other
-    `tails` than the usual are those of kind frf."""
+    """The campaigns (`campaign/1`) of random experiment `number` of a seed, several for kind joint, and the truth;
+    `tails`: other distributions, for kind frf only."""
     if kind == JOINT:
         return drawn_joint(seed, number, what)
     if kind == FRF:

@@ -200,7 +200,7 @@ UNCATALOGUED: dict[str, Effect] = {
 }  # fmt: skip
 
 _IN_CATALOGUE = {"amplitude_nonlinearity": "moving_contact_edge"}  # one law, at any amplitude and in its limit
-KNOWN = {**EFFECTS, **UNCATALOGUED}
+ALL_EFFECTS = {**EFFECTS, **UNCATALOGUED}
 
 
 def in_catalogue(effect: str) -> str:
@@ -210,22 +210,22 @@ def in_catalogue(effect: str) -> str:
 
 def checked(kind: str, document: Any) -> dict[str, Values]:
     """The effects of a description, every parameter given and within its range; raises RigError."""
-    given = checks.mapping("effects", document, tuple(KNOWN))
+    given = checks.mapping("effects", document, tuple(ALL_EFFECTS))
     result: dict[str, Values] = {}
     for name, parameters in given.items():
-        effect, field = KNOWN[name], f"effects.{name}"
+        effect, field = ALL_EFFECTS[name], f"effects.{name}"
         if kind not in effect.kinds:
             raise RigError(field, kind, f"acts on recordings of kind {', '.join(effect.kinds)}")
-        known = (*effect.parameters, *(("law",) if effect.laws else ()))
-        entry = checks.mapping(field, {} if parameters is None else parameters, known)
+        allowed = (*effect.parameters, *(("law",) if effect.laws else ()))
+        stated = checks.mapping(field, {} if parameters is None else parameters, allowed)
         values: Values = {}
         if effect.laws:
-            values["law"] = checks.one_of(f"{field}.law", entry.get("law", effect.laws[0]), effect.laws)
+            values["law"] = checks.choice(f"{field}.law", stated.get("law", effect.laws[0]), effect.laws)
         for parameter, (low, high) in effect.parameters.items():
-            if parameter in entry:
-                values[parameter] = checks.number(f"{field}.{parameter}", entry[parameter], low, high)
+            if parameter in stated:
+                values[parameter] = checks.number(f"{field}.{parameter}", stated[parameter], low, high)
                 if kind == FRF and parameter in effect.only_curves:
-                    raise RigError(f"{field}.{parameter}", entry[parameter], "only for indentation and compression")
+                    raise RigError(f"{field}.{parameter}", stated[parameter], "only for indentation and compression")
             elif parameter not in effect.optional:
                 raise RigError(
                     f"{field}.{parameter}", None, f"required, {low:g} to {high:g}{checks.in_unit(parameter)}"

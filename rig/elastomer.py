@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rig import effects, instrument
-from rig.contact_course import Body, course
+from rig.contact_course import Body, contact_history
 from rig.cylinder import cylinder_force
 from rig.effects import COMPRESSION, INDENTATION, Values
 from rig.errors import RigError
@@ -87,7 +87,7 @@ def pressed_body(
 
 
 def frame_compliance(on: Mapping[str, Values]) -> float:
-    """Compliance [mm/N] behind the sphere that nobody subtracts: the effect instrument_compliance."""
+    """Uncorrected compliance [mm/N] behind the sphere: the effect instrument_compliance."""
     frame = effects.of(on, "instrument_compliance", "stiffness_n_per_mm")
     return 1 / frame if frame else 0.0
 
@@ -102,13 +102,13 @@ def _curve(
         force = true_modulus(experiment) * cylinder_force(experiment.effects, shape, time, displacement)
     reading = instrument.shown(experiment, number, time, displacement, force)
     measured, noisy = instrument.noisy(experiment, number, reading)
-    entry: dict[str, Any] = {"id": f"c{number + 1:02d}", "kind": experiment.kind, **shape}
-    entry |= {"displacement_mm": _written(measured), "force_n": _written(noisy)}
+    recording: dict[str, Any] = {"id": f"c{number + 1:02d}", "kind": experiment.kind, **shape}
+    recording |= {"displacement_mm": _written(measured), "force_n": _written(noisy)}
     if curves.times:
-        entry["time_s"] = _written(time)
+        recording["time_s"] = _written(time)
     if curves.stage_stiffness_n_per_mm and curves.stage_declared:
-        entry["stage_stiffness_n_per_mm"] = curves.stage_stiffness_n_per_mm
-    return RecordedCurve(entry, reading.displacement_mm, reading.force_n, time, reading.zero_mm)
+        recording["stage_stiffness_n_per_mm"] = curves.stage_stiffness_n_per_mm
+    return RecordedCurve(recording, reading.displacement_mm, reading.force_n, time, reading.zero_mm)
 
 
 def _written(values: Floats) -> list[float]:
@@ -135,14 +135,15 @@ def _indented(
     time = np.linspace(0, sum(waits), (curves.samples - 1) * substeps + 1)
     travel = np.interp(time, np.cumsum(waits), corners)
     sunk = effects.of(on, "plastic_set", "ratio") * np.maximum.accumulate(np.maximum(travel, 0)) * largest / peak
-    depth, force = course(body, time, travel - sunk, compliance)
+    depth, force = contact_history(body, time, travel - sunk, compliance)
     time, depth, force = time[::substeps], (depth + sunk)[::substeps], force[::substeps]
     _check_loading(curves, int(((time <= waits[1]) & (depth > 0)).sum()), waits[1], float(time[-1]))
     return time, depth, force
 
 
 def _compressed(curves: CurveDesign, shape: Mapping[str, float], speed: float) -> tuple[Floats, Floats]:
-    """Times and shortenings of a cylinder: loading, hold, unloading; in tension then the same to the other side."""
+    """Times and shortenings of a cylinder: loading, hold, unloading; for tension then the same with the opposite
+    sign."""
     largest = curves.largest_displacement_mm
     _check_depth(largest, 0.9 * shape["sample_height_mm"])
     corners = [0.0, largest, largest, 0.0] + ([-largest, 0.0] if curves.tension else [])
@@ -160,11 +161,11 @@ def _check_depth(largest: float, deepest: float) -> None:
         raise RigError("curves.largest_displacement_mm", largest, allowed)
 
 
-def _check_loading(curves: CurveDesign, loading: int, ramp_s: float, whole_s: float) -> None:
+def _check_loading(curves: CurveDesign, loading: int, ramp_s: float, total_s: float) -> None:
     if loading < _LEAST_LOADING:
         needed = math.ceil(curves.samples * (_LEAST_LOADING + 1) / max(loading, 1))
         allowed = (
-            f"leaves {loading} samples while the load rises, in {ramp_s:g} s of {whole_s:g} s: must leave at least "
+            f"leaves {loading} samples while the load rises, in {ramp_s:g} s of {total_s:g} s: must leave at least "
             f"{_LEAST_LOADING}; about {needed} samples do, or a shorter hold_s"
         )
         raise RigError("curves.samples", curves.samples, allowed)

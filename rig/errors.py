@@ -1,4 +1,4 @@
-"""The rig's error."""
+"""The exception of the rig."""
 
 from typing import Any
 

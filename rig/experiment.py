@@ -15,7 +15,7 @@ MOST_RECORDINGS = 5000
 
 @dataclass(frozen=True)
 class DeclaredSkin:
-    """The skin as declared; `sensors` holds ids and centres. d33 is the true one, which only the truth states."""
+    """The skin as declared; `sensors` holds ids and centres. d33 is the true value, stated only in the truth."""
 
     thickness_mm: float
     youngs_modulus_mpa: float

@@ -1,4 +1,4 @@
-"""Rejects experiments that no rig can carry out: overlapping sensors, loads beside the skin, spheres that lift off."""
+"""Rejects impossible experiments: overlapping sensors, loads outside the skin, spheres that lift off."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ def check_skin(skin: DeclaredSkin) -> None:
 
 
 def check_presses(design: RecordingDesign, skin: DeclaredSkin) -> None:
-    """Raise RigError for spheres that lift off, that are beside the skin, or out of range of the sensor."""
+    """Raise RigError for spheres that lift off, lie outside the skin, or are out of range of the sensor."""
     lowest = min(design.preloads_n)
     for index, force in enumerate(design.dynamic_forces_n):
         if force >= lowest:
@@ -44,17 +44,17 @@ def check_presses(design: RecordingDesign, skin: DeclaredSkin) -> None:
 
 
 def _check_on_skin(field: str, offset: Sequence[float], skin: DeclaredSkin, sensors: Sequence[str]) -> None:
-    """Raise RigError for a load beside the skin; the array is in its middle, its length along x."""
+    """Raise RigError for a load outside the skin; the array is in its middle, its length along x."""
     for axis, extent, name in ((0, skin.length_mm, "length_mm"), (1, skin.width_mm, "width_mm")):
         if extent is None:
             continue
         centres = [centre[axis] for _, *centre in skin.sensors]
         middle = (min(centres) + max(centres)) / 2
         for sensor, *centre in skin.sensors:
-            place = centre[axis] + offset[axis]
-            if (not sensors or sensor in sensors) and abs(place - middle) > extent / 2:
+            at = centre[axis] + offset[axis]
+            if (not sensors or sensor in sensors) and abs(at - middle) > extent / 2:
                 allowed = (
-                    f"puts the sphere of {sensor} at {'xy'[axis]} = {place:g} mm: must be {middle - extent / 2:g} to "
+                    f"puts the sphere of {sensor} at {'xy'[axis]} = {at:g} mm: must be {middle - extent / 2:g} to "
                     f"{middle + extent / 2:g} mm, on the skin (skin.{name})"
                 )
                 raise RigError(field, list(offset), allowed)

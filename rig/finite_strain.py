@@ -55,7 +55,7 @@ def added_spectrum(a_over_h: Floats, load: Floats, law: str = DEAD_PRESSURE) -> 
         allowed = f"must be at most {LARGEST_LOAD}: lower preload_n, or a larger indenter_radius_mm"
         raise RigError("load parameter F/(R²E)", float(np.max(load)), allowed)
     powers = np.cbrt(load)[:, None] ** np.arange(1, 5)
-    known = np.einsum("rp,rpk->rk", powers, _curve(law)(a_over_h))
-    added = np.zeros((len(known), len(WAVENUMBERS)))
-    added[:, : known.shape[1]] = known
+    tabulated = np.einsum("rp,rpk->rk", powers, _curve(law)(a_over_h))
+    added = np.zeros((len(tabulated), len(WAVENUMBERS)))
+    added[:, : tabulated.shape[1]] = tabulated
     return added

@@ -22,7 +22,7 @@ from rig.layer import RIM, WAVENUMBERS, Floats
 DATA = Path(__file__).with_name("finite_strain.npz")
 RADII = np.concatenate([[0.04, 0.08, 0.12, 0.17, 0.23, 0.3], np.arange(0.4, 3.3, 0.14)])
 LOADS = np.array([0.116, 0.232, 0.348, 0.4642])  # x
-HIGHEST_WAVENUMBER = 12.0  # what finite strain adds is smooth on the base
+HIGHEST_WAVENUMBER = 12.0  # the addition by finite strain is smooth on the base
 _SHEAR = 1.0
 _Q0_OVER_E_X = 1.5 / np.pi * 0.5625 ** (-2 / 3)  # q0/E = this · L^(1/3)
 _GAUSS = np.polynomial.legendre.leggauss(3)
@@ -43,21 +43,21 @@ class Mesh:
     edges_r: Floats
 
 
-def graded(start: float, first: float, growth: float, end: float) -> Floats:
+def graded(start: float, first: float, ratio: float, end: float) -> Floats:
     """Points from start to end, steps growing from `first`."""
-    count = int(np.ceil(np.log1p((growth - 1) * (end - start) / first) / np.log(growth)))
-    steps = growth ** np.arange(count)
+    count = int(np.ceil(np.log1p((ratio - 1) * (end - start) / first) / np.log(ratio)))
+    steps = ratio ** np.arange(count)
     return start + (end - start) * np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
 
 
 def make_mesh(a: float, fineness: float = 2.5) -> Mesh:
     """The mesh for a contact of radius a: fine at the contact's edge and at the surface."""
     size = min(a / 4, 0.12) / fineness
-    growth = 1 + 0.35 / fineness
-    inner = a - graded(0.0, size / 2, growth, a)[::-1]
-    outer = graded(a, size / 2, growth, a + 5.0)
+    ratio = 1 + 0.35 / fineness
+    inner = a - graded(0.0, size / 2, ratio, a)[::-1]
+    outer = graded(a, size / 2, ratio, a + 5.0)
     edges_r = np.concatenate([inner, outer[1:]])
-    edges_z = 1 - graded(0.0, size, growth, 1.0)[::-1]
+    edges_z = 1 - graded(0.0, size, ratio, 1.0)[::-1]
     nodes_r = np.sort(np.concatenate([edges_r, (edges_r[1:] + edges_r[:-1]) / 2]))
     nodes_z = np.sort(np.concatenate([edges_z, (edges_z[1:] + edges_z[:-1]) / 2]))
     number = np.arange(len(nodes_r) * len(nodes_z)).reshape(len(nodes_z), len(nodes_r))

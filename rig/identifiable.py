@@ -44,15 +44,15 @@ class Visibility:
         return self.chi2_gain > THRESHOLD
 
 
-def visibility(recorded: RecordedLines, known: tuple[str, ...] = ()) -> Visibility:
-    """Visibility of the effects against a model that has only the effects `known`, at their true values."""
+def visibility(recorded: RecordedLines, effects_in_model: tuple[str, ...] = ()) -> Visibility:
+    """Visibility of the effects against a model that has only the effects `effects_in_model`, at their true values."""
     response = recorded.response
     aimed = replace(response, missed_mm=np.zeros_like(response.missed_mm))
-    effects = {name: values for name, values in response.on.items() if name in known}
-    gains = response.sensor_gains if "sensor_spread" in known else np.ones_like(response.sensor_gains)
+    effects = {name: values for name, values in response.on.items() if name in effects_in_model}
+    gains = response.sensor_gains if "sensor_spread" in effects_in_model else np.ones_like(response.sensor_gains)
     plain = replace(aimed, experiment=replace(response.experiment, effects=effects), sensor_gains=gains)
     true, _ = _Fit(recorded, aimed).best(_with_nuisances(recorded, aimed))
-    pickup = recorded.pickup if "mains_pickup" in known else np.zeros_like(recorded.pickup)
+    pickup = recorded.pickup if "mains_pickup" in effects_in_model else np.zeros_like(recorded.pickup)
     base, fitted = _Fit(recorded, plain).best(_with_nuisances(recorded, plain))
     expected = recorded.exact + recorded.pickup - pickup
     scale = np.vdot(fitted, expected).real / np.vdot(fitted, fitted).real
@@ -69,8 +69,8 @@ def _with_nuisances(recorded: RecordedLines, response: TrueResponse) -> _Design:
     columns, deviations = [base], [np.inf]
     for name, deviation in _DECLARED.items():
         skin = response.experiment.skin
-        other = replace(skin, **{name: getattr(skin, name) * (1 + _STEP)})
-        changed = replace(response, experiment=replace(response.experiment, skin=other)).lines(recorded.frequency_hz)
+        stepped = replace(skin, **{name: getattr(skin, name) * (1 + _STEP)})
+        changed = replace(response, experiment=replace(response.experiment, skin=stepped)).lines(recorded.frequency_hz)
         columns.append((changed - base) / _STEP)
         deviations.append(deviation)
     for number in np.unique(response.plan.sensor):

@@ -1,7 +1,7 @@
-"""The instrument: what it writes of a curve's exact displacement and force.
+"""The instrument: the written displacement and force of a curve from the exact ones.
 
 Frame, spindle, guide and cell distort first (effects); then each curve gets the cell's gain, its zeros and its drift,
-and last noise and the steps of the converters.
+and finally noise and the converters' quantisation.
 """
 
 from collections.abc import Mapping
@@ -30,15 +30,19 @@ def shown(experiment: Experiment, number: int, time: Floats, displacement: Float
     assert curves is not None
     common = np.random.default_rng([experiment.seed, 7]).normal()
     gain, force_zero, drift, drag = np.random.default_rng([experiment.seed, 8, number]).normal(size=4)
-    moved, felt = _distorted(experiment.effects, time, displacement, force)
-    felt = np.exp(curves.cell_gain * common + curves.gain * gain) * felt + curves.force_zero_n * force_zero
-    felt = felt + curves.drift_n_per_s * drift * time + curves.drift_n_per_mm * drag * (moved - moved[0])
+    moved, measured_force = _distorted(experiment.effects, time, displacement, force)
+    measured_force = (
+        np.exp(curves.cell_gain * common + curves.gain * gain) * measured_force + curves.force_zero_n * force_zero
+    )
+    measured_force = (
+        measured_force + curves.drift_n_per_s * drift * time + curves.drift_n_per_mm * drag * (moved - moved[0])
+    )
     zero = curves.contact_point_mm * float(np.random.default_rng([experiment.seed, 5, number]).normal())
-    return Reading(moved + zero, felt, zero)
+    return Reading(moved + zero, measured_force, zero)
 
 
 def noisy(experiment: Experiment, number: int, reading: Reading) -> tuple[Floats, Floats]:
-    """Displacement [mm] and force [N] as written, with noise and in the converters' steps."""
+    """Displacement [mm] and force [N] as written, with noise and quantisation."""
     curves = experiment.curves
     assert curves is not None
     random, size = np.random.default_rng([experiment.seed, 5, number]), len(reading.force_n)
@@ -53,12 +57,12 @@ def _stepped(values: Floats, step: float) -> Floats:
 
 
 def _distorted(on: Mapping[str, Values], time: Floats, displacement: Floats, force: Floats) -> tuple[Floats, Floats]:
-    """Displacement and force as frame, spindle, guide and cell pass them on."""
+    """Displacement and force after frame, spindle, guide and cell."""
 
     def value(name: str, parameter: str) -> float:
         return effects.of(on, name, parameter)
 
-    moved, felt = displacement, force
+    moved, measured_force = displacement, force
     if "instrument_compliance" in on:
         moved = moved + force / value("instrument_compliance", "stiffness_n_per_mm")
     if "rough_surface" in on:
@@ -68,20 +72,24 @@ def _distorted(on: Mapping[str, Values], time: Floats, displacement: Floats, for
         moved = moved - value("thermal_drift", "drift_mm") * np.expm1(-time / value("thermal_drift", "time_s"))
     if "force_ripple" in on:
         pitch = value("force_ripple", "pitch_mm")
-        felt = felt * (1 + value("force_ripple", "amplitude") * np.sin(2 * np.pi * displacement / pitch))
+        measured_force = measured_force * (
+            1 + value("force_ripple", "amplitude") * np.sin(2 * np.pi * displacement / pitch)
+        )
     if "guide_friction" in on:
         sense = _presliding(displacement, value("guide_friction", "slip_mm"))
-        felt = felt * (1 + value("guide_friction", "friction") * sense)
+        measured_force = measured_force * (1 + value("guide_friction", "friction") * sense)
     if "nonlinear_cell" in on:
-        felt = felt * (1 + value("nonlinear_cell", "nonlinearity") * felt / value("nonlinear_cell", "range_n"))
-    return moved, felt + value("force_drift", "n_per_root_s") * np.sqrt(time)
+        measured_force = measured_force * (
+            1 + value("nonlinear_cell", "nonlinearity") * measured_force / value("nonlinear_cell", "range_n")
+        )
+    return moved, measured_force + value("force_drift", "n_per_root_s") * np.sqrt(time)
 
 
 def _presliding(displacement: Floats, slip: float) -> Floats:
-    """Friction over its limit, −1 to 1, that turns round within the slip after each reversal (Dahl 1968)."""
+    """Friction over its limit, −1 to 1, which reverses within the slip after each reversal of motion (Dahl 1968)."""
     steps, state = np.diff(displacement), 1.0
     result = [state]
-    for step, left in zip(np.sign(steps), np.exp(-np.abs(steps) / slip), strict=True):
-        state = step + (state - step) * left
+    for step, remaining in zip(np.sign(steps), np.exp(-np.abs(steps) / slip), strict=True):
+        state = step + (state - step) * remaining
         result.append(state)
     return np.array(result)

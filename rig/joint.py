@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from rig import checks
-from rig.draw_joint import beside_a_block, beside_indentations
+from rig.draw_joint import with_block, with_indentations
 from rig.draw_joint_dates import two_dates
-from rig.draw_joint_skins import skins_of_one_make
+from rig.draw_joint_skins import skins_of_one_batch
 from rig.joint_campaign import Joint, first_feasible
 from rig.joint_truth import joint_truth
 
 _DRAWN = {
-    "compression": beside_a_block,
-    "indentation": beside_indentations,
+    "compression": with_block,
+    "indentation": with_indentations,
     "dates": two_dates,
-    "skins": skins_of_one_make,
+    "skins": skins_of_one_batch,
 }  # fmt: skip
 WHAT = tuple(_DRAWN)
 
@@ -28,7 +28,7 @@ WHAT = tuple(_DRAWN)
 def joint_campaigns(seed: int, number: int, what: str | None = None) -> Joint:
     """Draw and record random joint campaigns `number` of a seed; what they join is drawn too if not given."""
     random = np.random.default_rng([seed, number, 29])
-    drawn = _DRAWN[str(random.choice(WHAT)) if what is None else checks.one_of("what", what, WHAT)]
+    drawn = _DRAWN[str(random.choice(WHAT)) if what is None else checks.choice("what", what, WHAT)]
     return first_feasible(drawn, random, f"drawn joint {seed}/{number}", f"skin-{seed}-{number}")
 
 

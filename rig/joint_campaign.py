@@ -1,4 +1,4 @@
-"""Several campaigns of one truth: FRF lines and curves of one elastomer, dates of one skin, skins of one make."""
+"""Several campaigns of one truth: FRF lines and curves of one elastomer, dates of one skin, skins of one batch."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,7 +27,8 @@ class CurveSet:
 
 @dataclass(frozen=True)
 class JointDocument:
-    """One campaign: FRF lines of a skin, whose experiment declares E and h, and in some curves of its elastomer."""
+    """One campaign: FRF lines of a skin, whose experiment declares E and h, and for some kinds curves of its
+    elastomer."""
 
     lines: RecordedLines
     curves: CurveSet | None = None
@@ -100,7 +101,8 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Population:
-    """Skins of one make: E [MPa] and d33 [pC/N] are log-normal, of these medians and deviations of the logarithm."""
+    """Skins of one batch: E [MPa] and d33 [pC/N] are log-normal, with these medians and standard deviations of the
+    logarithm."""
 
     modulus_mpa: float
     modulus_sd: float
@@ -110,7 +112,7 @@ class Population:
 
 @dataclass(frozen=True)
 class Joint:
-    """Campaigns to be judged together, what they hide and, of several skins, their population."""
+    """Campaigns to be judged together, what they hide and, for several skins, their population."""
 
     name: str
     what: str
@@ -122,7 +124,7 @@ class Joint:
 def first_feasible(
     draw: Callable[[np.random.Generator, str, str], Joint], random: np.random.Generator, name: str, skin: str
 ) -> Joint:
-    """The first of what is drawn that the rig can do; raises RuntimeError where many draws in a row are not."""
+    """The first draw that the rig can carry out; raises RuntimeError if many draws in a row cannot."""
     for _ in range(_TRIES):
         try:
             return draw(random, name, skin)

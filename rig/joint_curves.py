@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.contact_course import Body, course
+from rig.contact_course import Body, contact_history
 from rig.cylinder import cylinder_force
 from rig.effects import INDENTATION
 from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
@@ -22,7 +22,7 @@ from rig.whitening import Whitener
 
 _SLOPE = 1e-4  # of the largest displacement
 _SAMPLES = 120  # of a curve: so many weigh as much as all
-_JUMP = 0.1  # of the largest force, between neighbours of these samples; samples beside a jump do not count
+_JUMP = 0.1  # of the largest force, between neighbouring samples; samples next to a jump do not count
 _NO_WEIGHT = 1e6
 _BEYOND = 1.2  # of the largest displacement: how far the law of a body reaches
 _UNKNOWN = 10.0  # of the largest force: scatter of the zero of force and of the drift
@@ -44,7 +44,7 @@ class CurvePart:
 
     def __init__(self, curve: RecordedCurve, truth: Experiment, model: Experiment, skin: str, *, free: bool) -> None:
         assert model.curves is not None
-        self._model, self._design, self._skin, self._entry = model, model.curves, skin, curve.entry
+        self._model, self._design, self._skin, self._recording = model, model.curves, skin, curve.entry
         at = np.unique(np.linspace(0, len(curve.time_s) - 1, _SAMPLES).astype(int))
         self._time_s = curve.time_s[at]
         self._displacement_mm = (curve.exact_displacement_mm - curve.zero_mm)[at]  # from the touch of the surfaces
@@ -71,15 +71,15 @@ class CurvePart:
         experiment = scaled(assumed, self._skin, values)
         displacement, modulus = self._displacement_mm - shift_mm, true_modulus(experiment)
         if experiment.kind != INDENTATION:
-            return modulus * cylinder_force(experiment.effects, self._entry, self._time_s, displacement)
+            return modulus * cylinder_force(experiment.effects, self._recording, self._time_s, displacement)
         body = replace(self._body(experiment, values), modulus=modulus)
-        return course(body, self._time_s, displacement, frame_compliance(experiment.effects))[1]
+        return contact_history(body, self._time_s, displacement, frame_compliance(experiment.effects))[1]
 
     def _body(self, experiment: Experiment, values: Mapping[str, float]) -> Body:
         key = tuple(values[name] for name in self._shape)
         if key not in self._bodies:
             deepest = _BEYOND * float(self._displacement_mm.max())
-            radius = self._entry["indenter_radius_mm"]
+            radius = self._recording["indenter_radius_mm"]
             self._bodies[key] = pressed_body(experiment, experiment.effects, radius, deepest)
         return self._bodies[key]
 

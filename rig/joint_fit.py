@@ -20,11 +20,11 @@ _TOLERANCE = 1e-4  # of χ²
 _EVALUATIONS = 40
 _SMALL = 0.1  # χ² that needs no second fit
 _HELD = 1e-4
-_ASTRAY = 1e6  # residuals beyond what the rig has solved: such a step is rejected
+_ASTRAY = 1e6  # residuals outside the rig's solutions: such a step is rejected
 
 
 class Part(Protocol):
-    """What shares parameters with others."""
+    """A part of a joint fit that shares parameters with others."""
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -40,16 +40,16 @@ class Part(Protocol):
 
 @dataclass(frozen=True)
 class Prior:
-    """Mean and deviation of a parameter; by default so wide that it is free."""
+    """Mean and standard deviation of a parameter; by default so wide that it is free."""
 
     mean: float = 0.0
     sd: float = 3.0
 
 
 def least_chi2(parts: Sequence[Part], priors: Mapping[str, Prior], at_first: Sequence[str] = ()) -> float:
-    """The least χ², from the priors' means; infinite where the parts cannot be calculated there.
+    """The least χ², from the priors' means; infinite if the parts cannot be calculated there.
 
-    A first fit holds the parameters `at_first`, which keeps the second from far minima.
+    A first fit holds the parameters `at_first`, which keeps the second from distant minima.
     """
     problem = _Problem(parts, priors)
     start = problem.mean
@@ -101,14 +101,14 @@ class _Problem:
             here = _reached(part, values)
             block = np.zeros((len(here), len(self.names)))
             for name in part.parameters:
-                beside = _reached(part, values | {name: values[name] + step})
-                block[:, self.names.index(name)] = (beside - here) / step
+                stepped = _reached(part, values | {name: values[name] + step})
+                block[:, self.names.index(name)] = (stepped - here) / step
             blocks.append(block)
         return np.concatenate([*blocks, np.diag(1 / self.sd)])
 
 
 def _reached(part: Part, values: Mapping[str, float]) -> Floats:
-    """Residuals of a part, enormous where it cannot be calculated."""
+    """Residuals of a part, very large if it cannot be calculated."""
     with np.errstate(all="ignore"):
         try:
             result = part.residuals(values)

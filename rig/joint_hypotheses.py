@@ -1,4 +1,4 @@
-"""Models of joint campaigns: everything that is hidden, or all but one thing; their parts and priors."""
+"""Models of joint campaigns with all hidden effects, or with all but one; their parts and priors."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -13,14 +13,19 @@ from rig.joint_lines import LinesPart
 from rig.layer import Floats
 
 _DECLARED_E, _DECLARED_H, _SENSOR = 0.02, 0.01, 0.01
-_BY_PRIORS = ("modulus_error", "thickness_error", D33_DEPARTURE)  # what a model has not is said by priors alone
+_BY_PRIORS = (
+    "modulus_error",
+    "thickness_error",
+    D33_DEPARTURE,
+)  # effects that a model lacks are described by priors only
 
 Hypothesis = tuple[list[Part], dict[str, Prior]]
 
 
 @dataclass(frozen=True)
 class Tied:
-    """Skins of one make: ln of a parameter over that of the population's unknown median, over its deviation."""
+    """Skins of one batch: ln of a parameter over that of the population's unknown median, over its standard
+    deviation."""
 
     names: tuple[str, ...]
     median: str
@@ -68,8 +73,8 @@ def hypothesis(
         parts.append(_lines(document, lacking, free=free))
         if curves and document.curves is not None:
             truth = document.curves.experiment
-            model = replace(truth, effects=_left(truth.effects, lacking))
-            parts += [CurvePart(one, truth, model, document.skin, free=free) for one in document.curves.recorded]
+            model = replace(truth, effects=_remaining(truth.effects, lacking))
+            parts += [CurvePart(curve, truth, model, document.skin, free=free) for curve in document.curves.recorded]
             assert truth.curves is not None
             priors[f"{document.skin}/cell"] = Prior(0.0, max(truth.curves.cell_gain, 1e-6))
         priors |= _priors(document, lacking, declared=declared, free=free)
@@ -91,7 +96,7 @@ def skin_covariance(document: JointDocument) -> Floats:
     return covariance([_lines(document, None, free=False)], gains, names)
 
 
-def _left(effects: dict[str, Values], without: Hidden | None) -> dict[str, Values]:
+def _remaining(effects: dict[str, Values], without: Hidden | None) -> dict[str, Values]:
     if without is None or without.effect in _BY_PRIORS:
         return effects
     return {name: values for name, values in effects.items() if name != without.effect}
@@ -100,7 +105,7 @@ def _left(effects: dict[str, Values], without: Hidden | None) -> dict[str, Value
 def _lines(document: JointDocument, without: Hidden | None, *, free: bool) -> LinesPart:
     response = document.lines.response
     gains = response.sensor_gains / (without.gains if without is not None and without.gains else 1.0)
-    experiment = replace(response.experiment, effects=_left(response.experiment.effects, without))
+    experiment = replace(response.experiment, effects=_remaining(response.experiment.effects, without))
     return LinesPart(document.lines, replace(response, experiment=experiment, sensor_gains=gains), free=free)
 
 
@@ -126,7 +131,7 @@ def _priors(document: JointDocument, without: Hidden | None, *, declared: bool, 
 
 
 def _ties(joint: Joint, population: Population, without: Hidden | None) -> list[Part]:
-    """E and d33 of the skins, each tied to its population, but for a skin that is known to depart in it."""
+    """E and d33 of the skins, each tied to its population, except for a skin that is known to depart in it."""
 
     def tied(name: str, departure: str, sd: float, of: Callable[[JointDocument], float]) -> Tied:
         departing = {hidden.documents[0] for hidden in joint.hidden if hidden.effect == departure and hidden != without}

@@ -41,7 +41,7 @@ class LinesPart:
         self._whiten = Whitener(
             np.tile(np.sqrt(recorded.line_variance), 2), _scatter(true, self._expected, self._frequency)
         )
-        self._known: dict[tuple[float, ...], Complexes] = {}
+        self._cached: dict[tuple[float, ...], Complexes] = {}
         effects = parameters_of_effects(experiment, self._skin) if free else ()
         self._shape = (f"{self._skin}/modulus", f"{self._skin}/thickness", *effects)
         ids = [sensor[0] for sensor in experiment.skin.sensors]
@@ -56,10 +56,10 @@ class LinesPart:
 
     def _lines(self, values: Mapping[str, float]) -> Complexes:
         key = tuple(values[name] for name in self._shape)
-        if key not in self._known:
+        if key not in self._cached:
             experiment = scaled(self._model.experiment, self._skin, values)
-            self._known[key] = replace(self._model, experiment=experiment).lines(self._frequency)
-        return self._known[key]
+            self._cached[key] = replace(self._model, experiment=experiment).lines(self._frequency)
+        return self._cached[key]
 
 
 def _scatter(true: TrueResponse, lines: Complexes, frequency_hz: Floats) -> Floats:

@@ -22,19 +22,19 @@ def scaled(experiment: Experiment, skin: str, values: Mapping[str, float]) -> Ex
             parameter: value
             if isinstance(value, str)
             else value * float(np.exp(values.get(f"{skin}/{name}.{parameter}", 0.0)))
-            for parameter, value in of_one.items()
+            for parameter, value in of_effect.items()
         }
-        for name, of_one in experiment.effects.items()
+        for name, of_effect in experiment.effects.items()
     }
     return replace(experiment, skin=changed, effects=effects)
 
 
 def parameters_of_effects(experiment: Experiment, skin: str) -> tuple[str, ...]:
-    """Names of the numbers that the effects have; errors of E and h and the spread have parameters of their own."""
-    own = {"modulus_error", "thickness_error", "sensor_spread"}
+    """Names of the effects' numbers; errors of E and h and the sensor spread have parameters of their own."""
+    of_effects = {"modulus_error", "thickness_error", "sensor_spread"}
     return tuple(
         f"{skin}/{name}.{parameter}"
         for name, values in experiment.effects.items()
         for parameter, value in values.items()
-        if name not in own and not isinstance(value, str)
+        if name not in of_effects and not isinstance(value, str)
     )

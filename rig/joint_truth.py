@@ -1,11 +1,11 @@
-"""The truth about joint campaigns (`joint_truth/1`): what each hides, what changed or departs, and what shows.
+"""The truth about joint campaigns (`joint_truth/1`): what each hides, what changed or departs, and what is visible.
 
-`chi2_gain_alone` is what a hidden thing gains in χ² over a model without it on the FRFs of the last campaign that it
-acts on, `chi2_gain_joint` on everything together; both are expected values. d33 is free there; E is known within 2 % of
-the declared one, h within 1 %, unless their error is hidden besides; E and d33 of skins of one make are tied to their
-population. `chi2_gain_modulus_free` is the joint gain where E is free in any case: whether the thing can be told from
-an error of E. `sd_ln_modulus_frf` and `sd_ln_modulus_joint` are standard deviations of ln E by Fisher's information,
-with the parameters of what is hidden free, and E too.
+`chi2_gain_alone` is the gain in χ² of a hidden effect over a model without it on the FRFs of the last campaign on which
+it acts, `chi2_gain_joint` that on all data; both are expected values. d33 is free; E is known within 2 % of the
+declared value, h within 1 %, unless their error is hidden too; E and d33 of skins of one batch are tied to their
+population. `chi2_gain_modulus_free` is the joint gain with E free in any case: whether the effect can be distinguished
+from an error of E. `sd_ln_modulus_frf` and `sd_ln_modulus_joint` are standard deviations of ln E by Fisher's
+information, with the parameters of hidden effects and E free.
 """
 
 import math
@@ -17,7 +17,7 @@ from rig.joint_fit import deviation, least_chi2
 from rig.joint_hypotheses import hypothesis
 
 SCHEMA = "joint_truth/1"
-SHOWS = 20.0  # χ²
+VISIBLE_CHI2 = 20.0  # χ²
 IDENTIFIABLE = 0.1  # standard deviation of ln E
 
 
@@ -35,9 +35,9 @@ def joint_truth(joint: Joint) -> dict[str, Any]:
 
 
 def that_show(joint: Joint) -> list[Hidden]:
-    """What of the hidden shows in all campaigns together: the `identifiable` of the truth, without the rest of it."""
+    """The hidden effects that are visible in all campaigns together: the `identifiable` of the truth."""
     everything = tuple(range(len(joint.documents)))
-    return [hidden for hidden in joint.hidden if _gain(joint, hidden, everything, curves=True) > SHOWS]
+    return [hidden for hidden in joint.hidden if _gain(joint, hidden, everything, curves=True) > VISIBLE_CHI2]
 
 
 def _document(joint: Joint, number: int) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def _d33(document: JointDocument) -> dict[str, float]:
 
 def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
     everything = tuple(range(len(joint.documents)))
-    alone = _gain(joint, hidden, hidden.documents[-1:], curves=False)
+    gain_of_frfs = _gain(joint, hidden, hidden.documents[-1:], curves=False)
     together = _gain(joint, hidden, everything, curves=True)
     modulus_free = together
     if hidden.effect != "modulus_error":
@@ -86,10 +86,10 @@ def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
         "sensors": list(hidden.sensors) or None,
         "since": hidden.since,
         "departs": joint.documents[hidden.documents[0]].skin if hidden.departs else None,
-        "chi2_gain_alone": _rounded(alone),
+        "chi2_gain_alone": _rounded(gain_of_frfs),
         "chi2_gain_joint": _rounded(together),
         "chi2_gain_modulus_free": _rounded(modulus_free),
-        "identifiable": together > SHOWS,
+        "identifiable": together > VISIBLE_CHI2,
     }
 
 
@@ -122,5 +122,5 @@ def _population(joint: Joint) -> list[dict[str, Any]] | None:
 
 
 def _rounded(value: float) -> float | None:
-    """To four significant digits; None where there is no bound, which JSON cannot hold."""
+    """To four significant digits; None without a bound, which JSON cannot hold."""
     return float(f"{value:.4g}") if math.isfinite(value) else None

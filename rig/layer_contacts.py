@@ -51,12 +51,12 @@ class LayerContacts:
     def at(self, force: Floats) -> "LayerContacts":
         """The same contacts under another force (rows,); cached."""
         key = force.tobytes()
-        if key not in self._others:
-            self._others[key] = LayerContacts(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
-        return self._others[key]
+        if key not in self._by_force:
+            self._by_force[key] = LayerContacts(self.thickness, self.modulus, self.on, self.radius, force, self.dwell)
+        return self._by_force[key]
 
     @cached_property
-    def _others(self) -> dict[bytes, "LayerContacts"]:
+    def _by_force(self) -> dict[bytes, "LayerContacts"]:
         return {}
 
     @cached_property
@@ -114,7 +114,7 @@ class LayerContacts:
 
     @property
     def _relaxed(self) -> Floats:
-        """1/J(t) of the standard linear solid that relaxes as E (1 − g (1 − e^(−t/τ)))."""
+        """1/J(t) of the standard linear solid with relaxation E (1 − g (1 − e^(−t/τ)))."""
         if "contact_creep" not in self.on:
             return np.full(self.force.shape, self.modulus)
         g, tau = (effects.of(self.on, "contact_creep", name) for name in ("fraction", "time_s"))
@@ -149,8 +149,8 @@ class LayerContacts:
         if not self._work:
             return hertz
         plane = self.effective_modulus / (1 - self.layer.poisson_ratio**2)
-        whole = 4 * plane * (alpha * h) ** 3 / (3 * self.radius) / self.force
-        return whole[:, None] * hertz + (1 - whole)[:, None] * np.sinc(np.multiply.outer(alpha, k) / np.pi)
+        total = 4 * plane * (alpha * h) ** 3 / (3 * self.radius) / self.force
+        return total[:, None] * hertz + (1 - total)[:, None] * np.sinc(np.multiply.outer(alpha, k) / np.pi)
 
 
 def stiffening(values: Values, strain: Floats) -> Floats:

@@ -102,8 +102,8 @@ def electrical(on: Mapping[str, Values], preload_n: float) -> list[Filter]:
         chain.append([([1 - amplitude], [1.0]), ([amplitude], [1.0, 2 * damping / natural, 1 / natural**2])])
     if "notch" in on:
         natural, width = (2 * math.pi * effects.of(on, "notch", name) for name in ("hz", "width_hz"))
-        left = effects.of(on, "notch", "left")
-        chain.append([([natural**2, left * width, 1.0], [natural**2, width, 1.0])])
+        remaining = effects.of(on, "notch", "left")
+        chain.append([([natural**2, remaining * width, 1.0], [natural**2, width, 1.0])])
     if "cable_motion" in on:
         natural, amplitude = (
             2 * math.pi * effects.of(on, "cable_motion", "hz"),

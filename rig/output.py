@@ -1,7 +1,7 @@
-"""An experiment's folder: campaign.json, truth.json and, where asked for, the raw recordings with their description.
+"""An experiment's folder: campaign.json, truth.json and optionally the raw recordings with their description.
 
-`recordings.tdms` has a group a recording: load cell and charge amplifier in volts, as LabVIEW writes them; `rig.yaml`
-(`rig/1`) says what the channels are. The amplifier inverts the sign of the charge, as charge amplifiers do.
+`recordings.tdms` has one group per recording: load cell and charge amplifier in volts, as LabVIEW writes them;
+`rig.yaml` (`rig/1`) describes the channels. The amplifier inverts the sign of the charge, as charge amplifiers do.
 """
 
 import json
@@ -37,7 +37,7 @@ _PROPERTIES = {
 def carry_out(experiment: Experiment, folder: Path, *, tdms: bool = False) -> list[Path]:
     """Record the experiment and write its folder; returns the files.
 
-    Raises RigError where an effect or the raw files need what the experiment does not have.
+    Raises RigError if an effect or the raw files need what the experiment lacks.
     """
     if tdms and experiment.drive is None:
         raise RigError("drive", None, "required for raw recordings: lines and curves have no time series")
@@ -65,9 +65,9 @@ def campaign_of_series(response: TrueResponse, series: list[TimeSeries]) -> dict
     drive = response.experiment.drive
     assert drive is not None
     entries = recording_headers(response)
-    for entry, recorded in zip(entries, series, strict=True):
-        entry["sample_rate_hz"] = drive.sample_rate_hz
-        entry["force_n"], entry["charge_pc"] = recorded.force_n.tolist(), recorded.charge_pc.tolist()
+    for header, recorded in zip(entries, series, strict=True):
+        header["sample_rate_hz"] = drive.sample_rate_hz
+        header["force_n"], header["charge_pc"] = recorded.force_n.tolist(), recorded.charge_pc.tolist()
     return campaign_document(response.experiment, entries)
 
 
@@ -82,27 +82,27 @@ def _write_tdms(path: Path, response: TrueResponse, series: list[TimeSeries]) ->
     timing = {"wf_increment": 1 / drive.sample_rate_hz, "wf_start_offset": 0.0, "unit_string": "V"}
     with TdmsWriter(str(path)) as writer:
         writer.write_segment([RootObject({"name": response.experiment.name})])
-        for entry, recorded in zip(recording_headers(response), series, strict=True):
-            stated = {_PROPERTIES[name]: value for name, value in entry.items() if name in _PROPERTIES}
+        for header, recorded in zip(recording_headers(response), series, strict=True):
+            stated = {_PROPERTIES[name]: value for name, value in header.items() if name in _PROPERTIES}
             volts = {
                 "Load cell": recorded.force_n * _VOLTS_PER_NEWTON,
                 "Charge amplifier": -recorded.charge_pc * _MILLIVOLTS_PER_PICOCOULOMB * 1e-3,
             }
             channels = [
-                ChannelObject(entry["id"], name, values.astype(np.float64), timing) for name, values in volts.items()
+                ChannelObject(header["id"], name, values.astype(np.float64), timing) for name, values in volts.items()
             ]
-            writer.write_segment([GroupObject(entry["id"], stated), *channels])
+            writer.write_segment([GroupObject(header["id"], stated), *channels])
     return path
 
 
 def _write_rig(path: Path, response: TrueResponse) -> Path:
-    known = [name for name in recording_headers(response)[0] if name in _PROPERTIES]
+    stated = [name for name in recording_headers(response)[0] if name in _PROPERTIES]
     description = {
         "schema": "rig/1",
         "name": f"virtual rig: {response.experiment.name}"[:200],
         "kind": FRF,
         "skin": {name: value for name, value in skin_document(response.experiment).items() if value is not None},
-        "recording": {"id": {"property": "block"}, **{name: {"property": _PROPERTIES[name]} for name in known}},
+        "recording": {"id": {"property": "block"}, **{name: {"property": _PROPERTIES[name]} for name in stated}},
         "channels": {
             "force_n": {
                 "channel": "Load cell", "unit": "V",

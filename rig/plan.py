@@ -13,8 +13,8 @@ from rig.layer import Floats
 
 @dataclass(frozen=True)
 class Plan:
-    """Arrays over recordings; `offset` is the commanded position from the sensor's centre (rows, 2), `hours` the time
-    since midnight of the first day. What the experiment does not record is None."""
+    """Arrays over recordings; `offset` is the commanded position from the sensor's centre (rows, 2), `hours` the
+    time since midnight of the first day. Quantities that the experiment does not record are None."""
 
     sensor: NDArray[np.intp]
     indenter_mm: Floats

@@ -1,4 +1,4 @@
-"""Reading a description: JSON, or YAML in which dates stay text and 1e-3 is a number, as in JSON."""
+"""Reads a description: JSON, or YAML in which dates stay text and 1e-3 is a number, as in JSON."""
 
 import json
 import re
@@ -14,7 +14,7 @@ class _PlainLoader(yaml.SafeLoader):
 
 _FLOAT = "tag:yaml.org,2002:float"
 _PlainLoader.yaml_implicit_resolvers = {
-    first: [entry for entry in resolvers if entry[0] not in ("tag:yaml.org,2002:timestamp", _FLOAT)]
+    first: [resolver for resolver in resolvers if resolver[0] not in ("tag:yaml.org,2002:timestamp", _FLOAT)]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
 _PlainLoader.add_implicit_resolver(
@@ -23,7 +23,7 @@ _PlainLoader.add_implicit_resolver(
 
 
 def document(path: Path) -> Any:
-    """The file's content; raises ValueError or yaml.YAMLError where it is neither."""
+    """The file's content; raises ValueError or yaml.YAMLError if it is neither."""
     text = path.read_text(encoding="utf-8")
     if text.lstrip().startswith("{"):
         return json.loads(text)

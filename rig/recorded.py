@@ -90,14 +90,14 @@ def mains_pickup(
 
 
 def campaign(recorded: RecordedLines) -> dict[str, Any]:
-    """The campaign (`campaign/1`) of recorded lines, with what the lab knows."""
+    """The campaign (`campaign/1`) of recorded lines, with what the lab knows of them."""
     entries = recording_headers(recorded.response)
-    for row, entry in enumerate(entries):
-        entry["frequency_hz"] = recorded.frequency_hz.tolist()
-        entry["frf_re_pc_per_n"] = _rounded(recorded.measured[row].real)
-        entry["frf_im_pc_per_n"] = _rounded(recorded.measured[row].imag)
+    for row, header in enumerate(entries):
+        header["frequency_hz"] = recorded.frequency_hz.tolist()
+        header["frf_re_pc_per_n"] = _rounded(recorded.measured[row].real)
+        header["frf_im_pc_per_n"] = _rounded(recorded.measured[row].imag)
         if recorded.coherence is not None:
-            entry["coherence"] = np.round(recorded.coherence[row], 8).tolist()
+            header["coherence"] = np.round(recorded.coherence[row], 8).tolist()
     return campaign_document(recorded.response.experiment, entries)
 
 
@@ -113,9 +113,11 @@ def campaign_document(experiment: Experiment, entries: list[dict[str, Any]]) -> 
 def skin_document(experiment: Experiment) -> dict[str, Any]:
     """The skin as the lab declares it, without d33."""
     skin = experiment.skin
-    known = {name: getattr(skin, name) for name in ("id", "width_mm", "length_mm") if getattr(skin, name) is not None}
+    declared = {
+        name: getattr(skin, name) for name in ("id", "width_mm", "length_mm") if getattr(skin, name) is not None
+    }
     return {
-        **known,
+        **declared,
         "thickness_mm": skin.thickness_mm,
         "youngs_modulus_mpa": skin.youngs_modulus_mpa,
         "poisson_ratio": 0.5,
@@ -132,7 +134,7 @@ def recording_headers(response: TrueResponse) -> list[dict[str, Any]]:
     entries = []
     for row, number in enumerate(plan.sensor):
         name, x, y = skin.sensors[number]
-        entry: dict[str, Any] = {
+        header: dict[str, Any] = {
             "id": f"r{row + 1:03d}",
             "sensor": name,
             "indenter_radius_mm": float(plan.indenter_mm[row]),
@@ -140,12 +142,12 @@ def recording_headers(response: TrueResponse) -> list[dict[str, Any]]:
             "dynamic_force_n": float(plan.dynamic_n[row]),
         }
         if times is not None:
-            entry["recorded_at"] = times[row]
+            header["recorded_at"] = times[row]
         if plan.cycles is not None:
-            entry["load_cycles"] = int(plan.cycles[row])
+            header["load_cycles"] = int(plan.cycles[row])
         if plan.dwell_s is not None:
-            entry["dwell_s"] = float(plan.dwell_s[row])
+            header["dwell_s"] = float(plan.dwell_s[row])
         if moved:
-            entry["position_mm"] = [float(x + plan.offset_mm[row, 0]), float(y + plan.offset_mm[row, 1])]
-        entries.append(entry)
+            header["position_mm"] = [float(x + plan.offset_mm[row, 0]), float(y + plan.offset_mm[row, 1])]
+        entries.append(header)
     return entries

@@ -30,7 +30,7 @@ def truth_of_solved(campaign: SolvedCampaign, fineness: float = FINENESS) -> dic
     models = {"base": base_levels(design), "truth": levels(commanded, world, fineness)[0]}
     models["plain_world"] = models["truth"] if world.effect == PLAIN else levels(commanded, World(PLAIN), fineness)[0]
     fitted = {name: fit(campaign, model) for name, model in models.items()}
-    chi2 = {name: found[0] for name, found in fitted.items()}
+    chi2 = {name: fit_of_effect[0] for name, fit_of_effect in fitted.items()}
     return {
         "effect": world.effect,
         "parameters": dict(world.parameters),
@@ -50,14 +50,15 @@ def truth_of_solved(campaign: SolvedCampaign, fineness: float = FINENESS) -> dic
     }
 
 
-def base_levels(design: Design, modulus: float = 0.0, thickness: float = 0.0, place: float = 0.0) -> Floats:
-    """Levels of the base model (rows,) [pC/N] as declared, or with ln E, ln h or the distance over h so much larger."""
+def base_levels(design: Design, modulus: float = 0.0, thickness: float = 0.0, position: float = 0.0) -> Floats:
+    """Levels of the base model (rows,) [pC/N] as declared, or with ln E, ln h or the distance over h increased by
+    these amounts."""
     declared = design.declared
     h = declared.thickness * np.exp(thickness)
     contacts = LayerContacts(
         h, declared.modulus * np.exp(modulus), {}, design.sphere, design.force, np.zeros(len(design.force))
     )
-    distance = np.hypot(*design.offset.T) + place * declared.thickness
+    distance = np.hypot(*design.offset.T) + position * declared.thickness
     sigma = contacts.sigma(declared.sensor_radius, distance)
     return np.asarray(design.d33 * 1.5 * (declared.sensor_radius / h) ** 2 * sigma)
 
@@ -68,7 +69,7 @@ def fit(campaign: SolvedCampaign, model: Floats) -> tuple[float, float]:
     real, _, variance = measured(campaign)
     spread = 1 / np.sum(1 / variance, axis=1)
     mean = np.sum(real / variance, axis=1) * spread
-    ahead, back = (base_levels(design, place=sign * _STEP) for sign in (1, -1))
+    ahead, back = (base_levels(design, position=sign * _STEP) for sign in (1, -1))
     moved = (ahead - back) / (2 * _STEP) / design.declared.thickness * design.noise.position_mm
     weight = 1 / np.sqrt(spread + (design.noise.gain * level) ** 2 + moved**2)
     base = base_levels(design)
@@ -79,5 +80,5 @@ def fit(campaign: SolvedCampaign, model: Floats) -> tuple[float, float]:
     columns = np.column_stack([model, *slopes]) * weight[:, None]
     priors = np.array([[0.0, 1 / _PRIOR_MODULUS, 0.0], [0.0, 0.0, 1 / _PRIOR_THICKNESS]])
     matrix, right = np.vstack([columns, priors]), np.append(mean * weight, [0.0, 0.0])
-    found = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    return float(np.sum((matrix @ found - right) ** 2)), float(found[0] - 1)
+    solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    return float(np.sum((matrix @ solution - right) ** 2)), float(solution[0] - 1)

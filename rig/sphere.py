@@ -112,11 +112,11 @@ def sphere_law(
 def _on_layer(layer: Layer, share: Floats, radius: float, thickness: float, widest: float) -> SphereLaw:
     """From the solution of the layer, in units of its thickness; at its narrowest it is that of the half space."""
     a = np.maximum(share * min(WIDEST, 1.5 * widest / thickness), _NARROWEST)
-    contact, one = sphere_contact(layer), np.ones_like(a)
+    contact, shape = sphere_contact(layer), np.ones_like(a)
     depth = contact.depth(a, radius / thickness, 1.0)
     pull = depth - contact.depth(a, radius / thickness, 1.0, 1.0)
     first = share == 0
     radii, depths, punch = (
         np.where(first, 0.0, column) * thickness for column in (a, depth, contact.stiffness(a, 1.0))
     )
-    return SphereLaw(radii, depths, punch, np.where(first, 0.0, pull) * np.sqrt(thickness), one)
+    return SphereLaw(radii, depths, punch, np.where(first, 0.0, pull) * np.sqrt(thickness), shape)

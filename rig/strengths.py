@@ -1,4 +1,4 @@
-"""Strengths of drawn effects: parameters uniform in their logarithm, from subtle to strong for the experiment."""
+"""Strengths of drawn effects: log-uniform parameters, from subtle to strong for the experiment."""
 
 import math
 from collections.abc import Mapping
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.effects import KNOWN, needed_by_law
+from rig.effects import ALL_EFFECTS, needed_by_law
 
 Ranges = dict[str, dict[str, tuple[float, float]]]
 
@@ -37,9 +37,9 @@ def drawn_parameters(random: np.random.Generator, name: str, ranges: Ranges) -> 
         values[SIGNED[name]] *= -1
     if name in INVERTED and upside_down:
         values["factor"] = 1 / values["factor"]
-    if KNOWN[name].laws:
-        values["law"] = str(random.choice(KNOWN[name].laws))
-        unused = set(KNOWN[name].optional) - set(needed_by_law(name, values))
+    if ALL_EFFECTS[name].laws:
+        values["law"] = str(random.choice(ALL_EFFECTS[name].laws))
+        unused = set(ALL_EFFECTS[name].optional) - set(needed_by_law(name, values))
         values = {parameter: value for parameter, value in values.items() if parameter not in unused}
     if name == "misalignment":
         angle = random.uniform(0, 2 * math.pi)

@@ -92,7 +92,8 @@ def shaker(drive: Drive, rate: float, random: np.random.Generator) -> Floats:
 
 
 def _stepped_sine(drive: Drive, rate: float) -> Floats:
-    """Tones that rise; each has ten cycles and its share of the duration; the phase runs on between them."""
+    """Stepped sine of rising frequency; each tone has ten cycles and its share of the duration; the phase is
+    continuous."""
     tones = np.geomspace(drive.low_hz, drive.high_hz, drive.steps)
     lengths = np.round((_CYCLES_A_STEP / tones + drive.duration_s / drive.steps) * rate).astype(int)
     lengths[0] += round(_RUN_IN_S * rate)
@@ -100,7 +101,8 @@ def _stepped_sine(drive: Drive, rate: float) -> Floats:
 
 
 def _charge(response: TrueResponse, row: int, force: Floats) -> Floats:
-    """Charge under the force about the preload, before the electronics: linear, or along the curve of a moving edge."""
+    """Charge under the force about the preload, before the electronics: linear, or along the curve of a moving
+    contact edge."""
     linear_charge = response.level[row] * force
     mobility = effects.of(response.on, "amplitude_nonlinearity", "mobility")
     if not mobility:

@@ -111,17 +111,17 @@ class TrueResponse:
         With crosstalk those of its neighbours are added, each weighted by its d33 under its own static stress.
         """
         contacts = self.contacts if np.all(factor == 1.0) else self.contacts.at(self.contacts.force * factor)
-        return (self.sensor_weights.weight * self.relative_d33 * self._each_sigma(contacts)).sum(axis=1)
+        return (self.sensor_weights.weight * self.relative_d33 * self._sigma_of_each(contacts)).sum(axis=1)
 
     @cached_property
     def relative_d33(self) -> Floats:
         """d33 of each contributing sensor under its own static stress, over that at rest (rows, sensors)."""
         if "preload_dependent_d33" not in self.on:
             return np.ones_like(self.sensor_weights.weight)
-        stress = 1.5 * self.plan.preload_n[:, None] * self._each_sigma(self.contacts) / (np.pi * self.thickness**2)
+        stress = 1.5 * self.plan.preload_n[:, None] * self._sigma_of_each(self.contacts) / (np.pi * self.thickness**2)
         return under_stress(self.on["preload_dependent_d33"], stress)
 
-    def _each_sigma(self, contacts: LayerContacts) -> Floats:
+    def _sigma_of_each(self, contacts: LayerContacts) -> Floats:
         radius = self.experiment.skin.sensor_radius_mm
         return self.sensor_weights.sigma(contacts.spectrum, self.contact, radius, self.thickness)
 

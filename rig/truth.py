@@ -1,4 +1,5 @@
-"""The truth about a campaign (`truth/1`), in a file of its own: effects, parameters, gains, and whether they show."""
+"""The truth about a campaign (`truth/1`), in a separate file: effects, parameters, gains, and whether they are
+visible."""
 
 import math
 from typing import Any
@@ -46,7 +47,7 @@ def truth_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict
     """`truth_of` with whether each effect, and all of them together, are visible in the curves."""
     overall = visible_curves.visibility(experiment, curves)
     on = tuple(experiment.effects)
-    each = (
+    by_effect = (
         {on[0]: overall}
         if len(on) == 1
         else {
@@ -57,10 +58,11 @@ def truth_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict
     return {
         **truth_of(experiment),
         "identifiable": overall.identifiable if on else True,
-        "every_effect_identifiable": all(one.identifiable for one in each.values()),
+        "every_effect_identifiable": all(visible.identifiable for visible in by_effect.values()),
         "chi2_gain_of_truth": round(overall.chi2_gain, 2),
         "chi2_gain_of_each": {  # None without bound: JSON has no infinity
-            name: round(one.chi2_gain, 2) if math.isfinite(one.chi2_gain) else None for name, one in each.items()
+            name: round(visible.chi2_gain, 2) if math.isfinite(visible.chi2_gain) else None
+            for name, visible in by_effect.items()
         },
         "base_rms_misfit_percent": round(overall.base_misfit_percent, 3),
     }
@@ -73,12 +75,14 @@ def truth_of_lines(recorded: RecordedLines) -> dict[str, Any]:
     """
     overall = visibility(recorded)
     on = tuple(recorded.response.on)
-    each = {name: visibility(recorded, tuple(other for other in on if other != name)).chi2_gain for name in on}
+    gain_by_effect = {
+        name: visibility(recorded, tuple(other for other in on if other != name)).chi2_gain for name in on
+    }
     return {
         **truth_of_response(recorded.response),
         "identifiable": overall.identifiable if on else True,
-        "every_effect_identifiable": all(gain > THRESHOLD for gain in each.values()),
+        "every_effect_identifiable": all(gain > THRESHOLD for gain in gain_by_effect.values()),
         "chi2_gain_of_truth": round(overall.chi2_gain, 2),
-        "chi2_gain_of_each": {name: round(gain, 2) for name, gain in each.items()},
+        "chi2_gain_of_each": {name: round(gain, 2) for name, gain in gain_by_effect.items()},
         "base_rms_misfit_percent": round(overall.base_misfit_percent, 3),
     }

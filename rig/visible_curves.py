@@ -4,7 +4,7 @@ Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compress
 Plain weighted least squares with the rig's own noise refit the modulus, which is free, and what every curve has: its
 zero of displacement z and, of an indentation, its zero of force, a linear drift (in travel where the rig drifts so,
 else in time) and the gain of the cell within its scatter. The truth is refitted alike, but for z. Effects that are
-`known` act in the base model at their true strength, along the recorded displacement.
+`effects_in_model` act in the base model at their true strength, along the recorded displacement.
 
 A factor on E shows as a departure from the declared modulus alone: under modulus_error and compressible_layer, and in
 compression, a declared modulus is known within 2 %.
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rig.contact_course import Body, course
+from rig.contact_course import Body, contact_history
 from rig.curve_fit import Curve, Law, Priors, least_chi2
 from rig.effects import INDENTATION, Values
 from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
@@ -26,7 +26,11 @@ from rig.layer import Floats
 THRESHOLD = 30.0
 _DECLARED = 0.02
 _FACTORS_ON_E = {"modulus_error", "compressible_layer"}
-_SHIFTS = (0.0, -0.2, 0.2)  # starts of z, of the largest displacement; beside known effects the first that has a fit
+_SHIFTS = (
+    0.0,
+    -0.2,
+    0.2,
+)  # starts of z over the largest displacement; with effects in the model the first that has a fit
 _OUT_OF_REACH: tuple[float, list[Floats]] = (np.inf, [])  # of a body that stiffens to infinity before its depth
 _STEP = 1e-4  # of the largest displacement
 _POINTS = 200  # of a course along the recorded displacement
@@ -48,18 +52,20 @@ class Visibility:
         return self.chi2_gain > THRESHOLD
 
 
-def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tuple[str, ...] = ()) -> Visibility:
-    """Visibility of the effects against a model that has only the effects `known`, at their true strength."""
+def visibility(
+    experiment: Experiment, recorded: list[RecordedCurve], effects_in_model: tuple[str, ...] = ()
+) -> Visibility:
+    """Visibility of the effects against a model with only those of `effects_in_model`, at their true strength."""
     design = experiment.curves
     assert design is not None
-    depth, on = design.largest_displacement_mm, {name: experiment.effects[name] for name in known}
+    depth, on = design.largest_displacement_mm, {name: experiment.effects[name] for name in effects_in_model}
     exact, base = [curve.exact_force_n for curve in recorded], _Base(experiment, recorded, on)
     curves = [_Base(experiment, recorded, {}).measured(number) for number in range(len(recorded))]
     priors = base.priors()
     fits: Iterator[tuple[float, list[Floats]]] = (
         least_chi2(base.law(), curves, priors, shift * depth, _STEP * depth) for shift in _SHIFTS
     )
-    if known:
+    if effects_in_model:
         fits = iter([next((fit for fit in fits if np.isfinite(fit[0])), _OUT_OF_REACH)])
     chi2, fitted = min(fits, key=lambda result: result[0])
     if not np.isfinite(chi2):
@@ -71,8 +77,8 @@ def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tup
         0.0,
         _STEP * depth,
     )
-    left = sum(float(np.sum((mine - other) ** 2)) for mine, other in zip(fitted, exact, strict=True))
-    return Visibility(chi2 - true, 100 * float(np.sqrt(left / sum(float(np.sum(force**2)) for force in exact))))
+    misfit = sum(float(np.sum((mine - other) ** 2)) for mine, other in zip(fitted, exact, strict=True))
+    return Visibility(chi2 - true, 100 * float(np.sqrt(misfit / sum(float(np.sum(force**2)) for force in exact))))
 
 
 def force_deviation(design: CurveDesign, slope: Floats, largest_n: float) -> Floats:
@@ -120,7 +126,7 @@ class _Base:
         """Force at ln E over the true modulus and a shift of the zero of displacement."""
         if self.experiment.kind != INDENTATION:
             return self._neo_hookean
-        return self._course if self.on else self._hertz
+        return self._history if self.on else self._hertz
 
     def _displacement(self, number: int, shift: float) -> Floats:
         curve = self.recorded[number]
@@ -130,9 +136,9 @@ class _Base:
         return true_modulus(self.experiment) * float(np.exp(log_modulus))
 
     def _neo_hookean(self, number: int, log_modulus: float, shift: float) -> Floats:
-        entry = self.recorded[number].entry
-        area = np.pi / 4 * entry["sample_diameter_mm"] ** 2
-        stretch = np.maximum(1 - self._displacement(number, shift) / entry["sample_height_mm"], _LEAST_STRETCH)
+        recording = self.recorded[number].entry
+        area = np.pi / 4 * recording["sample_diameter_mm"] ** 2
+        stretch = np.maximum(1 - self._displacement(number, shift) / recording["sample_height_mm"], _LEAST_STRETCH)
         return self._modulus(log_modulus) * area * (stretch**-2 - stretch) / 3
 
     def _hertz(self, number: int, log_modulus: float, shift: float) -> Floats:
@@ -146,11 +152,9 @@ class _Base:
             self.bodies[radius] = pressed_body(self.experiment, self.on, radius, 1.2 * deepest)
         return self.bodies[radius]
 
-    def _course(self, number: int, log_modulus: float, shift: float) -> Floats:
-        """Force of the known effects, calculated at some samples and at those beside a jump.
-
-        Infinite beyond the rig's laws.
-        """
+    def _history(self, number: int, log_modulus: float, shift: float) -> Floats:
+        """Force of the effects in the model, calculated at some samples and at those next to a jump. Infinite beyond
+        the rig's laws."""
         displacement, curve = self._displacement(number, shift), self.recorded[number]
         radius = curve.entry["indenter_radius_mm"]
         body = replace(self._body(radius), modulus=self._modulus(log_modulus))
@@ -158,7 +162,7 @@ class _Base:
         even = np.linspace(0, len(displacement) - 1, min(_POINTS, len(displacement))).astype(int)
         at = np.unique(np.concatenate([even, jumps, jumps + 1]))
         try:
-            _, force = course(body, curve.time_s[at], displacement[at], frame_compliance(self.on))
+            _, force = contact_history(body, curve.time_s[at], displacement[at], frame_compliance(self.on))
         except RigError:  # a step of the fit that went far astray, which is then rejected
             return np.full(len(displacement), np.inf)
         return np.interp(np.arange(len(displacement)), at, force)

@@ -1,4 +1,4 @@
-"""Whitens values whose covariance is a diagonal and a few directions in each row."""
+"""Whitens values whose covariance is diagonal plus a few directions in each row."""
 
 import numpy as np
 

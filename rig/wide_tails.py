@@ -1,6 +1,7 @@
-"""Wider tails than `rig.draw` has: scatter of gain and position, few sensors, and strengths from faint to extreme.
+"""Wider distributions than those of `rig.draw`: scatter of gain and position, few sensors, and strengths from faint
+to extreme.
 
-For tests of what priors of a diagnosis make of rigs and effects that they hardly expect.
+For tests of the priors of a diagnosis on rigs and effects that they hardly expect.
 """
 
 import math

@@ -27,9 +27,9 @@ from rig.strengths import drawn_parameters, evenly_in_log, of_frf
 _ERROR = "modulus_error"
 _FACTORS = (2.0, 4.0)
 _KINDS = {FRF: 0.5, COMPRESSION: 0.25, INDENTATION: 0.25}
-_BESIDE = (*COMPANIONS, "adhesion", "contact_creep")
+_COMPANIONS = (*COMPANIONS, "adhesion", "contact_creep")
 _COMPANY = 0.35
-_HARD = 0.5  # share of the draws with loads up to what the skin bears
+_HARD = 0.5  # share of the draws with loads up to the limit of the skin
 _WIDEST, _HARDEST = 2.9, 0.09  # a/h and L that it bears
 
 
@@ -66,13 +66,15 @@ def drawn_wrong_modulus(seed: int, number: int) -> tuple[dict[str, Any], dict[st
 
 def _drawn(random: np.random.Generator, name: str, skin: str) -> Joint:
     kind = str(random.choice(list(_KINDS), p=list(_KINDS.values())))
-    names = {_ERROR} | ({str(random.choice(_BESIDE))} if random.random() < _COMPANY else set())
+    names = {_ERROR} | ({str(random.choice(_COMPANIONS))} if random.random() < _COMPANY else set())
     description = frf_description(random, name, skin, names)
     if random.random() < _HARD:
         _press_harder(random, description)
     ranges = of_frf(description)
     factor = evenly_in_log(random, *_FACTORS) ** float(random.choice([-1, 1]))
-    effects = {one: drawn_parameters(random, one, ranges) for one in sorted(names)} | {_ERROR: {"factor": factor}}
+    effects = {effect: drawn_parameters(random, effect, ranges) for effect in sorted(names)} | {
+        _ERROR: {"factor": factor}
+    }
     declared = float(f"{description['skin']['youngs_modulus_mpa'] / factor:.3g}")
     true = description["skin"] | {"youngs_modulus_mpa": declared * factor}
     description["skin"]["youngs_modulus_mpa"] = declared
@@ -85,7 +87,7 @@ def _drawn(random: np.random.Generator, name: str, skin: str) -> Joint:
         together |= pressed.effects  # those of curves may have more parameters
     gains = tuple(float(gain) for gain in lines.response.sensor_gains)
     hidden = [
-        Hidden(one, values, gains=gains if one == "sensor_spread" else ()) for one, values in together.items()
+        Hidden(effect, values, gains=gains if effect == "sensor_spread" else ()) for effect, values in together.items()
     ]  # fmt: skip
     return Joint(name, kind, (JointDocument(lines, curves),), tuple(hidden))
 

@@ -93,7 +93,7 @@ def _described() -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def _models(kind: type[BaseModel]) -> list[type[BaseModel]]:
-    return [model for own in kind.__subclasses__() for model in (own, *_models(own))]
+    return [model for subclass in kind.__subclasses__() for model in (subclass, *_models(subclass))]
 
 
 def _in_order(schemas: Mapping[str, Any], homes: Mapping[str, str]) -> list[str]:
@@ -103,9 +103,9 @@ def _in_order(schemas: Mapping[str, Any], homes: Mapping[str, str]) -> list[str]
     def add(name: str) -> None:
         if name in order or name not in schemas:
             return
-        for other in _references(schemas[name]):
-            if homes.get(other) == homes[name]:
-                add(other)
+        for reference in _references(schemas[name]):
+            if homes.get(reference) == homes[name]:
+                add(reference)
         order.append(name)
 
     for name in schemas:
@@ -115,27 +115,29 @@ def _in_order(schemas: Mapping[str, Any], homes: Mapping[str, str]) -> list[str]
 
 def _references(schema: Any) -> list[str]:
     if isinstance(schema, dict):
-        own = [schema["$ref"].rsplit("/", 1)[1]] if "$ref" in schema else []
-        return own + [name for value in schema.values() for name in _references(value)]
+        references = [schema["$ref"].rsplit("/", 1)[1]] if "$ref" in schema else []
+        return references + [name for value in schema.values() for name in _references(value)]
     return [name for value in schema for name in _references(value)] if isinstance(schema, list) else []
 
 
 def _class(name: str, schemas: Mapping[str, Any], homes: Mapping[str, str], module: _Module) -> str:
     schema = schemas[name]
-    module.uses |= {other for other in _references(schema) if other in schemas and homes[other] != module.name}
+    module.uses |= {
+        reference for reference in _references(schema) if reference in schemas and homes[reference] != module.name
+    }
     lines = [
         "@dataclass(frozen=True, eq=False, kw_only=True)",
         f"class {name}(Document):",
         f'    """{schema["description"]}"""',
     ]
-    for own, entry in schema["properties"].items():
-        if hasattr(Document, own):
-            raise ValueError(f"{name}.{own}: is the name of something that every document has")
-        hint = _hint(entry, schemas)
-        if own not in schema.get("required", ()) and "None" not in hint.split(" | "):
+    for member, property_schema in schema["properties"].items():
+        if hasattr(Document, member):
+            raise ValueError(f"{name}.{member}: is the name of something that every document has")
+        hint = _hint(property_schema, schemas)
+        if member not in schema.get("required", ()) and "None" not in hint.split(" | "):
             hint += " | None"
-        said = entry.get("description") or schemas[_references(entry)[0]]["description"]
-        lines += ["", f"    {own}: {hint}", *textwrap.wrap(f'"""{said}"""', 116, initial_indent=" " * 4,
+        description = property_schema.get("description") or schemas[_references(property_schema)[0]]["description"]
+        lines += ["", f"    {member}: {hint}", *textwrap.wrap(f'"""{description}"""', 116, initial_indent=" " * 4,
                                                              subsequent_indent=" " * 4)]  # fmt: skip
     return "\n".join(lines)
 
@@ -148,7 +150,7 @@ def _hint(schema: Mapping[str, Any], schemas: Mapping[str, Any]) -> str:
     if "allOf" in schema:
         return _hint(schema["allOf"][0], schemas)
     if "anyOf" in schema:
-        return " | ".join(dict.fromkeys(_hint(one, schemas) for one in schema["anyOf"]))
+        return " | ".join(dict.fromkeys(_hint(alternative, schemas) for alternative in schema["anyOf"]))
     if "const" in schema or "enum" in schema:
         return f"Literal[{', '.join(map(repr, schema.get('enum', [schema.get('const')])))}]"
     match schema.get("type"):

@@ -48,20 +48,20 @@ def main() -> None:
     """Print the table."""
     modules = {_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in LIBRARY.rglob("*.py")}
     lines = {_name(path): len(path.read_text(encoding="utf-8").splitlines()) for path in LIBRARY.rglob("*.py")}
-    kept = [name for name in modules if not name.startswith(CATALOGUE)]
+    counted = [name for name in modules if not name.startswith(CATALOGUE)]
     engine = [name for name in modules if name.startswith(ENGINE) and not name.startswith(SLIPS)]
     circles = import_circles(modules)
     split = split_classes(modules)
     rows = [
         ("`underskin`: files, lines", f"{len(modules)}, {sum(lines.values()):,}"),
-        ("without the catalogue", f"{len(kept)}, {sum(lines[name] for name in kept):,}"),
+        ("without the catalogue", f"{len(counted)}, {sum(lines[name] for name in counted):,}"),
         ("diagnosis and inference without slips", f"{len(engine)}, {sum(lines[name] for name in engine):,}"),
         ("numeric module constants, of these", f"{sum(map(constants, (modules[name] for name in engine)))}"),
         ("numeric module constants in the diagnosis, slips included",
          f"{sum(constants(tree) for name, tree in modules.items() if name.startswith(ENGINE))}"),
         ("branches on the kind of recording", f"{sum(map(kind_branches, modules.values()))}"),
         ("files on the path of an FRF line, CSV to verdict", f"{len(passed_files())}"),
-        ("circles of imports", " · ".join(" ↔ ".join(one) for one in circles) or "0"),
+        ("circles of imports", " · ".join(" ↔ ".join(circle) for circle in circles) or "0"),
         ("classes over several files", f"{len(split)}: {', '.join(split)}" if split else "0"),
     ]  # fmt: skip
     print("| | |\n|---|---|")
@@ -81,10 +81,10 @@ def constants(tree: ast.Module) -> int:
             node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
         )
         value = getattr(node, "value", None)
-        if value is None or not any(_is_number(one) for one in ast.walk(value)):
+        if value is None or not any(_is_number(target) for target in ast.walk(value)):
             continue
-        names = chain.from_iterable(one.elts if isinstance(one, ast.Tuple) else [one] for one in targets)
-        count += sum(isinstance(one, ast.Name) and one.id == one.id.upper() for one in names)
+        names = chain.from_iterable(target.elts if isinstance(target, ast.Tuple) else [target] for target in targets)
+        count += sum(isinstance(target, ast.Name) and target.id == target.id.upper() for target in names)
     return count
 
 
@@ -104,7 +104,7 @@ def kind_branches(tree: ast.Module) -> int:
     indirect = [
         test
         for test in conditions
-        if any(_is_kind(one) for one in ast.walk(test)) and not any(_compares_kinds(one) for one in ast.walk(test))
+        if any(_is_kind(part) for part in ast.walk(test)) and not any(_compares_kinds(part) for part in ast.walk(test))
     ]
     return len(direct) + len(indirect)
 
@@ -134,9 +134,12 @@ def passed_files() -> list[str]:
 
 def import_circles(modules: Mapping[str, ast.Module]) -> list[list[str]]:
     """Groups of modules that import one another, wherever in the file the import is, for type checking too."""
-    known = {_dotted(name): name for name in modules}
+    file_of_module = {_dotted(name): name for name in modules}
     graph = {
-        name: {known[one] for one in _imported(tree, known) if known[one] != name} for name, tree in modules.items()
+        name: {
+            file_of_module[imported] for imported in _imported(tree, file_of_module) if file_of_module[imported] != name
+        }
+        for name, tree in modules.items()
     }
     groups = [sorted(group) for group in _strongly_connected(graph) if len(group) > 1]
     return sorted(groups)
@@ -146,15 +149,15 @@ def _dotted(name: str) -> str:
     return ".".join(("underskin", *Path(name).with_suffix("").parts)).removesuffix(".__init__")
 
 
-def _imported(tree: ast.Module, known: Mapping[str, str]) -> Iterator[str]:
+def _imported(tree: ast.Module, modules: Mapping[str, str]) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in known)
+            yield from (alias.name for alias in node.names if alias.name in modules)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
             for alias in node.names:
                 name = f"{node.module}.{alias.name}"
-                if name in known or node.module in known:
-                    yield name if name in known else node.module
+                if name in modules or node.module in modules:
+                    yield name if name in modules else node.module
 
 
 def _strongly_connected(graph: Mapping[str, Iterable[str]]) -> list[list[str]]:
@@ -167,16 +170,16 @@ def _strongly_connected(graph: Mapping[str, Iterable[str]]) -> list[list[str]]:
     def visit(node: str) -> None:
         order[node] = lowest[node] = len(order)
         stack.append(node)
-        for other in graph[node]:
-            if other not in order:
-                visit(other)
-                lowest[node] = min(lowest[node], lowest[other])
-            elif other in stack:
-                lowest[node] = min(lowest[node], order[other])
+        for neighbour in graph[node]:
+            if neighbour not in order:
+                visit(neighbour)
+                lowest[node] = min(lowest[node], lowest[neighbour])
+            elif neighbour in stack:
+                lowest[node] = min(lowest[node], order[neighbour])
         if lowest[node] == order[node]:
-            place = stack.index(node)
-            groups.append(stack[place:])
-            del stack[place:]
+            index = stack.index(node)
+            groups.append(stack[index:])
+            del stack[index:]
 
     sys.setrecursionlimit(10_000)
     for node in graph:

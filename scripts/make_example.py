@@ -73,8 +73,8 @@ def rounded(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.{_DIGITS}g}")
     if isinstance(value, list):
-        return [rounded(entry) for entry in value]
-    return {name: rounded(entry) for name, entry in value.items()} if isinstance(value, dict) else value
+        return [rounded(item) for item in value]
+    return {name: rounded(item) for name, item in value.items()} if isinstance(value, dict) else value
 
 
 if __name__ == "__main__":

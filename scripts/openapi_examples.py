@@ -64,12 +64,16 @@ class Walk:
         answer = self.http.request(method, path.format(**options), json=body, params=params)
         if not answer.is_success:
             raise RuntimeError(f"{method} {path}: {answer.status_code} {answer.text}")
-        own = answer.json() if answer.headers["content-type"] == "application/json" else None
+        answer_document = answer.json() if answer.headers["content-type"] == "application/json" else None
         if kept:
-            asked = {} if body is None else {"request": body}
-            given = {**options, **params}
-            self.examples[operation] = {**({"given": given} if given else {}), **asked, "answer": own}
-        return own
+            request = {} if body is None else {"request": body}
+            parameters = {**options, **params}
+            self.examples[operation] = {
+                **({"given": parameters} if parameters else {}),
+                **request,
+                "answer": answer_document,
+            }
+        return answer_document
 
     def columns(self, operation: str, path: str, body: dict[str, Any]) -> None:
         """As `ask`, with the same answer as CSV."""
@@ -91,7 +95,7 @@ def walk(http: httpx.Client) -> dict[str, dict[str, Any]]:
     _umbridge(walked)
     _campaigns(walked)
     _diagnoses(walked)
-    return {name: _stable(one) for name, one in sorted(walked.examples.items())}
+    return {name: _stable(example) for name, example in sorted(walked.examples.items())}
 
 
 def _calculations(walked: Walk) -> None:
@@ -124,14 +128,14 @@ def _mechanisms(walked: Walk) -> None:
 def _umbridge(walked: Walk) -> None:
     model: dict[str, Any] = {"name": "sigma", "config": {}}
     at = {**model, "input": [[0.3, 0.6, 0.01]]}
-    place = {**at, "outWrt": 0, "inWrt": 0}
+    derivative = {**at, "outWrt": 0, "inWrt": 0}
     walked.ask("umbridge_info", "GET", "/umbridge/Info")
     walked.ask("umbridge_model_info", "POST", "/umbridge/ModelInfo", model)
     walked.ask("umbridge_input_sizes", "POST", "/umbridge/InputSizes", model)
     walked.ask("umbridge_output_sizes", "POST", "/umbridge/OutputSizes", model)
     walked.ask("umbridge_evaluate", "POST", "/umbridge/Evaluate", at)
-    walked.ask("umbridge_gradient", "POST", "/umbridge/Gradient", {**place, "sens": [1.0]})
-    walked.ask("umbridge_apply_jacobian", "POST", "/umbridge/ApplyJacobian", {**place, "vec": [1.0, 0.0, 0.0]})
+    walked.ask("umbridge_gradient", "POST", "/umbridge/Gradient", {**derivative, "sens": [1.0]})
+    walked.ask("umbridge_apply_jacobian", "POST", "/umbridge/ApplyJacobian", {**derivative, "vec": [1.0, 0.0, 0.0]})
     walked.problem("umbridge_problem", "/umbridge/ApplyHessian", model)
     walked.examples["umbridge_apply_hessian"] = {"request": model}  # which these models do not support
 
@@ -139,7 +143,7 @@ def _umbridge(walked: Walk) -> None:
 def _campaigns(walked: Walk) -> None:
     of_campaign = "/v1/campaigns/{campaign_id}"
     sent = walked.ask("post_campaigns", "POST", "/v1/campaigns", campaigns.EXAMPLE)
-    other = walked.ask(
+    second = walked.ask(
         "", "POST", "/v1/campaigns", {**campaigns.EXAMPLE, "name": "another"}, kept=False, params={"skin": "palm-3b"}
     )
     walked.ask("campaigns", "GET", "/v1/campaigns", params={"skin": sent["skin_id"]})
@@ -154,8 +158,8 @@ def _campaigns(walked: Walk) -> None:
     walked.ask("campaign", "GET", of_campaign, campaign_id=sent["id"])
     walked.ask("skin_history", "GET", "/v1/skins/{skin_id}/history", skin_id=sent["skin_id"])
     withdrawn = {"reason": "recorded with the wrong sphere"}
-    walked.ask("withdraw_campaign", "POST", f"{of_campaign}/withdraw", withdrawn, campaign_id=other["id"])
-    _annotated(walked, sent["id"], other["skin_id"])
+    walked.ask("withdraw_campaign", "POST", f"{of_campaign}/withdraw", withdrawn, campaign_id=second["id"])
+    _annotated(walked, sent["id"], second["skin_id"])
 
 
 def _annotated(walked: Walk, campaign_id: str, skin_id: str) -> None:
@@ -186,8 +190,8 @@ def _diagnoses(walked: Walk) -> None:
     diagnosed = walked.examples["diagnose_campaign"]["answer"]["id"]
     while walked.ask("diagnosis", "GET", "/v1/diagnoses/{diagnosis_id}", diagnosis_id=diagnosed)["state"] != "done":
         time.sleep(0.1)
-    one = {"diagnosis_id": diagnosed}
-    walked.ask("adopt_model", "POST", "/v1/skins/{skin_id}/model", one, skin_id=skins[0])
+    of_diagnosis = {"diagnosis_id": diagnosed}
+    walked.ask("adopt_model", "POST", "/v1/skins/{skin_id}/model", of_diagnosis, skin_id=skins[0])
     walked.ask("skin_model", "GET", "/v1/skins/{skin_id}/model", skin_id=skins[0])
     reason = {"reason": "the tip was changed"}
     walked.ask("withdraw_model", "DELETE", "/v1/skins/{skin_id}/model", params=reason, skin_id=skins[0])
@@ -209,8 +213,8 @@ def _stable(example: dict[str, Any]) -> dict[str, Any]:
     """With ids and times that are the same in every run."""
     numbers: dict[str, str] = {}
 
-    def numbered(found: re.Match[str]) -> str:
-        return numbers.setdefault(found[0], f"{found[1]}-{len(numbers) + 1:016x}")
+    def numbered(match: re.Match[str]) -> str:
+        return numbers.setdefault(match[0], f"{match[1]}-{len(numbers) + 1:016x}")
 
     text = _TODAY.sub("2026-01-05T09:00:00Z", _ID.sub(numbered, orjson.dumps(example).decode()))
     stable: dict[str, Any] = orjson.loads(_REQUEST.sub("000000000000-1", text))

@@ -91,13 +91,13 @@ def copy(stage: Stage, arguments: str, context: Path, stages: dict[str, Stage]) 
     *sources, target = words
     for source in sources:
         origin = source_root / source.lstrip("/")
-        place = stage.inside(target)
+        destination = stage.inside(target)
         if origin.is_dir():
-            shutil.copytree(origin, place, symlinks=True, dirs_exist_ok=True)
+            shutil.copytree(origin, destination, symlinks=True, dirs_exist_ok=True)
         else:
-            place = place / origin.name if target.endswith("/") else place
-            place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(origin, place)
+            destination = destination / origin.name if target.endswith("/") else destination
+            destination.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(origin, destination)
 
 
 def build(work: Path) -> Stage:

@@ -1,4 +1,4 @@
-"""What routes and pages are given, as annotated types."""
+"""Dependencies of routes and pages, as annotated types."""
 
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
@@ -46,7 +46,7 @@ SkinId = Annotated[str, Path(description="Id of a skin.")]
 
 
 def authorised(scopes: SecurityScopes, request: Request) -> None:
-    """Refuses a key of too narrow a scope; that there is a key, where one is needed, was checked before."""
+    """Rejects a key of too narrow a scope; whether a key is required was checked before."""
     key: Key | None = request.scope["key"]
     if key is not None and "write" in scopes.scopes and key.scope != "write":
         raise Refusal(

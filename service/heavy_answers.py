@@ -1,4 +1,4 @@
-"""Answers that take long to compute: a few at a time, the others wait in turn without a thread."""
+"""Answers that take long to compute: a few at a time; the others wait without occupying a thread."""
 
 import asyncio
 import functools
@@ -8,20 +8,20 @@ from typing import ParamSpec, TypeVar
 _AT_ONCE = asyncio.Semaphore(4)
 
 _Answer = TypeVar("_Answer")
-_Asked = ParamSpec("_Asked")
+_Parameters = ParamSpec("_Parameters")
 
 
 async def in_turn(work: Callable[[], _Answer]) -> _Answer:
-    """What `work` answers, in a thread beside the event loop."""
+    """The result of `work`, computed in a thread outside the event loop."""
     async with _AT_ONCE:
         return await asyncio.to_thread(work)
 
 
-def each_in_turn(endpoint: Callable[_Asked, _Answer]) -> Callable[_Asked, Awaitable[_Answer]]:
+def computed_in_turn(endpoint: Callable[_Parameters, _Answer]) -> Callable[_Parameters, Awaitable[_Answer]]:
     """An endpoint that answers the same `in_turn`; `inspect.unwrap` gives the endpoint back."""
 
     @functools.wraps(endpoint)
-    async def answer(*arguments: _Asked.args, **values: _Asked.kwargs) -> _Answer:
+    async def answer(*arguments: _Parameters.args, **values: _Parameters.kwargs) -> _Answer:
         return await in_turn(functools.partial(endpoint, *arguments, **values))
 
     return answer

@@ -1,4 +1,4 @@
-"""The log: one JSON object a line on stderr, in which no API key is readable."""
+"""The log: one JSON object per line on stderr, without API keys."""
 
 import logging
 import re
@@ -9,16 +9,16 @@ from typing import Any
 
 import orjson
 
-KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
+KEY = re.compile(r"us_[\w-]{16,}")  # a text that looks like a key, wherever it is
 
 
 def without_keys(text: str) -> str:
-    """A text in which nothing looks like an API key."""
+    """A text with everything that looks like an API key removed."""
     return KEY.sub("us_…", text)
 
 
 def first_line(reason: object) -> str:
-    """Of an error in words, which may have more lines, as what a database's driver says has; else its kind."""
+    """The first line of an error's message (database drivers write several); if empty, its class."""
     return next(iter(str(reason).splitlines()), type(reason).__name__)
 
 
@@ -47,7 +47,7 @@ def configure_logging() -> None:
 
 
 class LastingFailure:
-    """Logs a failure that repeats while its cause lasts once; of several threads that have one cause, such as a store
+    """Logs a repeating failure once per cause and duration; shared by threads with the same cause, such as a store
     that does not answer."""
 
     def __init__(self, logger: logging.Logger) -> None:
@@ -56,16 +56,16 @@ class LastingFailure:
         self._logged: set[tuple[str, type[Exception]]] = set()
 
     def log(self, what: str, error: Exception) -> None:
-        """Warn, unless an error of this kind kept from the same since the last success."""
+        """Warn, unless an error of this kind was logged since the last success."""
         kind = (what, type(error))
         with self._lock:
-            known = kind in self._logged
+            is_logged = kind in self._logged
             self._logged.add(kind)
-        if not known:
+        if not is_logged:
             self._logger.warning("%s: %s", what, error)
 
     def is_over(self) -> None:
-        """Say that it works again, where it had failed."""
+        """Log that it works again if it had failed."""
         with self._lock:
             failed = bool(self._logged)
             self._logged.clear()

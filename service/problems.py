@@ -15,7 +15,7 @@ from underskin.errors import ErrorCode, InvalidInput
 from underskin.several_errors import SeveralInvalid
 
 _MOST_LOGGED = 3
-_MOST_TOLD = 100  # errors of one body
+_MOST_LISTED_ERRORS = 100  # errors of one body
 _MOST_FIELDS = 200  # of one body: no request has a quarter of them, and each unknown one is an error
 RETRY_LATER = {"Retry-After": "5"}  # seconds
 MEDIA_TYPE = "application/problem+json"
@@ -65,11 +65,11 @@ class Refusal(Exception):
         super().__init__(detail)
 
     def status_for(self, path: str) -> int:
-        """Status of the answer to `path`: UM-Bridge knows 400 only for what is wrong with a request's content."""
+        """Status of the answer to `path`: UM-Bridge knows only 400 for invalid content."""
         return 400 if self.status == 422 and _is_umbridge(path) else self.status
 
     def in_log(self) -> str | None:
-        """What the log says of it: the refused fields and what is allowed, never what came, which may be a secret."""
+        """For the log: the rejected fields and what is allowed, never the values, which may be secret."""
         if self.status < HTTPStatus.BAD_REQUEST:
             return None
         if not self.errors:
@@ -83,7 +83,7 @@ class Refusal(Exception):
         return "application/json" if _is_umbridge(path) else MEDIA_TYPE
 
     def body(self, path: str, request_id: str) -> bytes:
-        """The problem document, or under /umbridge what that protocol says instead."""
+        """The problem document, or UM-Bridge's own form under /umbridge."""
         if _is_umbridge(path):
             error = {"type": self.title.title().replace(" ", ""), "message": self.detail}
             return orjson.dumps({"error": error})
@@ -113,9 +113,9 @@ def _is_umbridge(path: str) -> bool:
 
 
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
-    """The problem of values that cannot be used, of which the first hundred are told: 422."""
+    """The problem of invalid values, of which the first hundred are listed: 422."""
     remaining = iter(errors)
-    shortened = [_shortened(error) for error in islice(remaining, _MOST_TOLD)]
+    shortened = [_shortened(error) for error in islice(remaining, _MOST_LISTED_ERRORS)]
     more = sum(1 for _ in remaining)
     entries = [
         {
@@ -137,16 +137,16 @@ def _shortened(error: InvalidInput) -> InvalidInput:
     )
 
 
-def given_twice(field: str, place: str) -> Refusal:
-    """The problem of a key that comes again in its JSON object, at `place`: 422."""
+def given_twice(field: str, part: str) -> Refusal:
+    """The problem of a repeated key in a JSON object, at `part`: 422."""
     name = _brief(field)
-    allowed = f"is given twice: must be given once in its object; it comes again at {place}"
+    allowed = f"is given twice: must be given once in its object; it comes again at {part}"
     error = {"code": str(ErrorCode.NOT_UNIQUE), "field": name, "index": None, "value": None, "allowed": allowed}
     return Refusal(422, f"{name} {allowed}", title="Invalid input", errors=[error])
 
 
 def unexpected() -> Refusal:
-    """The problem of an error that nobody foresaw: 500."""
+    """The problem of an unexpected error: 500."""
     return Refusal(500, "Something went wrong in the server; its log has the request's id.")
 
 
@@ -169,38 +169,38 @@ def _listed(errors: ValidationError | Sequence[Any]) -> Iterator[InvalidInput]:
     return map(_as_invalid_input, details)
 
 
-def _guessed(error: InvalidInput, known: Collection[str]) -> InvalidInput:
-    """The error; of an unknown field with the one that was probably meant."""
-    unknown = error.code == ErrorCode.UNKNOWN_FIELD and error.field not in known
-    close = _nearest(error.field, known) if unknown else None
+def _guessed(error: InvalidInput, names: Collection[str]) -> InvalidInput:
+    """The error; for an unknown field with the most similar known one."""
+    unknown = error.code == ErrorCode.UNKNOWN_FIELD and error.field not in names
+    close = _nearest(error.field, names) if unknown else None
     if close is None:
         return error
     return InvalidInput(error.field, error.value, f"{error.allowed}; did you mean {close}?", code=error.code)
 
 
-def _nearest(name: str, known: Collection[str]) -> str | None:
-    return next(iter(get_close_matches(name.lower(), known, n=1)), None)
+def _nearest(name: str, names: Collection[str]) -> str | None:
+    return next(iter(get_close_matches(name.lower(), names, n=1)), None)
 
 
 def validated(kind: type[_Model], document: Any) -> _Model:
-    """The model of a document; raises Refusal with all that is wrong."""
+    """The model of a document; raises Refusal with all errors."""
     require_few_fields(document)
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        raise invalid_input(_guessed(one, kind.model_fields) for one in _listed(error)) from None
+        raise invalid_input(_guessed(error_of_field, kind.model_fields) for error_of_field in _listed(error)) from None
 
 
 def parsed(kind: type[_Model], document: Any) -> _Model:
-    """The model of a document; raises SeveralInvalid with all that is wrong."""
+    """The model of a document; raises SeveralInvalid with all errors."""
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        raise SeveralInvalid([_shortened(one) for one in _listed(error)]) from None
+        raise SeveralInvalid([_shortened(error_of_field) for error_of_field in _listed(error)]) from None
 
 
 # Of pydantic's errors the code and, where a lab's words are clearer than pydantic's, those.
-_KNOWN = {
+_CODES = {
     "greater_than": (ErrorCode.OUT_OF_RANGE, ""),
     "greater_than_equal": (ErrorCode.OUT_OF_RANGE, "must be at least {ge:g}"),
     "less_than": (ErrorCode.OUT_OF_RANGE, ""),
@@ -220,11 +220,11 @@ _NOT_FIELDS = {"body", "query", "scalar", "column"}
 
 
 def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
-    place = [part for part in detail["loc"] if part not in _NOT_FIELDS]
-    names = [part for part in place if isinstance(part, str)]
-    indices = [part for part in place if isinstance(part, int)]
+    path = [part for part in detail["loc"] if part not in _NOT_FIELDS]
+    names = [part for part in path if isinstance(part, str)]
+    indices = [part for part in path if isinstance(part, int)]
     message = str(detail["msg"])
-    code, words = _KNOWN.get(detail["type"], (ErrorCode.INVALID_VALUE, ""))
+    code, words = _CODES.get(detail["type"], (ErrorCode.INVALID_VALUE, ""))
     if detail["type"] == "too_short" and detail["ctx"]["min_length"] > 1:
         words = f"must have at least {detail['ctx']['min_length']} entries"
     return InvalidInput(
@@ -237,7 +237,7 @@ def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
 
 
 def _brief(value: Any) -> Any:
-    """A refused value in few words: a whole batch may have been sent where a number belongs."""
+    """A rejected value, shortened: a whole batch may have been sent in place of a number."""
     if isinstance(value, int) and abs(value) >= 2**53:
         return "a very large integer"
     if value is None or isinstance(value, int | float):
@@ -255,12 +255,12 @@ def _in_json(value: Any) -> Any:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def unknown_name(name: str, value: str, known: Collection[str], noun: str) -> InvalidInput:
-    """The error of a name that is none of those `known`; `noun`: what such a name is, such as a query parameter."""
-    if not known:
+def unknown_name(name: str, value: str, names: Collection[str], noun: str) -> InvalidInput:
+    """The error of a name that is none of those `names`; `noun`: what such a name is, such as a query parameter."""
+    if not names:
         words = ", which has none"
     else:
-        close = _nearest(name, known)
+        close = _nearest(name, names)
         guess = f"; did you mean {close}?" if close else "."
-        words = f"{guess} Known: {', '.join(known)}"
+        words = f"{guess} Known: {', '.join(names)}"
     return InvalidInput(name, value, f"is not a {noun} of this request{words}", code=ErrorCode.UNKNOWN_FIELD)

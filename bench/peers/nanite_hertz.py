@@ -28,8 +28,8 @@ def fitted(curve: dict[str, Any]) -> dict[str, float]:
         fits.append(lmfit.minimize(residuals, parameters))
     best = min(fits, key=lambda fit: float((fit.residual**2).sum()))
     values = best.params.valuesdict()
-    left = float((best.residual**2).sum())
-    return {"youngs_modulus_pa": values["E"], "contact_point_m": values["contact_point"], "left_n2": left}
+    squares = float((best.residual**2).sum())
+    return {"youngs_modulus_pa": values["E"], "contact_point_m": values["contact_point"], "left_n2": squares}
 
 
 json.dump([fitted(curve) for curve in json.load(sys.stdin)], sys.stdout)

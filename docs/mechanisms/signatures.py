@@ -1,7 +1,7 @@
-"""What each mechanism does to the recordings, over the axes on which it shows: the panels of its figure.
+"""The effect of each mechanism on the recordings, over the axes on which it is visible: the panels of its figure.
 
-A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; each parameter at the value that it says is
-shown, or at a typical strength. The mechanism says over which axes its figure is drawn.
+A soft skin (h 2.5 mm, rT 1.5 mm, E 2 MPa) under spheres of 4 and 10 mm; each parameter at its stated value, or at a
+typical strength. The mechanism names the axes of its figure.
 """
 
 from collections.abc import Callable, Sequence
@@ -78,9 +78,9 @@ def _recording(number: int, **changes: Any) -> FrfRecording:
 
 def _fit(model: Model, base: Model) -> Floats:
     """The mechanism's own parameters, which come first, as shown; those of the base model at their priors' centres."""
-    own = len(model.parameters) - len(base.parameters)
-    values = [entry.to_fit(shown(entry)) for entry in model.parameters[:own]]
-    return np.array([*values, *(entry.start for entry in base.parameters)])
+    count_of_effect = len(model.parameters) - len(base.parameters)
+    values = [parameter.to_fit(shown(parameter)) for parameter in model.parameters[:count_of_effect]]
+    return np.array([*values, *(parameter.start for parameter in base.parameters)])
 
 
 def _ratio(name: str, recordings: Sequence[FrfRecording], table: SigmaTable) -> Floats:
@@ -109,9 +109,9 @@ def _over_position(name: str, table: SigmaTable) -> Panel:
     rows = [_recording(i, position_mm=(float(x), 0.0)) for i, x in enumerate(offset)]
     campaign = Campaign("signature", _SKIN, tuple(rows))
     with_it, base = compose([name], campaign, table), compose([], campaign, table)
-    found = with_it.predict(_fit(with_it, base)).value.real * 1e12
+    response = with_it.predict(_fit(with_it, base)).value.real * 1e12
     usual = base.predict(_fit(base, base)).value.real * 1e12
-    return Panel("position of the sphere, mm", "FRF, pC/N", {"base": (offset, usual), name: (offset, found)})
+    return Panel("position of the sphere, mm", "FRF, pC/N", {"base": (offset, usual), name: (offset, response)})
 
 
 def _over_dwell(name: str, table: SigmaTable) -> Panel:
@@ -143,7 +143,11 @@ def _over_sensors(name: str, table: SigmaTable) -> Panel:
     campaign = Campaign("signature", _SKIN, tuple(rows))
     model = compose([name], campaign, table)
     fit = _fit(model, compose([], campaign, table))
-    spread = next(one.from_fit(at) for one, at in zip(model.parameters, fit, strict=True) if one.name == "spread")
+    spread = next(
+        parameter.from_fit(at)
+        for parameter, at in zip(model.parameters, fit, strict=True)
+        if parameter.name == "spread"
+    )
     number = np.arange(1.0, len(rows) + 1)
     gains = np.random.default_rng(5).normal(0, spread, len(rows))
     band = 100 * np.expm1(np.full(len(rows), spread))
@@ -205,8 +209,8 @@ def _curve(name: str, campaign: Campaign, table: SigmaTable, axis: str, way: Flo
     return Panel(axis, "force, N", curves)
 
 
-Make = Callable[[str, SigmaTable], Panel]
-PANELS: dict[str, tuple[Kind, Make]] = {  # by axis
+MakePanel = Callable[[str, SigmaTable], Panel]
+PANELS: dict[str, tuple[Kind, MakePanel]] = {  # by axis
     "preload_n": ("frf", _over_preload),
     "position_mm": ("frf", _over_position),
     "dwell_s": ("frf", _over_dwell),

@@ -43,8 +43,8 @@ class Sample:
 
     def up_to(self, strain: float) -> "Sample":
         """The part below a strain."""
-        kept = np.abs(self.strain) <= strain
-        return Sample(self.name, self.strain[kept], self.stress_kpa[kept])
+        mask = np.abs(self.strain) <= strain
+        return Sample(self.name, self.strain[mask], self.stress_kpa[mask])
 
 
 def yeoh(stretch: Floats, shape: Floats) -> Floats:
@@ -84,14 +84,14 @@ def fit(sample: Sample, law: Law, start: tuple[float, ...]) -> Fit:
 
     # Gent's stress ends where I reaches J.
     ends = 0.999 / (stretch**2 + 2 / stretch - 3).max() if law is gent else np.inf
-    found = least_squares(
+    solution = least_squares(
         residual,
         [1.0, *(min(value, ends / 2) for value in start)],
         x_scale=[1.0, *(0.1 for _ in start)],
         bounds=([-np.inf] * (1 + len(start)), [np.inf, *(ends for _ in start)]),
         max_nfev=2000,
     )
-    return Fit(float(found.x[0] * modulus), found.x[1:], float(100 * np.sqrt(np.mean(found.fun**2))))
+    return Fit(float(solution.x[0] * modulus), solution.x[1:], float(100 * np.sqrt(np.mean(solution.fun**2))))
 
 
 def compression_samples(folder: Path) -> list[Sample]:
@@ -107,8 +107,8 @@ def tension_samples(folder: Path) -> list[Sample]:
 
 
 def _sample(name: str, rows: Floats, strain: int, stress: int, to_kpa: float) -> Sample:
-    kept = rows[:: max(1, len(rows) // _POINTS)]
-    return Sample(name, kept[:, strain], kept[:, stress] * to_kpa)
+    thinned = rows[:: max(1, len(rows) // _POINTS)]
+    return Sample(name, thinned[:, strain], thinned[:, stress] * to_kpa)
 
 
 def _numbers(path: Path, delimiter: str, columns: int) -> Floats:
@@ -117,7 +117,7 @@ def _numbers(path: Path, delimiter: str, columns: int) -> Floats:
     with path.open(newline="", encoding="utf-8", errors="replace") as file:
         for row in csv.reader(file, delimiter=delimiter):
             try:
-                numbers = [float(entry) for entry in row[:columns]]
+                numbers = [float(cell) for cell in row[:columns]]
             except ValueError:
                 continue
             if len(numbers) == columns:
@@ -127,7 +127,7 @@ def _numbers(path: Path, delimiter: str, columns: int) -> Floats:
 
 
 def main(results: Path = RESULTS) -> None:
-    """Fit everything in the folder that `UNDERSKIN_RECORDINGS` names and keep the numbers for the page."""
+    """Fit everything in the folder of `UNDERSKIN_RECORDINGS` and store the numbers for the page."""
     folder = Path(os.environ["UNDERSKIN_RECORDINGS"])
     rows = []
     for kind, samples in (("compression", compression_samples(folder)), ("tension", tension_samples(folder))):
@@ -137,11 +137,11 @@ def main(results: Path = RESULTS) -> None:
                 largest = round(float(np.abs(part.strain).max()), 2)
                 row: dict[str, Any] = {"kind": kind, "sample": sample.name, "largest_strain": largest}
                 for name, (law, start) in LAWS.items():
-                    found = fit(part, law, start)
+                    fitted = fit(part, law, start)
                     row[name] = {
-                        "modulus_kpa": float(f"{found.modulus_kpa:.3g}"),
-                        "shape": [float(f"{value:.2g}") for value in found.shape],
-                        "residual_percent": float(f"{found.residual_percent:.2g}"),
+                        "modulus_kpa": float(f"{fitted.modulus_kpa:.3g}"),
+                        "shape": [float(f"{value:.2g}") for value in fitted.shape],
+                        "residual_percent": float(f"{fitted.residual_percent:.2g}"),
                     }
                 rows.append(row)
     results.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

@@ -87,11 +87,11 @@ def _section(mechanism: Mechanism) -> str:
         f"**Source.** {mechanism.source}\n",
         f"{where} **Needs:** {mechanism.needs}.\n",
     ]
-    found = {
+    by_name = {
         parameter.name: parameter for kind in mechanism.kinds for parameter in mechanism.parameters(_CAMPAIGN, kind)
     }
-    if found:
-        lines.append(_parameters(tuple(found.values()), with_shown=True))
+    if by_name:
+        lines.append(_parameters(tuple(by_name.values()), with_shown=True))
     lines.append(f"![What {mechanism.name} does](figures/mechanism-{mechanism.name}.svg)\n")
     return "\n".join(lines)
 
@@ -107,22 +107,30 @@ def _parameters(parameters: tuple[Parameter, ...], *, with_shown: bool) -> str:
         "why this prior",
     )
     rows = []
-    for entry in parameters:
-        limit = "" if entry.limit is None else f"{entry.limit:g}".replace("inf", "∞")
-        value = (f"{shown(entry):g}",) if with_shown else ()
+    for parameter in parameters:
+        limit = "" if parameter.limit is None else f"{parameter.limit:g}".replace("inf", "∞")
+        value = (f"{shown(parameter):g}",) if with_shown else ()
         rows.append(
-            (entry.name, entry.unit, f"{entry.low:g} to {entry.high:g}", _prior(entry), limit, *value, entry.reason)
+            (
+                parameter.name,
+                parameter.unit,
+                f"{parameter.low:g} to {parameter.high:g}",
+                _prior(parameter),
+                limit,
+                *value,
+                parameter.reason,
+            )
         )
     return table(header, rows)
 
 
-def _prior(entry: Parameter) -> str:
-    if not isinstance(entry.prior, Normal):
-        return "even" if entry.scale == "linear" else "even in the logarithm"
-    heavy = isinstance(entry.prior, HeavyTailed)
-    if entry.scale == "linear":
-        return f"{'heavy-tailed' if heavy else 'normal'}, {entry.prior.mean:g} ± {entry.prior.sd:g}"
-    usual, factor = np.exp([entry.prior.mean, entry.prior.sd])
+def _prior(parameter: Parameter) -> str:
+    if not isinstance(parameter.prior, Normal):
+        return "even" if parameter.scale == "linear" else "even in the logarithm"
+    heavy = isinstance(parameter.prior, HeavyTailed)
+    if parameter.scale == "linear":
+        return f"{'heavy-tailed' if heavy else 'normal'}, {parameter.prior.mean:g} ± {parameter.prior.sd:g}"
+    usual, factor = np.exp([parameter.prior.mean, parameter.prior.sd])
     return f"{'heavy-tailed in the logarithm' if heavy else 'log-normal'}, {usual:.3g}, factor {factor:.3g}"
 
 
@@ -142,6 +150,6 @@ def _silicones() -> str:
     return table(header, rows)
 
 
-def _fitted(found: dict[str, Any]) -> str:
-    shape = ", ".join(f"{value:g}" for value in found["shape"])
-    return f"{found['modulus_kpa']:g}; {shape}; {found['residual_percent']:g} %"
+def _fitted(fitted: dict[str, Any]) -> str:
+    shape = ", ".join(f"{value:g}" for value in fitted["shape"])
+    return f"{fitted['modulus_kpa']:g}; {shape}; {fitted['residual_percent']:g} %"

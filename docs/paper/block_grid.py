@@ -6,7 +6,7 @@ from skfem import Basis, BilinearForm, ElementLinePp, MeshLine
 
 from underskin.units import Floats
 
-_GROWTH = 2.0
+_RATIO = 2.0
 
 _mass = BilinearForm(lambda u, v, _: u * v)
 _trial_slope = BilinearForm(lambda u, v, _: u.grad[0] * v)
@@ -52,9 +52,9 @@ class Axis:
     @property
     def integral(self) -> Floats:
         """∫ of each shape function."""
-        one = np.zeros(self._basis.N)
-        one[self._basis.nodal_dofs[0]] = 1.0  # the vertex functions add up to 1
-        return np.asarray(self.mass @ one)
+        ones = np.zeros(self._basis.N)
+        ones[self._basis.nodal_dofs[0]] = 1.0  # the vertex functions add up to 1
+        return np.asarray(self.mass @ ones)
 
     def values(self, points: Floats) -> Floats:
         """Shape functions at points: (points, displacements)."""
@@ -84,7 +84,7 @@ def _growing(length: float, first: float) -> Floats:
     step = first
     while nodes[-1] < length:
         nodes.append(nodes[-1] + step)
-        step *= _GROWTH
+        step *= _RATIO
     return np.array(nodes) * (length / nodes[-1])
 
 

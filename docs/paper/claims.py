@@ -1,4 +1,4 @@
-"""The paper's statements that can be checked, each beside what this project computes for it."""
+"""The paper's verifiable statements, each with the value that this project computes."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ _THICKER_MM = np.linspace(1.5, 5.0, 71)
 
 
 def checked(table: SigmaTable) -> list[Claim]:
-    """All rows but the half space's error, which has a section of its own."""
+    """All rows except the half space's error, which has a section of its own."""
     small, large = (press(table, radius, PRELOADS_N) for radius in INDENTERS_MM)
     return [
         _identities(),

@@ -1,4 +1,4 @@
-"""The paper's statements about the layer's surface and about tension beside the contact."""
+"""The paper's statements about the layer's surface and about tension next to the contact."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ _PRELOAD_N = 1.0
 
 @dataclass(frozen=True)
 class Claim:
-    """One row: what the paper says, what is found here, and the verdict."""
+    """One row: the paper's statement, the finding here, and the verdict."""
 
     claim: str
     found: str
@@ -42,14 +42,14 @@ def tension() -> Claim:
     normal = elastic_layer.gamma_n(layer, _OFFSETS, RHO)
     tangential = elastic_layer.gamma_t(layer, _OFFSETS, RHO)
     most = int(np.argmax(tangential))
-    told = bool(normal.min() >= 0) and bool(tangential[most] > 0)
+    confirmed = bool(normal.min() >= 0) and bool(tangential[most] > 0)
     return Claim(
         "A tangential force is told by tensile stress just outside the compressed region alone (section 1)",
         f"a normal force makes no tension on the base (γ_n ≥ {max(normal.min(), 0.0):.3f} up to 4 h away, "
         f"{normal[0]:.2f} below it); a tangential one presses on one side and pulls as much on the other, most at "
         f"{_OFFSETS[most]:.2f} h, with {100 * tangential[most] / normal[0]:.0f} % of what an equal normal force gives "
         "below it",
-        "holds" if told else "does not hold",
+        "holds" if confirmed else "does not hold",
     )
 
 

@@ -1,4 +1,4 @@
-"""The paper's prototype, and what each model of the skin says that its sensors feel."""
+"""The paper's prototype, and the predictions of each model of the skin for its sensors."""
 
 from dataclasses import dataclass
 
@@ -73,5 +73,5 @@ def press(
 def preload_at_peak_pressure(indenter_radius_mm: float, pressure_mpa: float) -> float:
     """The preload [N] at which the Hertz pressure's peak reaches `pressure_mpa`; q0 grows like F^(1/3)."""
     radius = Indenter.from_lab(indenter_radius_mm=indenter_radius_mm).radius
-    one_newton = hertz.peak_pressure(1.0, hertz.contact_radius(1.0, radius, SKIN.youngs_modulus))
-    return float((to_si("mean_stress_mpa", pressure_mpa) / one_newton) ** 3)
+    peak_at_one_newton = hertz.peak_pressure(1.0, hertz.contact_radius(1.0, radius, SKIN.youngs_modulus))
+    return float((to_si("mean_stress_mpa", pressure_mpa) / peak_at_one_newton) ** 3)

@@ -1,6 +1,6 @@
-"""The figures in which the paper shows its prototype: what the model says of it, and the numbers that the paper states.
+"""The paper's figures of its prototype: the model's predictions, and the numbers that the paper states.
 
-The measured curves of figures 13 to 16 are nowhere at hand as numbers; none is drawn.
+The measured curves of figures 13 to 16 are not available as numbers; none is drawn.
 """
 
 import numpy as np

@@ -1,4 +1,5 @@
-"""What the paper's cylinder leaves open: if it stuck to the platens, 16 MPa is not E; what a diagnosis says."""
+"""An open question of the paper's cylinder: if it stuck to the platens, 16 MPa is not E; and the diagnosis of that
+case."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -64,7 +65,7 @@ One cylinder cannot tell friction from modulus, and the interval of E says so; t
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """What a report says of cylinders of some heights beside the FRFs."""
+    """The report on cylinders of some heights together with the FRFs."""
 
     heights_mm: tuple[float, ...]
     report: dict[str, Any]
@@ -182,15 +183,15 @@ def _preload_at_two_megapascals(modulus_mpa: float) -> float:
 
 def _reported(reports: list[Diagnosed]) -> str:
     header = ("cylinders, height mm", "verdict", "E of the cylinders, MPa", "friction", "d33, pC/N", "quotable")
-    return table(header, [_row(entry) for entry in reports])
+    return table(header, [_row(report) for report in reports])
 
 
-def _row(entry: Diagnosed) -> tuple[str, ...]:
-    report = entry.report
+def _row(result: Diagnosed) -> tuple[str, ...]:
+    report = result.report
     (modulus,) = (
-        known
-        for known in report["by_kind"]
-        if known["parameter"] == "youngs_modulus" and known["kind"] == "compression"
+        fitted
+        for fitted in report["by_kind"]
+        if fitted["parameter"] == "youngs_modulus" and fitted["kind"] == "compression"
     )
     frictions = [
         f"{parameter['low']:.2f} to {parameter['high']:.2f}"
@@ -199,9 +200,9 @@ def _row(entry: Diagnosed) -> tuple[str, ...]:
     ]  # fmt: skip
     d33 = report["d33"]
     return (
-        " and ".join(f"{height:g}" for height in entry.heights_mm),
+        " and ".join(f"{height:g}" for height in result.heights_mm),
         f"`{report['verdict']}`"
-        + (": " + ", ".join(f"`{one['name']}`" for one in report["mechanisms"]) if report["mechanisms"] else ""),
+        + (": " + ", ".join(f"`{named['name']}`" for named in report["mechanisms"]) if report["mechanisms"] else ""),
         f"{modulus['value']:.1f} ({modulus['low']:.1f} to {modulus['high']:.1f})",
         *(frictions or ["not told"]),
         f"{d33['value']:.1f} ({d33['low']:.1f} to {d33['high']:.1f})",

@@ -1,4 +1,4 @@
-"""What a reader takes home from docs/paper.md: every number is computed."""
+"""The summary of docs/paper.md: every number is computed."""
 
 from collections import Counter
 
@@ -38,12 +38,12 @@ def section(sigma_table: SigmaTable) -> str:
     lower = MODULUS_MPA / cylinder.stiffness_ratio(CYLINDER_HEIGHT_MM, CYLINDER_DIAMETER_MM)
     stated = [press(sigma_table, radius, PRELOADS_N) for radius in INDENTERS_MM]
     softer = [press(sigma_table, radius, PRELOADS_N, youngs_modulus_mpa=lower) for radius in INDENTERS_MM]
-    low = _percent([one.half_space / one.table for one in stated])
-    loaded = _percent([one.table / one.linear for one in stated])
+    low = _percent([contact.half_space / contact.table for contact in stated])
+    loaded = _percent([contact.table / contact.linear for contact in stated])
     pairs = list(zip(stated, softer, strict=True))
-    changed = _percent([one.table / other.table for one, other in pairs])
-    wider = _percent([other.contact_radius_mm / one.contact_radius_mm for one, other in pairs])
-    verdicts = Counter(entry.verdict.split()[0].strip(":") for entry in checked(sigma_table))
+    changed = _percent([first.table / second.table for first, second in pairs])
+    wider = _percent([larger.contact_radius_mm / smaller.contact_radius_mm for smaller, larger in pairs])
+    verdicts = Counter(claim.verdict.split()[0].strip(":") for claim in checked(sigma_table))
     return _TEXT.format(
         least=-low.max(),
         most=-low.min(),

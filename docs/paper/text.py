@@ -1,4 +1,4 @@
-"""docs/paper.md as text: everything that has a number in it is computed by the modules beside this one."""
+"""docs/paper.md as text: every number is computed by the other modules of this package."""
 
 from collections.abc import Sequence
 
@@ -110,7 +110,7 @@ def document(sigma_table: SigmaTable, depths: Sequence[Depth], wide_block_error:
 
 def claims_section(sigma_table: SigmaTable) -> str:
     """The paper's statements beside what is found here."""
-    rows = ((entry.claim, entry.found, entry.verdict) for entry in checked(sigma_table))
+    rows = ((claim.claim, claim.found, claim.verdict) for claim in checked(sigma_table))
     header = ("the paper says", "found here", "verdict")
     return (
         "## The paper's statements, checked\n\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 from docs.tour.photographer import browsing, photograph, serving, words
 from docs.tour.steps import STEPS, TourStep
 
-SHOWN = "shown.json"  # what each page of the tour said, which a test compares with what it says now
+SHOWN = "shown.json"  # the words of each page of the tour, which a test compares with the present ones
 _HEAD = """# Five minutes with the pages
 
 Written, with its pictures, by `python -m docs.tour`, which starts a server with an empty store and walks through it

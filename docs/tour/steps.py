@@ -1,4 +1,4 @@
-"""What the tour looks at, in order."""
+"""The steps of the tour, in order."""
 
 import tempfile
 from collections.abc import Callable
@@ -15,7 +15,7 @@ VERDICT = "a contact resonance with a tip mass of 6.00 g, at a probability of 98
 
 @dataclass(frozen=True)
 class TourStep:
-    """A picture: how to come there from the step before, and what is to be said."""
+    """A picture: how to reach it from the previous step, and its text."""
 
     name: str
     title: str

@@ -1,4 +1,5 @@
-"""The ledger: campaigns, their truth and the answers kept for each, to see in minutes what a change moved.
+"""The ledger: campaigns with their truth and the stored answers, which show in minutes what a change of the code
+affects.
 
-`make ledger` diagnoses all of them and compares; CONTRIBUTING.md says how it is read.
+`make ledger` diagnoses all of them and compares; CONTRIBUTING.md explains how to read it.
 """

@@ -33,11 +33,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--keep", action="store_true", help="keep the new answers")
     parser.add_argument("--work-dir", type=Path, default=Path("build/ledger"), help="where single reports are stored")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
-    given = parser.parse_args()
-    unknown = sorted(set(given.parts) - set(PARTS))
+    arguments = parser.parse_args()
+    unknown = sorted(set(arguments.parts) - set(PARTS))
     if unknown:
         parser.error(f"no such part: {', '.join(unknown)}; it must be one of {', '.join(PARTS)}")
-    return given
+    return arguments
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""The answer of a report, as the ledger keeps it, and its grade: `right`, `open` or `wrong`."""
+"""The answer of a report in the ledger's form, and its grade: `right`, `open` or `wrong`."""
 
 from collections.abc import Collection, Mapping
 from typing import Any
 
 from proof.judge import UNKNOWN
-from proof.names import one_name_each
+from proof.names import distinct_names
 from rig.identifiable import THRESHOLD
 
 Report = Mapping[str, Any]
@@ -17,8 +17,8 @@ _DIGITS = 4
 def named(report: Report) -> list[str]:
     """The leading set of mechanisms; of `unexplained` the unlisted law and its companions; slips by their codes."""
     if "slips" in report:
-        return sorted([*report["false"], *(slip for slip, one in report["slips"].items() if one["named"])])
-    names = sorted(entry["name"] for entry in report["mechanisms"])
+        return sorted([*report["false"], *(slip for slip, of_slip in report["slips"].items() if of_slip["named"])])
+    names = sorted(mechanism["name"] for mechanism in report["mechanisms"])
     law = report.get("unnamed")
     if report["verdict"] == "unexplained":
         names.append("unlisted" if law is None else f"unlisted: {law['acts_on']} over {law['axis']}, {law['form']}")
@@ -29,7 +29,7 @@ def answer(report: Report) -> dict[str, Any]:
     """Verdict, set, probability, the d33 or modulus that is stated, and the set's parameters, with 95 % intervals."""
     stated = {"verdict": report.get("verdict", "slips"), "names": named(report)}
     if "slips" in report:
-        return {**stated, "slips": slips_told(report)}
+        return {**stated, "slips": distinguishable_slips(report)}
     fit = report.get("fit") or {}
     quantity, value = "d33", report.get("d33")
     if not value or value.get("value") is None:
@@ -46,15 +46,15 @@ def answer(report: Report) -> dict[str, Any]:
     return {**stated, "parameters": parameters} if parameters else stated
 
 
-def slips_told(report: Report) -> list[int]:
-    """How many of the slips that can be told from other causes are named, and how many there are."""
-    identifiable = [one["named"] for one in report["slips"].values() if one["over_rivals"] > THRESHOLD]
+def distinguishable_slips(report: Report) -> list[int]:
+    """Of the slips that can be distinguished from other causes, how many are named, and how many there are."""
+    identifiable = [of_slip["named"] for of_slip in report["slips"].values() if of_slip["over_rivals"] > THRESHOLD]
     return [sum(identifiable), len(identifiable)]
 
 
 def graded(report: Report, effects: Collection[str], shows: Collection[str]) -> str:
-    """A set is right that holds all that shows and nothing that is not hidden; open is an `ambiguous` answer with a
-    right set among its alternatives, and no conclusion where something shows."""
+    """Right: a set with all visible effects and none that is not hidden. Open: an `ambiguous` answer with a right
+    set among its alternatives, or no conclusion although something is visible."""
     hidden, seen = _merged(effects), _merged(shows)
 
     def is_right(names: Collection[str]) -> bool:
@@ -63,22 +63,22 @@ def graded(report: Report, effects: Collection[str], shows: Collection[str]) -> 
     verdict = report["verdict"]
     if verdict == "unexplained":
         return RIGHT if UNKNOWN in hidden else WRONG
-    stated = [entry["name"] for entry in report["mechanisms"]]
+    stated = [mechanism["name"] for mechanism in report["mechanisms"]]
     if is_right(stated):
         return OPEN if verdict == "insufficient_data" and hidden else RIGHT
-    rivals = [_of_rival(entry["mechanisms"]) for entry in report.get("alternatives", ())]
-    left_open = verdict == "ambiguous" and any(is_right(names) for names in rivals)
-    return OPEN if left_open or verdict == "insufficient_data" else WRONG
+    rivals = [_of_rival(alternative["mechanisms"]) for alternative in report.get("alternatives", ())]
+    is_ambiguous = verdict == "ambiguous" and any(is_right(names) for names in rivals)
+    return OPEN if is_ambiguous or verdict == "insufficient_data" else WRONG
 
 
 def _of_rival(names: Collection[str]) -> list[str]:
     """A rival set: `nothing_missing` is the empty one, `none_of_these` is what is in no catalogue."""
-    said = {"nothing_missing": [], "none_of_these": [UNKNOWN]}
-    return [one for name in names for one in said.get(name, [name])]
+    effects_of = {"nothing_missing": [], "none_of_these": [UNKNOWN]}
+    return [effect for name in names for effect in effects_of.get(name, [name])]
 
 
 def _merged(names: Collection[str]) -> set[str]:
-    return set(one_name_each(names))
+    return set(distinct_names(names))
 
 
 def _rounded(value: float | None) -> float | None:

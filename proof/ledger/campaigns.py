@@ -1,6 +1,6 @@
-"""The ledger's campaigns, part by part: what is diagnosed, what is true, and what a right answer is.
+"""The ledger's campaigns by part: what is diagnosed, what is true, and what a right answer is.
 
-Drawn campaigns have seeds that no part of the proof uses, since the ledger is looked at every day.
+Drawn campaigns have seeds that no part of the proof uses, because the ledger is looked at daily.
 """
 
 import importlib.util
@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 from proof import joint, judge, slips
 from proof.cases import DrawnCase, DrawnCurves
-from proof.ledger.answer import OPEN, RIGHT, WRONG, graded, slips_told
+from proof.ledger.answer import OPEN, RIGHT, WRONG, distinguishable_slips, graded
 from proof.results import data_folder
 from proof.stored import diagnosed, diagnosed_by
 from proof.unlisted import judged as judged_by_law
@@ -51,7 +51,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Item:
-    """One campaign of the ledger, or some to be judged together; small, so that any process can get it."""
+    """One campaign of the ledger, or several to be judged together; small, so that it can be sent to any process."""
 
     name: str
     needs: ClassVar[str] = ""  # the setting that names the folder of its data
@@ -89,8 +89,8 @@ class DrawnFrf(Item):
 
     def truth(self) -> Truth:
         """By the rig's own fit."""
-        known = truth_of_lines(record(self._case.description))
-        return {**_that_shows(known, THRESHOLD), "d33": known["d33_pc_per_n"]}
+        facts = truth_of_lines(record(self._case.description))
+        return {**_identifiable_effects(facts, THRESHOLD), "d33": facts["d33_pc_per_n"]}
 
 
 @dataclass(frozen=True)
@@ -109,13 +109,16 @@ class DrawnRawCurves(Item):
 
     def truth(self) -> Truth:
         """By the rig's own fit."""
-        known = truth_of_curves(*drawn_curves(CURVE_SEED, self.number, INDENTATION, self._case.what))
-        return {**_that_shows(known, CURVE_THRESHOLD), "youngs_modulus": known["youngs_modulus_mpa"]}
+        facts = truth_of_curves(*drawn_curves(CURVE_SEED, self.number, INDENTATION, self._case.what))
+        return {
+            **_identifiable_effects(facts, CURVE_THRESHOLD),
+            "youngs_modulus": facts["youngs_modulus_mpa"],
+        }
 
 
 @dataclass(frozen=True)
 class DrawnJoint(Item):
-    """FRFs beside curves, dates of a skin, or skins of one make, judged together."""
+    """FRFs with curves, dates of a skin, or skins of one batch, judged together."""
 
     number: int
 
@@ -155,7 +158,7 @@ class DrawnJoint(Item):
 
 @dataclass(frozen=True)
 class Slips(Item):
-    """A campaign of the virtual rig as it is, and with each slip of a lab in it."""
+    """A campaign of the virtual rig without slips, and with each slip of a lab."""
 
     number: int
 
@@ -166,7 +169,7 @@ class Slips(Item):
     def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
         """What the screening names in it without a slip, and with each."""
         del documents  # drawn again, since slips are judged by the rig's equations
-        return slips.of_one(SLIP_SEED, self.number)
+        return slips.judged_campaign(SLIP_SEED, self.number)
 
     def truth(self) -> Truth:
         """The slips themselves are the truth."""
@@ -174,10 +177,10 @@ class Slips(Item):
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """Right where every slip that can be told is named and none without one."""
-        named, told = slips_told(report)
+        named, distinguishable = distinguishable_slips(report)
         if report["false"]:
             return WRONG
-        return RIGHT if named == told else OPEN
+        return RIGHT if named == distinguishable else OPEN
 
 
 @dataclass(frozen=True)
@@ -193,16 +196,19 @@ class Concealed(Item):
         return [json.loads((data_folder(_CAMPAIGNS) / self.folder / f"{self.name}.json").read_text(encoding="utf-8"))]
 
     @property
-    def known(self) -> Truth:
+    def recorded_truth(self) -> Truth:
         """Its entry in the file of truths."""
         return dict(_read(data_folder(_CAMPAIGNS) / self.truths)[self.name])
 
     def truth(self) -> Truth:
         """Effects, and whether they show."""
-        known = self.known
+        facts = self.recorded_truth
         value = {"d33": "d33_pc_per_n", "youngs_modulus": "youngs_modulus_mpa"}
-        values = {name: known[field] for name, field in value.items() if field in known}
-        return {**_that_shows(known, CURVE_THRESHOLD if "youngs_modulus" in values else THRESHOLD), **values}
+        values = {name: facts[field] for name, field in value.items() if field in facts}
+        return {
+            **_identifiable_effects(facts, CURVE_THRESHOLD if "youngs_modulus" in values else THRESHOLD),
+            **values,
+        }
 
 
 @dataclass(frozen=True)
@@ -211,13 +217,17 @@ class UnlistedLaw(Concealed):
 
     def truth(self) -> Truth:
         """The law, and whether it shows."""
-        known = self.known
-        law = f"{known['law']['acts_on']} over {known['law']['axis']}"
-        return {"effects": [law], "shows": [law] if known["identifiable"] else [], "d33": known["d33_pc_per_n"]}
+        facts = self.recorded_truth
+        law = f"{facts['law']['acts_on']} over {facts['law']['axis']}"
+        return {
+            "effects": [law],
+            "shows": [law] if facts["identifiable"] else [],
+            "d33": facts["d33_pc_per_n"],
+        }
 
     def grade(self, report: Report, truth: Truth, /) -> str:
         """Right where it is recognised as unlisted and placed; open where it is recognised or left open."""
-        judged = judged_by_law(self.name, self.known, report)
+        judged = judged_by_law(self.name, self.recorded_truth, report)
         if not truth["shows"]:
             return RIGHT if report["verdict"] in judge.QUIET or judged["recognised"] else WRONG
         if judged["recognised"]:
@@ -231,16 +241,16 @@ class Solved(Concealed):
 
     def truth(self) -> Truth:
         """The effect, and the true d33 or E."""
-        known = self.known
-        quantity = "youngs_modulus" if "case" in known else "d33"
-        value = known["youngs_modulus_mpa" if "case" in known else "d33_pc_per_n"]
-        return {"effects": [known["effect"]], "shows": [], quantity: value}
+        facts = self.recorded_truth
+        quantity = "youngs_modulus" if "case" in facts else "d33"
+        value = facts["youngs_modulus_mpa" if "case" in facts else "d33_pc_per_n"]
+        return {"effects": [facts["effect"]], "shows": [], quantity: value}
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """By the scorer's classes."""
         scorer = _module(data_folder(_CAMPAIGNS) / "solved-open" / "score.py")
-        known = self.known
-        judged = (scorer.grade_curve if "case" in known else scorer.grade)(known, report)
+        facts = self.recorded_truth
+        judged = (scorer.grade_curve if "case" in facts else scorer.grade)(facts, report)
         return _SOLVED_GRADES[judged["cls"]]
 
 
@@ -251,15 +261,15 @@ class Real(Item):
     needs: ClassVar[str] = _RECORDINGS
 
     @property
-    def known(self) -> Truth:
+    def recorded_truth(self) -> Truth:
         """Its entry in the file of truths."""
         return dict(_read(data_folder(_RECORDINGS) / "real" / "open" / "truth.json")[self.name])
 
     def documents(self) -> list[dict[str, Any]]:
         """Its files as text: what they are read as belongs to the answer."""
-        known = self.known
-        folder = data_folder(_RECORDINGS) / "real" / "open" / known["folder"]
-        paths = [folder / name for name in (*known["files"], *([known["rig"]] if known["rig"] else []))]
+        facts = self.recorded_truth
+        folder = data_folder(_RECORDINGS) / "real" / "open" / facts["folder"]
+        paths = [folder / name for name in (*facts["files"], *([facts["rig"]] if facts["rig"] else []))]
         return [{"name": path.name, "content": path.read_bytes().hex()} for path in paths]
 
     def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
@@ -269,10 +279,10 @@ class Real(Item):
         from underskin.recordings.rig_description import parse
 
         contents = {one["name"]: bytes.fromhex(one["content"]) for one in documents}
-        known = self.known
+        facts = self.recorded_truth
         try:
-            rig = parse(contents[known["rig"]], known["rig"]) if known["rig"] else None
-            readings = [read_file(contents[name], name, rig) for name in known["files"]]
+            rig = parse(contents[facts["rig"]], facts["rig"]) if facts["rig"] else None
+            readings = [read_file(contents[name], name, rig) for name in facts["files"]]
             report = diagnose(readings[0]) if len(readings) == 1 else diagnose_together(readings, self.name)
         except UnderskinError as error:
             return {"verdict": "refused", "probability": 0.0, "statement": str(error), "mechanisms": []}
@@ -280,12 +290,16 @@ class Real(Item):
 
     def truth(self) -> Truth:
         """What its owner says."""
-        return {"effects": self.known["required"], "shows": self.known["required"], "says": self.known["truth"]}
+        return {
+            "effects": self.recorded_truth["required"],
+            "shows": self.recorded_truth["required"],
+            "says": self.recorded_truth["truth"],
+        }
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """By the judge's words."""
         judging = _module(data_folder(_RECORDINGS) / "real" / "judge.py")
-        word = judging.judge(self.known, None if report["verdict"] == "refused" else report)[0]
+        word = judging.judge(self.recorded_truth, None if report["verdict"] == "refused" else report)[0]
         return next(grade for grade, words in _GRADES.items() if word in words)
 
 
@@ -312,17 +326,17 @@ NEEDS = {name: _CAMPAIGNS for name in PARTS if name.endswith("-open") or name.st
 }
 
 
-def _that_shows(known: Mapping[str, Any], threshold: float) -> Truth:
-    """The effects, and those that show: all together gain in χ² over the base model, and each over the others.
+def _identifiable_effects(facts: Mapping[str, Any], threshold: float) -> Truth:
+    """The effects, and the visible ones: all together gain in χ² over the base model, and each over the others.
 
-    As a whole, where the gain of each is unknown; two effects that cancel each other do not show.
+    All of them if the single gains are unknown; two effects that cancel each other are not visible.
     """
-    effects = list(known["effects"])
-    if not effects or not known["identifiable"]:
+    effects = list(facts["effects"])
+    if not effects or not facts["identifiable"]:
         return {"effects": sorted(effects), "shows": []}
-    gains = list(known.get("chi2_gain_of_each") or [])
-    if isinstance(known.get("chi2_gain_of_each"), Mapping):
-        gains = list(known["chi2_gain_of_each"].values())
+    gains = list(facts.get("chi2_gain_of_each") or [])
+    if isinstance(facts.get("chi2_gain_of_each"), Mapping):
+        gains = list(facts["chi2_gain_of_each"].values())
     if len(effects) == 1 or len(gains) != len(effects):
         return {"effects": sorted(effects), "shows": sorted(effects)}
     seen = [effect for effect, gain in zip(effects, gains, strict=True) if gain is None or gain > threshold]

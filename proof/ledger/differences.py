@@ -1,4 +1,4 @@
-"""What changed between the kept answers and new ones, and whether right answers were won or lost beyond chance."""
+"""Differences between stored and new answers, and whether right answers were won or lost beyond chance."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,25 +22,25 @@ SIGNIFICANT = 0.05
 
 @dataclass(frozen=True)
 class Compared:
-    """A part's kept lines and its new ones, in pairs of one campaign."""
+    """A part's stored and new lines, in pairs of one campaign."""
 
     part: str
     pairs: Sequence[tuple[Line, Line]]
-    seconds: tuple[float, float]  # processor time of the diagnoses, kept and new; nan where it is not known
+    seconds: tuple[float, float]  # processor time of the diagnoses, stored and new; nan if unknown
 
     def changed(self) -> list[tuple[Line, Line]]:
         """Pairs of different answers."""
-        return [(kept, new) for kept, new in self.pairs if next(differences(kept, new), None)]
+        return [(stored, new) for stored, new in self.pairs if next(differences(stored, new), None)]
 
     @property
     def better(self) -> int:
         """Answers that were graded higher: from wrong to open or right, from open to right."""
-        return sum(GRADES.index(new["grade"]) > GRADES.index(kept["grade"]) for kept, new in self.pairs)
+        return sum(GRADES.index(new["grade"]) > GRADES.index(stored["grade"]) for stored, new in self.pairs)
 
     @property
     def worse(self) -> int:
         """Answers that were graded lower."""
-        return sum(GRADES.index(new["grade"]) < GRADES.index(kept["grade"]) for kept, new in self.pairs)
+        return sum(GRADES.index(new["grade"]) < GRADES.index(stored["grade"]) for stored, new in self.pairs)
 
     @property
     def p_value(self) -> float:
@@ -53,24 +53,24 @@ class Compared:
         return self.worse > self.better and self.p_value < SIGNIFICANT
 
 
-def differences(kept: Line, new: Line) -> Iterator[str]:
-    """What differs in one answer, in words: set, verdict, probability by more than 0.05, a number or its interval by
-    more than a tenth of the kept interval (also of each parameter of a set that stayed)."""
-    if kept["documents"] != new["documents"]:
+def differences(stored: Line, new: Line) -> Iterator[str]:
+    """The differences of one answer in words: set, verdict, probability by more than 0.05, a number or its interval
+    by more than a tenth of the stored interval (also of each parameter of an unchanged set)."""
+    if stored["documents"] != new["documents"]:
         yield "the campaign itself"
-    before, after = kept["answer"], new["answer"]
+    before, after = stored["answer"], new["answer"]
     for name in ("verdict", "names"):
         if before[name] != after[name]:
-            yield f"{_said(before[name])} → {_said(after[name])}"
+            yield f"{_in_words(before[name])} → {_in_words(after[name])}"
     if abs(before.get("probability", 0.0) - after.get("probability", 0.0)) > _PROBABILITY:
         yield f"probability {before['probability']:.2f} → {after['probability']:.2f}"
     for quantity in _QUANTITIES:
         if _moved(before.get(quantity), after.get(quantity)):
             yield f"{quantity} {_interval(before.get(quantity))} → {_interval(after.get(quantity))}"
-    known, found = before.get("parameters", {}), after.get("parameters", {})
-    for name in [one for one in known if one in found]:
-        if _moved(known[name], found[name]):
-            yield f"{name} {_interval(known[name])} → {_interval(found[name])}"
+    earlier, later = before.get("parameters", {}), after.get("parameters", {})
+    for name in [common for common in earlier if common in later]:
+        if _moved(earlier[name], later[name]):
+            yield f"{name} {_interval(earlier[name])} → {_interval(later[name])}"
     if before.get("quotable", False) != after.get("quotable", False):
         yield "quotable now" if after.get("quotable") else "no longer quotable"
 
@@ -83,7 +83,7 @@ def _moved(before: Sequence[float | None] | None, after: Sequence[float | None] 
         return before != after
     allowed = _OF_INTERVAL * (high - low)
     pairs = zip(before, after, strict=True)
-    return any(one is None or other is None or abs(one - other) > allowed for one, other in pairs)
+    return any(earlier is None or later is None or abs(earlier - later) > allowed for earlier, later in pairs)
 
 
 def _interval(stated: Sequence[float | None] | None) -> str:
@@ -93,21 +93,21 @@ def _interval(stated: Sequence[float | None] | None) -> str:
     return f"{value:g}" if low is None or high is None else f"{value:g} ({low:g} to {high:g})"
 
 
-def _said(value: Any) -> str:
+def _in_words(value: Any) -> str:
     return value if isinstance(value, str) else " + ".join(value) or "nothing"
 
 
 def text(compared: Sequence[Compared]) -> str:
-    """All that changed, by part, and a table of the parts in Markdown."""
+    """All changes by part, and a table of the parts in Markdown."""
     lines: list[str] = []
     for part in compared:
         changed = part.changed()
         if changed:
             lines.append(f"{part.part}: {len(changed)} of {len(part.pairs)} answers changed{_by_effect(changed)}")
-        for kept, new in changed:
-            hidden = _said(kept["truth"].get("effects", ()))
-            graded = new["grade"] if kept["grade"] == new["grade"] else f"{kept['grade']} → {new['grade']}"
-            lines.append(f"  {new['name']} ({hidden}; {graded}): {'; '.join(differences(kept, new))}")
+        for stored, new in changed:
+            hidden = _in_words(stored["truth"].get("effects", ()))
+            graded = new["grade"] if stored["grade"] == new["grade"] else f"{stored['grade']} → {new['grade']}"
+            lines.append(f"  {new['name']} ({hidden}; {graded}): {'; '.join(differences(stored, new))}")
     header = [
         *("part", "changed", "right", "open", "wrong", "better", "worse", "p"),
         *("error of probabilities (by chance)", "interval holds the truth", "processor time, s"),
@@ -118,25 +118,27 @@ def text(compared: Sequence[Compared]) -> str:
 
 
 def _slips(part: Compared) -> str:
-    """Of the slips that can be told, how many are named; and campaigns in which one is named without a slip."""
-    kept, new = ([pair[place] for pair in part.pairs] for place in (0, 1))
-    told = [[sum(line["answer"]["slips"][place] for line in lines) for place in (0, 1)] for lines in (kept, new)]
-    false = [_count(lines, WRONG) for lines in (kept, new)]
-    named = " → ".join(percent(Share(*counts)) for counts in told)
+    """The share of distinguishable slips that are named; and campaigns in which one is named without a slip."""
+    stored, new = ([pair[index] for pair in part.pairs] for index in (0, 1))
+    slip_counts = [
+        [sum(line["answer"]["slips"][index] for line in lines) for index in (0, 1)] for lines in (stored, new)
+    ]
+    false = [_count(lines, WRONG) for lines in (stored, new)]
+    named = " → ".join(percent(Share(*counts)) for counts in slip_counts)
     return f"named {named}; one named without a slip in {false[0]} → {false[1]} of {len(new)} campaigns"
 
 
 def _by_effect(changed: Sequence[tuple[Line, Line]]) -> str:
-    """How many changed of each hidden effect, the most first: where to look."""
-    counts = Counter(effect for kept, _ in changed for effect in kept["truth"].get("effects", ()))
+    """Number of changes by hidden effect, the most frequent first."""
+    counts = Counter(effect for stored, _ in changed for effect in stored["truth"].get("effects", ()))
     return f", by what is hidden: {', '.join(f'{name} {count}' for name, count in counts.most_common(6))}" * bool(
         counts
     )
 
 
 def _row(part: Compared) -> list[str]:
-    kept, new = ([pair[place] for pair in part.pairs] for place in (0, 1))
-    grades = [[f"{_count(kept, grade)} → {_count(new, grade)}"] for grade in (RIGHT, OPEN, WRONG)]
+    stored, new = ([pair[index] for pair in part.pairs] for index in (0, 1))
+    grades = [[f"{_count(stored, grade)} → {_count(new, grade)}"] for grade in (RIGHT, OPEN, WRONG)]
     before, after = part.seconds
     return [
         part.part,
@@ -145,8 +147,8 @@ def _row(part: Compared) -> list[str]:
         str(part.better),
         f"{part.worse}{' (significant)' if part.is_worse else ''}",
         f"{part.p_value:.2g}",
-        f"{_calibration(kept)} → {_calibration(new)}",
-        f"{_held(kept)} → {_held(new)}",
+        f"{_calibration(stored)} → {_calibration(new)}",
+        f"{_held(stored)} → {_held(new)}",
         f"{before:.0f} → {after:.0f}",
     ]
 
@@ -160,9 +162,11 @@ def _calibration(lines: Sequence[Line]) -> str:
     stated = [line for line in lines if "probability" in line["answer"] and line["answer"]["verdict"] != "refused"]
     if not stated:
         return "–"
-    told = calibration([line["answer"]["probability"] for line in stated], [line["grade"] == RIGHT for line in stated])
-    low, high = told.chance_range
-    return f"{told.error:.3f} ({low:.3f}–{high:.3f})"
+    calibrated = calibration(
+        [line["answer"]["probability"] for line in stated], [line["grade"] == RIGHT for line in stated]
+    )
+    low, high = calibrated.chance_range
+    return f"{calibrated.error:.3f} ({low:.3f}–{high:.3f})"
 
 
 def _held(lines: Sequence[Line]) -> str:

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.solved.charge import Course, harmonic, solve
+from rig.solved.charge import ChargeCurve, harmonic, solve
 from rig.solved.design import Design, drawn_design
 from rig.solved.layer import Floats, NotConverged
 from rig.solved.worlds import SHARES, World, drawn_world
 
 _ATTEMPTS = 20
 _START = datetime(2024, 3, 4, 8, 30, tzinfo=UTC)
-_SAME_PLACE = 1e-3  # mm: charge curves are shared within
+_DISTANCE_STEP_MM = 1e-3  # mm: charge curves are shared within
 FINENESS = 1.5  # of the mesh
 
 
@@ -31,7 +31,7 @@ class SolvedCampaign:
 
 
 def drawn(seed: int, number: int, fineness: float = FINENESS) -> SolvedCampaign:
-    """Campaign `number` of a seed. Seconds; one that cannot be solved is drawn again."""
+    """Campaign `number` of a seed. Takes seconds; a draw that cannot be solved is repeated."""
     random = np.random.default_rng([seed, number, 41])
     effect = str(random.choice(list(SHARES), p=list(SHARES.values())))
     for _ in range(_ATTEMPTS):
@@ -47,35 +47,35 @@ def drawn(seed: int, number: int, fineness: float = FINENESS) -> SolvedCampaign:
 
 def levels(design: Design, world: World, fineness: float = FINENESS) -> tuple[Floats, tuple[float, float]]:
     """First harmonic of the charge over force of each recording (rows,) [pC/N] in a world, at the true sizes and
-    places; and the narrowest and widest contact, a/h."""
+    positions; and the narrowest and widest contact, a/h."""
     true = design.true
     dwell = np.zeros(len(design.force)) if design.dwell_s is None else design.dwell_s
     unit = true.modulus * world.relaxed(dwell) * true.thickness**2
     force, dynamic = design.force / unit, design.dynamic / unit
-    found, widths = np.empty(len(force)), []
+    levels_of_rows, widths = np.empty(len(force)), []
     for sphere in np.unique(design.sphere):
         rows = np.flatnonzero(design.sphere == sphere)
         low, high = float((force - dynamic)[rows].min()), float((force + dynamic)[rows].max())
-        course = solve(world.skin(), float(sphere / true.thickness), low, high, fineness)
-        found[rows] = _shares(course, design, rows, force, dynamic)
-        widths += course.contact_radius(force[rows]).tolist()
-    return design.d33 * found, (min(widths), max(widths))
+        curve = solve(world.skin(), float(sphere / true.thickness), low, high, fineness)
+        levels_of_rows[rows] = _shares(curve, design, rows, force, dynamic)
+        widths += curve.contact_radius(force[rows]).tolist()
+    return design.d33 * levels_of_rows, (min(widths), max(widths))
 
 
-def _shares(course: Course, design: Design, rows: NDArray[np.intp], force: Floats, dynamic: Floats) -> Floats:
+def _shares(curve: ChargeCurve, design: Design, rows: NDArray[np.intp], force: Floats, dynamic: Floats) -> Floats:
     """First harmonic over force of the share borne by the disc, for the rows of one sphere."""
-    true, found = design.true, np.empty(len(rows))
-    places = np.round(design.distance[rows] / _SAME_PLACE) * _SAME_PLACE
-    for place in np.unique(places):
-        here = places == place
-        share = course.share(true.sensor_radius / true.thickness, float(place / true.thickness))
-        found[here] = harmonic(share, force[rows[here]], dynamic[rows[here]])
-    return found
+    true, shares = design.true, np.empty(len(rows))
+    places = np.round(design.distance[rows] / _DISTANCE_STEP_MM) * _DISTANCE_STEP_MM
+    for distance in np.unique(places):
+        here = places == distance
+        share = curve.share(true.sensor_radius / true.thickness, float(distance / true.thickness))
+        shares[here] = harmonic(share, force[rows[here]], dynamic[rows[here]])
+    return shares
 
 
 def measured(campaign: SolvedCampaign) -> tuple[Floats, Floats, Floats]:
-    """Real and imaginary part of each line, and the variance of each (rows, lines): the gain of the recording, and
-    noise relative to the line beside a floor."""
+    """Real and imaginary part of each line, and the variance of each (rows, lines): gain error of the recording, and
+    noise relative to the line plus a floor."""
     noise, f = campaign.design.noise, campaign.design.frequency_hz
     random = np.random.default_rng([*campaign.seed, 43])
     actual = campaign.level * np.exp(noise.gain * random.normal(size=len(campaign.level)))
@@ -92,7 +92,7 @@ def document(campaign: SolvedCampaign) -> dict[str, Any]:
     names = [f"s{number + 1:02d}" for number in range(len(design.sensors))]
     moved, recordings = bool(np.any(design.offset)), []
     for row, sensor in enumerate(design.sensor):
-        entry: dict[str, Any] = {
+        header: dict[str, Any] = {
             "id": f"r{row + 1:03d}",
             "sensor": names[sensor],
             "indenter_radius_mm": float(design.sphere[row]),
@@ -100,16 +100,16 @@ def document(campaign: SolvedCampaign) -> dict[str, Any]:
             "dynamic_force_n": float(design.dynamic[row]),
         }
         if design.minutes:
-            entry["recorded_at"] = (_START + timedelta(minutes=design.minutes * row)).strftime("%Y-%m-%dT%H:%M:%SZ")
+            header["recorded_at"] = (_START + timedelta(minutes=design.minutes * row)).strftime("%Y-%m-%dT%H:%M:%SZ")
         if design.dwell_s is not None:
-            entry["dwell_s"] = float(design.dwell_s[row])
+            header["dwell_s"] = float(design.dwell_s[row])
         if moved:
-            entry["position_mm"] = np.round(design.sensors[sensor] + design.offset[row], 4).tolist()
-        entry["frequency_hz"] = design.frequency_hz.tolist()
-        entry["frf_re_pc_per_n"], entry["frf_im_pc_per_n"] = _rounded(real[row]), _rounded(imaginary[row])
+            header["position_mm"] = np.round(design.sensors[sensor] + design.offset[row], 4).tolist()
+        header["frequency_hz"] = design.frequency_hz.tolist()
+        header["frf_re_pc_per_n"], header["frf_im_pc_per_n"] = _rounded(real[row]), _rounded(imaginary[row])
         if design.noise.coherence:
-            entry["coherence"] = np.round(coherence[row], 6).tolist()
-        recordings.append(entry)
+            header["coherence"] = np.round(coherence[row], 6).tolist()
+        recordings.append(header)
     return {
         "schema": "campaign/1",
         "name": campaign.name,

@@ -27,7 +27,7 @@ class Skin:
 
 
 @dataclass(frozen=True)
-class Course:
+class ChargeCurve:
     """Forces [E h²], contact radii [h] and base pressures [E] (steps, places) at radii `r` [h] of one sphere."""
 
     force: Floats
@@ -62,24 +62,24 @@ def inside(r: Floats, sensor: float, offset: float) -> Floats:
 
 
 @lru_cache(maxsize=8)
-def solve(skin: Skin, radius: float, lowest: float, highest: float, fineness: float = 1.5) -> Course:
+def solve(skin: Skin, radius: float, lowest: float, highest: float, fineness: float = 1.5) -> ChargeCurve:
     """The course of a sphere [h] over forces from `lowest` to `highest` [E h²]."""
     softest = min(part.material.modulus for part in skin.sublayers if part.thickness > 0.3)
     widest = np.cbrt(0.5625 * highest * radius / softest)
     pressed = PressedLayer(skin.sublayers, radius, float(widest), fineness, skin.lateral)
     end = float(pressed.r.max())
     r = np.linspace(0, end, int(end * 500) + 1)
-    depth, force, kept = 0.5 * np.cbrt(0.5625 * _MARGIN * lowest * radius) ** 2 / radius, 0.0, []
-    growth = (highest / lowest) ** (0.6 / _STEPS)  # of the depth, as F ~ δ^(3/2) or steeper
+    depth, force, steps = 0.5 * np.cbrt(0.5625 * _MARGIN * lowest * radius) ** 2 / radius, 0.0, []
+    ratio = (highest / lowest) ** (0.6 / _STEPS)  # of the depth, as F ~ δ^(3/2) or steeper
     while force < highest / _MARGIN:
         force = pressed.press(float(depth))
         if force > _MARGIN * lowest:
-            kept.append((force, pressed.contact_radius(), pressed.base_pressure(r)))
-            depth *= growth
+            steps.append((force, pressed.contact_radius(), pressed.base_pressure(r)))
+            depth *= ratio
         else:
-            depth *= max(growth, min(1.5, (_MARGIN * lowest / force) ** 0.5 + 0.02))
-    forces, contacts, pressures = zip(*kept, strict=True)
-    return Course(np.array(forces), np.array(contacts), r, np.array(pressures))
+            depth *= max(ratio, min(1.5, (_MARGIN * lowest / force) ** 0.5 + 0.02))
+    forces, contacts, pressures = zip(*steps, strict=True)
+    return ChargeCurve(np.array(forces), np.array(contacts), r, np.array(pressures))
 
 
 def harmonic(share: Floats, force: Floats, dynamic: Floats) -> Floats:

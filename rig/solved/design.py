@@ -1,6 +1,6 @@
-"""What a lab of the solved rig declares and does: skin, spheres, preloads, places, times, and the noise.
+"""What a lab of the solved rig declares and does: skin, spheres, preloads, positions, times, and noise.
 
-True modulus, thickness and radius of the sensors differ from the declared ones by the tolerances of such measurements.
+True modulus, thickness and sensor radius differ from the declared ones by the tolerances of such measurements.
 """
 
 import math
@@ -85,7 +85,7 @@ class Design:
 
 
 def drawn_design(random: np.random.Generator, world: World) -> Design:
-    """A lab's design, that suits the world."""
+    """A lab's design suited to the world."""
     declared = _declared(random)
     off = np.exp(random.normal(size=3) * (MODULUS_OFF, THICKNESS_OFF, SENSOR_OFF))
     true = Sizes(
@@ -153,7 +153,7 @@ def _places(random: np.random.Generator, declared: Sizes, world: World) -> Float
 
 
 def _scan(random: np.random.Generator, thickness: float) -> Floats:
-    """Commanded places of a line across the sensor (places, 2)."""
+    """Commanded positions of a line across the sensor (places, 2)."""
     angle, reach = float(random.uniform(0, 2 * math.pi)), 1.2 * thickness
     along = reach * np.linspace(-1, 1, int(random.choice([5, 7])))
     return np.round(along[:, None] * (math.cos(angle), math.sin(angle)), 2)

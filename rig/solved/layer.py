@@ -61,10 +61,10 @@ class NotConverged(Exception):
     """Newton's method did not converge at an indentation, even in smaller steps."""
 
 
-def graded(first: float, growth: float, length: float) -> Floats:
+def graded(first: float, ratio: float, length: float) -> Floats:
     """Sizes of elements that grow from about `first` and fill a length."""
-    count = max(2, int(np.ceil(np.log1p((growth - 1) * length / first) / np.log(growth))))
-    sizes = growth ** np.arange(count)
+    count = max(2, int(np.ceil(np.log1p((ratio - 1) * length / first) / np.log(ratio))))
+    sizes = ratio ** np.arange(count)
     return np.asarray(length * sizes / sizes.sum())
 
 
@@ -72,13 +72,13 @@ def _shape(x: float) -> tuple[Floats, Floats]:
     return np.array([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2]), np.array([x - 0.5, -2 * x, x + 0.5])
 
 
-def _edges(sublayers: tuple[Sublayer, ...], size: float, growth: float) -> tuple[Floats, list[Material]]:
+def _edges(sublayers: tuple[Sublayer, ...], size: float, ratio: float) -> tuple[Floats, list[Material]]:
     """Heights of the elements' edges, from the base up, and the material of each row of elements."""
     top = sum(part.thickness for part in sublayers)
     edges, rows, low = [0.0], [], 0.0
     for part in sublayers:
-        fine = size + (growth - 1) * (top - low - part.thickness)  # an element's size there
-        steps = graded(min(fine, part.thickness / 2), growth, part.thickness)[::-1]
+        fine = size + (ratio - 1) * (top - low - part.thickness)  # an element's size there
+        steps = graded(min(fine, part.thickness / 2), ratio, part.thickness)[::-1]
         edges += list(low + np.cumsum(steps))
         rows += [part.material] * len(steps)
         low += part.thickness
@@ -86,7 +86,7 @@ def _edges(sublayers: tuple[Sublayer, ...], size: float, growth: float) -> tuple
 
 
 class PressedLayer:
-    """The layer and the sphere; each call of `press` goes on from the state before."""
+    """The layer and the sphere; each call of `press` continues from the previous state."""
 
     def __init__(
         self,
@@ -100,11 +100,11 @@ class PressedLayer:
         self.radius = radius
         self.top = float(sum(part.thickness for part in sublayers))
         size = min(widest / 20, _COARSEST) / fineness
-        growth = 1 + 0.35 / fineness
+        ratio = 1 + 0.35 / fineness
         fine = np.linspace(0, 1.1 * widest, int(np.ceil(1.1 * widest / size)) + 1)
         end = widest + _REACH if lateral is None else lateral
-        edges_r = np.concatenate([fine, fine[-1] + np.cumsum(graded(size, growth, end - fine[-1]))])
-        edges_z, rows = _edges(sublayers, min(1.5 * size, 0.12 / fineness), growth)
+        edges_r = np.concatenate([fine, fine[-1] + np.cumsum(graded(size, ratio, end - fine[-1]))])
+        edges_z, rows = _edges(sublayers, min(1.5 * size, 0.12 / fineness), ratio)
         self._build(edges_r, edges_z, rows)
         self.hardest = max(part.material.modulus for part in sublayers)
         self.penalty = _PENALTY * self.hardest
@@ -212,7 +212,7 @@ class PressedLayer:
 
         `held` are the points that touch (edges, points), even where they must pull; otherwise those inside the sphere.
         """
-        r, below = self._place()
+        r, below = self._positions()
         distance = np.hypot(r, below)
         gap = distance - self.radius
         touching = gap < 0 if held is None else held
@@ -287,19 +287,20 @@ class PressedLayer:
     def contact_radius(self) -> float:
         """Radius of the outermost point in contact."""
         touching = self._gap() < 0
-        return float(self._place()[0][touching].max()) if touching.any() else 0.0
+        return float(self._positions()[0][touching].max()) if touching.any() else 0.0
 
-    def _place(self) -> tuple[Floats, Floats]:
+    def _positions(self) -> tuple[Floats, Floats]:
         """Radius of the points of the upper face, and how far they lie below the sphere's centre."""
         u = self.u[self.edges]
         below = self.top + self.radius - self.depth - (self.z[self.edges] + u[..., 1]) @ self.n.T
         return (self.r[self.edges] + u[..., 0]) @ self.n.T, below
 
     def _gap(self) -> Floats:
-        return np.asarray(np.hypot(*self._place()) - self.radius)
+        return np.asarray(np.hypot(*self._positions()) - self.radius)
 
     def base_pressure(self, at: Floats) -> Floats:
-        """Compressive stress on the base at radii, from the nodal reactions by the consistent mass of the base."""
+        """Compressive stress on the base at radii, from the nodal reactions by the consistent mass matrix of the
+        base."""
         nodes = len(self.base)
         r = self.r[self.base]
         mass = np.zeros((nodes, nodes))
@@ -312,5 +313,5 @@ class PressedLayer:
         cell = np.clip(np.searchsorted(r[::2], at, side="right") - 1, 0, (nodes - 3) // 2)
         x = 2 * (at - r[2 * cell]) / (r[2 * cell + 2] - r[2 * cell]) - 1
         n = np.stack([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2])
-        found = np.sum(n * values[2 * cell + np.arange(3)[:, None]], axis=0)
-        return np.where(at <= r[-1], found, 0.0)
+        pressure = np.sum(n * values[2 * cell + np.arange(3)[:, None]], axis=0)
+        return np.where(at <= r[-1], pressure, 0.0)

@@ -1,7 +1,7 @@
-"""Worlds that the solved rig draws: the plain one, and one effect beside it.
+"""Worlds that the solved rig draws: the plain one, and one with an additional effect.
 
-The plain world is a rigid frictionless sphere in true contact with one incompressible neo-Hookean layer, its contact
-free to move. `exact_name` and `nearest_names` are the names of PHYSICS.md section 8 for what is added.
+The plain world is a rigid frictionless sphere in true contact with one incompressible neo-Hookean layer, with a moving
+contact edge. `exact_name` and `nearest_names` are the names of PHYSICS.md section 8 for the effect.
 """
 
 import math
@@ -42,7 +42,7 @@ class World:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def skin(self) -> Skin:
-        """What is solved."""
+        """The solved problem."""
         bulk = Material(poisson=self.parameters.get("poisson_ratio", 0.5), c2=self.parameters.get("c2", 0.0))
         film = self.parameters.get("film_thickness", 0.0)
         sublayers = [Sublayer(1.0 - film, bulk)]
@@ -82,5 +82,5 @@ def drawn_world(random: np.random.Generator, effect: str) -> World:
 
 
 def evenly_in_log(random: np.random.Generator, low: float, high: float) -> float:
-    """A value between two, even in its logarithm, to three digits."""
+    """A log-uniform value between two bounds, to three digits."""
     return float(f"{math.exp(random.uniform(math.log(low), math.log(high))):.3g}")

@@ -1,1 +1,1 @@
-"""Virtual measurement campaigns of an electronic skin, each with one concealed law that no catalogue lists."""
+"""Virtual measurement campaigns of an electronic skin, each with one hidden law that is in no catalogue."""

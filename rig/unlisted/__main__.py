@@ -16,10 +16,10 @@ def main() -> None:
     parser.add_argument("--output-dir", type=Path, required=True)
     parser.add_argument("--quiet", action="store_true", help="conceal nothing")
     parser.add_argument("--random-columns", type=int, default=0, help="further columns of conditions without meaning")
-    given = parser.parse_args()
-    truth = write(given.seed, given.count, given.output_dir, given.quiet, given.random_columns)
+    arguments = parser.parse_args()
+    truth = write(arguments.seed, arguments.count, arguments.output_dir, arguments.quiet, arguments.random_columns)
     identifiable = sum(bool(t["identifiable"]) for t in truth.values())
-    print(f"{len(truth)} campaigns, {identifiable} identifiable: {given.output_dir}")
+    print(f"{len(truth)} campaigns, {identifiable} identifiable: {arguments.output_dir}")
 
 
 if __name__ == "__main__":

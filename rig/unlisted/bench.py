@@ -44,7 +44,7 @@ class Companion:
 
 @dataclass(frozen=True)
 class State:
-    """What is really there in each recording."""
+    """The true state in each recording."""
 
     radius_mm: Array
     thickness_mm: Array
@@ -65,7 +65,7 @@ def base_state(design: Design) -> State:
 def state(design: Design, law: Law | None, shift: Array | None = None) -> State:
     """The state under a law; `shift` is a further displacement of each contact, (n, 2), mm."""
     base = base_state(design)
-    place = design.offset_xy + (0.0 if shift is None else shift)
+    position = design.offset_xy + (0.0 if shift is None else shift)
     radius, h, gain, angle, force = base.radius_mm, base.thickness_mm, base.log_gain, base.loss_angle, base.force_n
     if law is not None and not law.spectral:
         u = law.u(design)
@@ -81,10 +81,10 @@ def state(design: Design, law: Law | None, shift: Array | None = None) -> State:
             case "thickness":
                 h = h * np.exp(u)
             case "position":
-                place = place + np.outer(u, [1.0, 0.0] if law.along == "x" else [0.0, 1.0])
+                position = position + np.outer(u, [1.0, 0.0] if law.along == "x" else [0.0, 1.0])
             case _:
                 angle = u
-    return State(np.asarray(radius), np.asarray(h), np.hypot(*place.T), gain, angle, np.asarray(force))
+    return State(np.asarray(radius), np.asarray(h), np.hypot(*position.T), gain, angle, np.asarray(force))
 
 
 def log_amplitude(design: Design, s: State) -> Array:
@@ -168,7 +168,7 @@ def static_log(design: Design, companion: Companion | None, s: State) -> Array:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the bench wrote down, and what only the bench knows."""
+    """The recorded data, and what only the bench knows."""
 
     frf: Complex
     exact: Complex

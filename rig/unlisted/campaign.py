@@ -120,7 +120,7 @@ def strengthen(rng: Generator, design: Design, law: Law) -> tuple[Law, bool]:
 
 
 def draw(rng: Generator, name: str, quiet: bool = False, random_columns: int = 0) -> Campaign:
-    """One campaign; a design in which the law cannot show at any strength is mostly drawn again."""
+    """One campaign; a design in which the law is invisible at any strength is mostly drawn again."""
     law: Law | None = None
     if quiet:
         design = draw_design(rng, careful=bool(rng.random() < 0.5))

@@ -1,9 +1,8 @@
 """Draws what was planned and noted: skin, sensors, spheres, sequence of recordings, conditions and noise levels.
 
-Units: mm, N, MPa, Hz, s; `recorded_at` is in hours since the midnight before the first recording.
-
-The skin is linear, so a design is drawn again until large strain would not show: the estimate of
-`layer.finite_strain_shift`, weighed with the gain error, stays below `FINITE_STRAIN_CHI2` over the whole campaign.
+Units: mm, N, MPa, Hz, s; `recorded_at` is in hours since the midnight before the first recording. The skin is linear,
+so a design is drawn again until large strain would be invisible: the estimate of `layer.finite_strain_shift`, relative
+to the gain error, stays below `FINITE_STRAIN_CHI2` over the whole campaign.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ class Design:
 
     @property
     def count(self) -> int:
-        """How many recordings there are."""
+        """Number of recordings."""
         return int(self.sensor.size)
 
     def value(self, name: str) -> Array:
@@ -90,9 +89,9 @@ class Design:
 
     @property
     def offset_xy(self) -> Array:
-        """Commanded position less the sensor's place, (n, 2), mm."""
-        place = np.stack([self.value("x_mm"), self.value("y_mm")], axis=1)
-        return np.asarray(place - self.sensor_xy[self.sensor])
+        """Commanded position less the sensor's position, (n, 2), mm."""
+        position = np.stack([self.value("x_mm"), self.value("y_mm")], axis=1)
+        return np.asarray(position - self.sensor_xy[self.sensor])
 
 
 def draw_noise(rng: Generator, careful: bool, thickness_mm: float, scattered: bool) -> Noise:
@@ -168,11 +167,11 @@ def _plan(rng: Generator, needs: frozenset[str], careful: bool) -> Design:
     by_block = rng.random() < 0.3
     sphere = np.sort(np.arange(count) % spheres) if by_block else rng.permutation(np.arange(count) % spheres)
     which = np.asarray(rng.permutation(np.arange(count) % sensors), dtype=np.int64)
-    place = xy[which]
+    positions = xy[which]
     shown = {n for n in OPTIONAL if n in needs or rng.random() < 0.55}
     if needs & {"x_mm", "y_mm"} or ("position_mm" in shown and rng.random() < 0.7):
         shown.add("position_mm")
-        place = np.round(place + rng.uniform(-0.6, 0.6, size=(count, 2)) * min(h, 1.5 * r_t), 2)
+        positions = np.round(positions + rng.uniform(-0.6, 0.6, size=(count, 2)) * min(h, 1.5 * r_t), 2)
     hours = _times(rng, count)
     used = np.exp(rng.uniform(np.log(10.0), np.log(3e4), size=sensors))
     step = rng.exponential(1.0, size=count) * np.exp(rng.uniform(np.log(30.0), np.log(3e3)))
@@ -186,8 +185,8 @@ def _plan(rng: Generator, needs: frozenset[str], careful: bool) -> Design:
         "dynamic_force_n": np.asarray(rng.permutation(np.resize(ladder, count))),
         "load_cycles": np.round(cycles),
         "dwell_s": np.asarray(rng.choice([2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0], size=count)),
-        "x_mm": place[:, 0],
-        "y_mm": place[:, 1],
+        "x_mm": positions[:, 0],
+        "y_mm": positions[:, 1],
         "recorded_at": hours,
         "time_of_day": np.asarray(hours % 24.0),
         "order": np.arange(count, dtype=np.float64),
@@ -226,7 +225,7 @@ def _plan(rng: Generator, needs: frozenset[str], careful: bool) -> Design:
 
 
 def draw_design(rng: Generator, needs: frozenset[str] = frozenset(), careful: bool = True) -> Design:
-    """A design that has the axes in `needs` and in which large strain does not show."""
+    """A design that has the axes in `needs` and in which large strain is invisible."""
     while True:
         design = _plan(rng, needs, careful)
         load = float(np.max(design.value("preload_n")))
@@ -235,7 +234,7 @@ def draw_design(rng: Generator, needs: frozenset[str] = frozenset(), careful: bo
 
 
 def add_random_columns(rng: Generator, design: Design, count: int) -> Design:
-    """`count` further columns of conditions that mean nothing: numbers, drifting numbers, or words."""
+    """`count` further columns of irrelevant conditions: numbers, drifting numbers, or words."""
     columns, names = dict(design.columns), list(design.conditions)
     for index in range(count):
         name = f"note_{index + 1:02d}"
@@ -256,5 +255,5 @@ def axes(design: Design) -> tuple[str, ...]:
     hidden |= {n for n in ("load_cycles", "dwell_s") if n not in design.shown}
     if "recorded_at" not in design.shown:
         hidden |= {"recorded_at", "time_of_day"}
-    known = [n for n in design.columns if n not in hidden]
-    return tuple(n for n in known if np.unique(np.nan_to_num(design.value(n))).size > 1)
+    visible_columns = [n for n in design.columns if n not in hidden]
+    return tuple(n for n in visible_columns if np.unique(np.nan_to_num(design.value(n))).size > 1)

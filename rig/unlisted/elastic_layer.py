@@ -25,10 +25,10 @@ def layer_transfer(poisson_ratio: float, slip: float = 0.0) -> Array:
     """M at the wavenumbers of `transfer`, (200,); `slip` is 1/kappa, 0 for a bonded layer."""
     k, nu = transfer()[0], poisson_ratio
     fall, rise = np.exp(-k), 1.0 / np.tanh(k)
-    zero, one = np.zeros_like(k), np.ones_like(k)
+    zero, unit = np.zeros_like(k), np.ones_like(k)
     # f, f'/k and f''/k^2, then those of g, at the surface and at the base.
-    surface = ((one, -one, one), (zero, 1.0 / np.sinh(k), zero))
-    base = ((fall, -fall, fall), (one, rise, one))
+    surface = ((unit, -unit, unit), (zero, 1.0 / np.sinh(k), zero))
+    base = ((fall, -fall, fall), (unit, rise, unit))
 
     def normal(at: tuple[tuple[Array, Array, Array], ...], z: float) -> list[Array]:
         return [2.0 * (1.0 - nu) * d - z * k * dd for _, d, dd in at] + [-dd for _, _, dd in at]
@@ -41,5 +41,5 @@ def layer_transfer(poisson_ratio: float, slip: float = 0.0) -> Array:
     glue = [a - 2.0 * slip * k * b for a, b in zip(out, shear(base, 1.0), strict=True)]
     matrix = np.stack([np.stack(row, axis=-1) for row in (normal(surface, 0.0), shear(surface, 0.0), down, glue)], 1)
     load = np.stack([-1.0 / k, zero, zero, zero], axis=-1)
-    found = np.linalg.solve(matrix, load[..., None])[..., 0]
-    return np.asarray(-k * (np.stack(normal(base, 1.0), axis=-1) * found).sum(axis=-1))
+    solution = np.linalg.solve(matrix, load[..., None])[..., 0]
+    return np.asarray(-k * (np.stack(normal(base, 1.0), axis=-1) * solution).sum(axis=-1))

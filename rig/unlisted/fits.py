@@ -1,4 +1,4 @@
-"""Least-squares fits of the base model, of the true law and of its rivals, by one who knows the noise.
+"""Least-squares fits of the base model, of the true law and of its rivals, with known noise.
 
 Recordings: y = linear columns + Phi(u(x)), fitted by Levenberg-Marquardt over many shapes at once. A law other than on
 the gain may be referred to any state, so a constant c0 with the prior `REFERENCE` is added to its u.
@@ -150,9 +150,9 @@ def value(fit: Fit, observed: Observed, acts_on: str, along: str) -> Array:
 def predict(observed: Observed, change: Array, train: Index, test: Index) -> Array:
     """Best linear prediction of the residual at `test` from `train`, with Phi(u) = `change` given everywhere."""
     inner = observed.covariance[np.ix_(train, train)]
-    left = observed.residual[train] - change[train]
+    remaining = observed.residual[train] - change[train]
     x = observed.linear[:, train].T
-    solved = np.linalg.solve(inner, np.column_stack([left, x]))
+    solved = np.linalg.solve(inner, np.column_stack([remaining, x]))
     beta = np.linalg.solve(x.T @ solved[:, 1:], x.T @ solved[:, 0]) if x.shape[1] else np.zeros(0)
     cross = observed.covariance[np.ix_(test, train)]
     return np.asarray(change[test] + observed.linear[:, test].T @ beta + cross @ (solved[:, 0] - solved[:, 1:] @ beta))
@@ -196,8 +196,8 @@ class Lines:
         """The base model with its companion, if any: parameters and chi2."""
         if not self.extra.size:
             return self.extra, float((self.residual("", self.extra) ** 2).sum())
-        found = least_squares(partial(self.residual, ""), self.extra, max_nfev=25)
-        return np.asarray(found.x), 2.0 * float(found.cost)
+        solution = least_squares(partial(self.residual, ""), self.extra, max_nfev=25)
+        return np.asarray(solution.x), 2.0 * float(solution.cost)
 
     def fit(self, form: str, start: Array | None = None) -> tuple[Array, float]:
         """The best fit of one form: the two best points of a grid (and `start`), refined."""
@@ -211,8 +211,8 @@ class Lines:
         best: tuple[Array, float] | None = None
         for p in ranked:
             inside = np.clip(p, low + 1e-6, high - 1e-6)
-            found = least_squares(partial(self.residual, form), inside, bounds=(low, high), max_nfev=25)
-            if best is None or 2.0 * found.cost < best[1]:
-                best = (np.asarray(found.x), 2.0 * float(found.cost))
+            solution = least_squares(partial(self.residual, form), inside, bounds=(low, high), max_nfev=25)
+            if best is None or 2.0 * solution.cost < best[1]:
+                best = (np.asarray(solution.x), 2.0 * float(solution.cost))
         assert best is not None
         return best

@@ -53,7 +53,7 @@ class Shape:
 
 
 def filled(column: Column) -> Array:
-    """The axis without gaps."""
+    """The axis with missing values filled in."""
     return np.asarray(np.where(np.isnan(column.values), np.nanmin(column.values), column.values))
 
 
@@ -108,7 +108,7 @@ def _free(column: Column, x: Array) -> Array:
 
 
 def possible(name: str, column: Column) -> tuple[str, ...]:
-    """Forms that can be told on an axis at all: by its kind and its number of levels."""
+    """Forms that can be distinguished on an axis, by its kind and its number of levels."""
     levels = np.unique(filled(column))
     if column.words:
         return ("step", "free") if levels.size > 2 else ("step",)
@@ -131,7 +131,7 @@ def candidates(name: str, column: Column) -> list[Shape]:
     x = filled(column)
     levels = np.unique(x)
     low, span = float(levels[0]), float(np.ptp(levels))
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for form in possible(name, column):
         if form == "saturating":
             least = max(float(levels[1] - low), 0.02 * span)
@@ -150,8 +150,8 @@ def candidates(name: str, column: Column) -> list[Shape]:
             grid = [(t, w) for t in np.linspace(0.0, 1.0, 13) for w in (0.06, 0.12, 0.25)]
         else:
             grid = [()]
-        found += [shape(form, column, p) for p in grid]
-    return found
+        shapes += [shape(form, column, p) for p in grid]
+    return shapes
 
 
 def periods(name: str, column: Column) -> list[float]:

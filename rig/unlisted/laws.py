@@ -1,4 +1,4 @@
-"""The hidden laws: what they act on, along which axis, with which form, and what they are called."""
+"""The hidden laws: the quantity on which they act, their axis, form and name."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def listed(acts_on: str, axis: str, form: str, rising: bool) -> bool:
 
 
 def choose(rng: Generator) -> tuple[str, str]:
-    """What the law acts on and its axis."""
+    """The quantity on which the law acts, and its axis."""
     acts_on = str(rng.choice(list(WEIGHTS), p=list(WEIGHTS.values())))
     return acts_on, str(rng.choice(AXES[acts_on]))
 
@@ -159,15 +159,15 @@ def _draw_spectral(rng: Generator, design: Design) -> Law:
     """A minimum-phase response, the same in every recording."""
     f = design.frequency_hz
     form = str(rng.choice(FREQUENCY_FORMS))
-    place = float(np.log(np.exp(rng.uniform(np.log(4.0 * f[0]), np.log(0.5 * f[-1])))))
+    log_frequency = float(np.log(np.exp(rng.uniform(np.log(4.0 * f[0]), np.log(0.5 * f[-1])))))
     sign = 1.0 if form in ("power", "saturating", "exponential") or rng.random() < 0.5 else -1.0
-    p: tuple[float, ...] = (sign, place)
+    p: tuple[float, ...] = (sign, log_frequency)
     if form in ("linear", "power", "exponential"):
         p = (sign,)
     elif form == "periodic":
         p = (sign, float(np.log(f[-1] / rng.uniform(1.0, 4.0))))
     elif form == "peak":
-        p = (sign, place, float(np.log(rng.uniform(0.06, 0.3))))
+        p = (sign, log_frequency, float(np.log(rng.uniform(0.06, 0.3))))
     elif form == "free":
         p = tuple(float(v) for v in rng.uniform(-1.0, 1.0, size=FREE_KNOTS - 1))
     return Law("frequency_response", "frequency_hz", form, (), p)

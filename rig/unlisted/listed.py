@@ -1,7 +1,7 @@
 """Single mechanisms of the published catalogue, fitted to a campaign with a hidden law.
 
-A law that one of them describes as well is not unlisted. Each mechanism is fitted by one who owns the equations and
-the noise levels (with the nuisances of `observed.py`), beside the base model and the campaign's companion, whose
+A law that one of them describes as well is not unlisted. Each mechanism is fitted with the true equations and
+noise levels (with the nuisances of `observed.py`), beside the base model and the campaign's companion, whose
 parameters stay free. Mechanisms have no priors; bounds are wide.
 
 A mechanism is fitted to the numbers in which the law shows: to ln |FRF| of each recording (`listed_static.py`) if the
@@ -56,6 +56,6 @@ def least_chi2(residual: Callable[[Array], Array], starts: list[Array], low: Arr
     costs = [float((residual(p) ** 2).sum()) for p in points]
     best = min(costs)
     for i in np.argsort(costs)[: LEADING if low.size else 0]:
-        found = least_squares(residual, points[i], bounds=(low, high), x_scale="jac", max_nfev=EVALUATIONS)
-        best = min(best, 2.0 * float(found.cost))
+        solution = least_squares(residual, points[i], bounds=(low, high), x_scale="jac", max_nfev=EVALUATIONS)
+        best = min(best, 2.0 * float(solution.cost))
     return best

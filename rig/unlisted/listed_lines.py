@@ -116,6 +116,6 @@ def lines_chi2(lines: Lines) -> dict[str, float]:
         return least_chi2(residual, starts, *_bounds(lines, form.low, form.high))
 
     there = lines.companion.name if lines.companion is not None else ""
-    found = {name: min(map(least, forms)) for name, forms in _forms(lines).items() if name != there}
-    found["mains_pickup"] = min(_mains(lines, mains_hz) for mains_hz in (50.0, 60.0))
-    return found
+    chi2 = {name: min(map(least, forms)) for name, forms in _forms(lines).items() if name != there}
+    chi2["mains_pickup"] = min(_mains(lines, mains_hz) for mains_hz in (50.0, 60.0))
+    return chi2

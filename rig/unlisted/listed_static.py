@@ -69,8 +69,8 @@ class Skin:
 
     def stress(self, pressure: Array, m: Array | None = None) -> Array:
         """sigma of a pressure's transform (n, 200), on another layer if M is given."""
-        found = base_stress(pressure, self.rho, self.offset / self.h, m)
-        return np.asarray(np.maximum(found, SMALLEST_SIGMA))
+        stress = base_stress(pressure, self.rho, self.offset / self.h, m)
+        return np.asarray(np.maximum(stress, SMALLEST_SIGMA))
 
     def hertz(self, a: Array) -> Array:
         """Transform of Hertz's pressure on the radius a, (n, 200)."""
@@ -175,8 +175,8 @@ class Skin:
         dwell = self.design.value("dwell_s")
 
         def relaxed(p: Array) -> Array:
-            left = 1.0 - p[::2] @ (1.0 - np.exp(-dwell / np.exp(p[1::2])[:, None]))
-            return self.at_radius(self.radius / np.cbrt(np.maximum(left, 0.1)))
+            remaining = 1.0 - p[::2] @ (1.0 - np.exp(-dwell / np.exp(p[1::2])[:, None]))
+            return self.at_radius(self.radius / np.cbrt(np.maximum(remaining, 0.1)))
 
         single = tuple((0.2, np.log(tau)) for tau in (2.0, 20.0, 200.0))
         low, high = (0.0, np.log(0.1)), (0.8, np.log(1e4))
@@ -203,10 +203,10 @@ class Skin:
         return np.asarray(2.0 / HARMONIC_NODES * total / swing)
 
     def _misalignment(self) -> Form:
-        place = self.design.offset_xy
+        offset = self.design.offset_xy
 
         def moved(p: Array) -> Array:
-            return log_transmission(self.radius, self.h, self.r_t, np.hypot(*(place + p).T))
+            return log_transmission(self.radius, self.h, self.r_t, np.hypot(*(offset + p).T))
 
         angles = np.arange(6) * np.pi / 3.0
         rings = tuple((s * self.h * np.cos(t), s * self.h * np.sin(t)) for s in (0.1, 0.3, 0.7) for t in angles)
@@ -218,11 +218,11 @@ class Skin:
         np.fill_diagonal(apart, np.inf)
         if not np.isfinite(apart).any():
             return []
-        place = self.design.offset_xy + xy[self.design.sensor]
+        position = self.design.offset_xy + xy[self.design.sensor]
         near = (apart <= NEAR * apart.min())[self.design.sensor]
         total = np.zeros(self.force.size)
         for j, centre in enumerate(xy):
-            away = np.hypot(*(place - centre).T)
+            away = np.hypot(*(position - centre).T)
             total = total + near[:, j] * sigma(self.radius / self.h, self.rho, away / self.h)
         base = self.at_radius(self.radius)
         ratio = total / self.stress(self.hertz(self.radius))
@@ -251,10 +251,10 @@ def static_chi2(observed: Observed, companion: str = "", untouched: Observed | N
 
         return least_chi2(residual, [np.array(s) for s in form.starts], np.array(form.low), np.array(form.high))
 
-    found = {name: min(least(name, f) for f in forms) for name, forms in Skin(design).forms().items() if forms}
+    chi2 = {name: min(least(name, f) for f in forms) for name, forms in Skin(design).forms().items() if forms}
     white = whitener(observed, every)
     columns = white @ (design.sensor[:, None] == np.arange(1, len(design.sensor_xy)))
     if columns.shape[1]:
         gains = np.linalg.lstsq(columns, white @ observed.residual, rcond=None)[0]
-        found["sensor_spread"] = float(((white @ observed.residual - columns @ gains) ** 2).sum())
-    return found
+        chi2["sensor_spread"] = float(((white @ observed.residual - columns @ gains) ** 2).sum())
+    return chi2

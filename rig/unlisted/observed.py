@@ -49,7 +49,7 @@ class Table:
         return np.asarray(y0 + r * (d0 + r * (c + r * d))), np.asarray(slope)
 
     def rows(self, keep: npt.NDArray[np.intp]) -> Table:
-        """The same for some of the recordings."""
+        """The same for a subset of the recordings."""
         return Table(self.start, self.step, self.values[keep], self.slopes[keep], self.scale)
 
 
@@ -80,8 +80,8 @@ class Observed:
         kind = "contact_radius" if acts_on in _SLOPE else acts_on
         if (kind, along) not in self.tables:
             self.tables[kind, along] = _build(self.design, kind, along)
-        found = self.tables[kind, along]
-        return Table(found.start, found.step, found.values, found.slopes, _SLOPE.get(acts_on, 1.0))
+        table = self.tables[kind, along]
+        return Table(table.start, table.step, table.values, table.slopes, _SLOPE.get(acts_on, 1.0))
 
 
 def _build(design: Design, kind: str, along: str) -> Table:

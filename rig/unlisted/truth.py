@@ -1,6 +1,6 @@
-"""The truth about a campaign: the law, what its design cannot tell from the law, and what modelling it is worth.
+"""The truth about a campaign: the law, what the design cannot distinguish from it, and the gain from modelling it.
 
-All fits are by one who owns the equations and the noise levels (`fits.py`). Rivals are those that leave less than
+All fits use the true equations and noise levels (`fits.py`). Rivals are those that leave less than
 `INDISTINCT` more chi2 than the law's own form at its best:
 
 - form_also: another form, acting on the same quantity along the same axis;
@@ -10,7 +10,7 @@ All fits are by one who owns the equations and the noise levels (`fits.py`). Riv
 
 `chi2_gain_over_best_listed` is the gain over the best single mechanism of the published catalogue (`listed.py`): the
 gain over the base model less what that mechanism gains over the base model from the same numbers. A law is identifiable
-if both gains exceed `IDENTIFIABLE`; otherwise nobody can say that there is something, or that it is unlisted.
+if both gains exceed `IDENTIFIABLE`; otherwise no diagnosis can state that a law acts, or that it is unlisted.
 
 A free form fits whatever a narrower one does; it counts as a rival of free laws only. Positions may move along x or y.
 """
@@ -55,7 +55,7 @@ CLEAN_LINE = 0.05
 
 
 def observe(design: Design, data: Measurement, law: Law, companion: Companion | None) -> Observed:
-    """The numbers in which a law shows that does not go along frequency."""
+    """The numbers in which a law not along frequency is visible."""
     truth = state(design, law)
     if law.acts_on == "frequency_response":
         return loss_angles(design, data, responses(design, None, companion, base_state(design)))
@@ -74,7 +74,7 @@ def size_percent(design: Design, law: Law) -> tuple[float, float]:
 
 
 class Rivals:
-    """chi2 of every (acts_on, axis, form) that is asked for."""
+    """chi2 of each requested (acts_on, axis, form)."""
 
     def __init__(self, observed: Observed, law: Law) -> None:
         self.observed, self.law = observed, law
@@ -83,21 +83,21 @@ class Rivals:
     def forms(self, acts_on: str, axis: str) -> dict[str, float]:
         """The least chi2 of each form of one quantity along one axis."""
         design, law = self.observed.design, self.law
-        own = axis == law.axis
+        is_axis_of_law = axis == law.axis
         key = (multiplies(acts_on), axis)
         if key not in self.shapes:
             barred = {"free"} - {law.form} | (set() if multiplies(acts_on) else set(MULTIPLICATIVE))
             usable = [s for s in candidates(axis, design.columns[axis]) if s.form not in barred]
-            fair = own and law.form not in barred
+            fair = is_axis_of_law and law.form not in barred
             self.shapes[key] = [*usable, law.on(design)] if fair else usable
         shapes = self.shapes[key]
-        start = np.array(law.coefficients) if own and acts_on == law.acts_on else None
-        found: dict[str, float] = {}
+        start = np.array(law.coefficients) if is_axis_of_law and acts_on == law.acts_on else None
+        chi2: dict[str, float] = {}
         for along in ("x", "y") if acts_on == "position" else ("",):
             for fit in fit_shapes(self.observed, acts_on, along, shapes, start):
                 name = "notch" if fit.shape.form == "peak" and fit.coefficients[0] < 0 else fit.shape.form
-                found[name] = min(found.get(name, np.inf), fit.chi2)
-        return found
+                chi2[name] = min(chi2.get(name, np.inf), fit.chi2)
+        return chi2
 
     def close(self, acts_on: str, names: Iterable[str], limit: float) -> list[str]:
         """Axes on which some form of one quantity comes within the limit."""
@@ -131,17 +131,19 @@ def _listed(
 
 def _static_truth(design: Design, data: Measurement, law: Law, companion: Companion | None) -> dict[str, Any]:
     rivals = Rivals(observe(design, data, law, companion), law)
-    own = rivals.forms(law.acts_on, law.axis)
-    best = own[law.name] if law.name in own else own["peak" if law.name == "notch" else "notch"]
+    forms_of_law = rivals.forms(law.acts_on, law.axis)
+    best = (
+        forms_of_law[law.name] if law.name in forms_of_law else forms_of_law["peak" if law.name == "notch" else "notch"]
+    )
     limit = best + INDISTINCT
     axis_also = rivals.close(law.acts_on, [n for n in axes(design) if n != law.axis], limit)
-    others = [q for q in STATIC if q != law.acts_on] if law.acts_on != "frequency_response" else []
+    other_quantities = [q for q in STATIC if q != law.acts_on] if law.acts_on != "frequency_response" else []
     over_base = base_chi2(rivals.observed) - best
     return _gains(over_base, *_listed(rivals.observed, data, law, companion)) | {
-        "form_also": sorted(n for n, chi2 in own.items() if n != law.name and chi2 < limit),
+        "form_also": sorted(n for n, chi2 in forms_of_law.items() if n != law.name and chi2 < limit),
         "axis_also": sorted(axis_also),
         "acts_on_also": sorted(
-            q for q in others if {q, law.acts_on} <= CONTACT or rivals.close(q, [law.axis, *axis_also], limit)
+            q for q in other_quantities if {q, law.acts_on} <= CONTACT or rivals.close(q, [law.axis, *axis_also], limit)
         ),
     }
 
@@ -149,14 +151,14 @@ def _static_truth(design: Design, data: Measurement, law: Law, companion: Compan
 def _spectral_truth(design: Design, data: Measurement, law: Law, companion: Companion | None) -> dict[str, Any]:
     lines = Lines(design, data, companion, state(design, law))
     _, base = lines.base()
-    found: dict[str, float] = {}
+    chi2_of_forms: dict[str, float] = {}
     for form in FREQUENCY_FORMS:
         if form == "free" and law.form != "free":
             continue
         p, chi2 = lines.fit(form, np.array(law.coefficients) if form == law.form else None)
-        found["notch" if form == "peak" and p[0] < 0 else form] = chi2
-    best = found.get(law.name, min(found.values()))
-    also = sorted(n for n, chi2 in found.items() if n != law.name and chi2 < best + INDISTINCT)
+        chi2_of_forms["notch" if form == "peak" and p[0] < 0 else form] = chi2
+    best = chi2_of_forms.get(law.name, min(chi2_of_forms.values()))
+    also = sorted(n for n, chi2 in chi2_of_forms.items() if n != law.name and chi2 < best + INDISTINCT)
     return _gains(base - best, base, lines_chi2(lines)) | {"form_also": also, "axis_also": [], "acts_on_also": []}
 
 
@@ -209,7 +211,7 @@ def held_out(
 
 
 def static_extra(design: Design, companion: Companion | None, truth: State) -> Array:
-    """What a static companion adds to ln |FRF|; `amplitudes` takes it out, predictions put it back."""
+    """The contribution of a static companion to ln |FRF|; `amplitudes` subtracts it, predictions add it."""
     return companion_column(design, companion, truth)[0] if companion else np.zeros(design.count)
 
 
@@ -217,7 +219,7 @@ def describe(
     design: Design, data: Measurement, law: Law | None, companion: Companion | None, test: Index
 ) -> dict[str, Any]:
     """The entry of one campaign in `truth.json`, without the numbers of its file."""
-    entry: dict[str, Any] = {
+    document: dict[str, Any] = {
         "effects": [companion.name] if companion else [],
         "kind": "unknown" if law else "nothing",
         "law": None,
@@ -229,18 +231,18 @@ def describe(
         "form_also": [], "axis_also": [], "acts_on_also": [],
     }  # fmt: skip
     if law is not None:
-        refit, kept = size_percent(design, law)
+        refit, size = size_percent(design, law)
         names = {"parameters": list(law.parameters), "coefficients": list(law.coefficients), "along": law.along}
-        entry["law"] = {
+        document["law"] = {
             "acts_on": law.acts_on, "axis": law.axis, "form": law.name, "expression": expression(law, design),
-            "size_percent": refit, "size_with_d33_kept_percent": kept, "parameters": names,
+            "size_percent": refit, "size_with_d33_kept_percent": size, "parameters": names,
         }  # fmt: skip
-        entry |= (_spectral_truth if law.spectral else _static_truth)(design, data, law, companion)
-        gains = (entry["chi2_gain_over_base"], entry["chi2_gain_over_best_listed"])
-        entry["identifiable"] = min(gains) > IDENTIFIABLE
-    entry |= held_out(design, data, law, companion, test)
+        document |= (_spectral_truth if law.spectral else _static_truth)(design, data, law, companion)
+        gains = (document["chi2_gain_over_base"], document["chi2_gain_over_best_listed"])
+        document["identifiable"] = min(gains) > IDENTIFIABLE
+    document |= held_out(design, data, law, companion, test)
     noise = design.noise
-    entry |= {
+    document |= {
         "noise_floor_percent": noise_floor(design, data),
         "companion_parameters": list(companion.parameters) if companion else [],
         "d33_pc_per_n": [float(v) for v in np.exp(data.log_d33)],
@@ -252,4 +254,4 @@ def describe(
         "recordings": design.count,
         "lines": int(design.frequency_hz.size),
     }  # fmt: skip
-    return entry
+    return document

@@ -26,8 +26,10 @@ def expression(law: Law, design: Design) -> str:
         symbol = SYMBOL[law.acts_on]
         if law.form == "power":
             exponent = "F" if axis == "preload_n" else "R"
-            whole = f" (in all {exponent}^{1.0 / 3.0 + c[0]:.3f} instead of {exponent}^(1/3))" if law.altered else ""
-            return f"{symbol}·({axis}/{_mean(column):.4g})^{c[0]:.4g}{whole}"
+            exponent_in_words = (
+                f" (in all {exponent}^{1.0 / 3.0 + c[0]:.3f} instead of {exponent}^(1/3))" if law.altered else ""
+            )
+            return f"{symbol}·({axis}/{_mean(column):.4g})^{c[0]:.4g}{exponent_in_words}"
         body = _body(law, column)
         return f"{symbol}·exp({body})" if law.form == "exponential" else f"{symbol}·(1 {body})"
     body = _body(law, column)
@@ -54,8 +56,8 @@ def _body(law: Law, column: Column) -> str:
             return f"{c[0]:+.4g}·(1 - exp(-({axis} - {low:.4g})/{p[0]:.4g}))"
         case "threshold":
             side = "above" if p[1] > 0.0 else "below"
-            place = f"{from_unit(column, p[0]):.4g}"
-            return f"{c[0]:+.4g}·t, t how far {log}{axis} is {side} that of {place}, over its range"
+            position = f"{from_unit(column, p[0]):.4g}"
+            return f"{c[0]:+.4g}·t, t how far {log}{axis} is {side} that of {position}, over its range"
         case "step":
             return f"{c[0]:+.4g} where {axis} {f'is {column.words[int(p[0])]}' if column.words else f'> {p[0]:.5g}'}"
         case "periodic":
@@ -70,7 +72,7 @@ def _body(law: Law, column: Column) -> str:
 
 def _along_frequency(law: Law, top: float) -> str:
     c = law.coefficients
-    place = f"{np.exp(c[1]):.4g} Hz" if len(c) > 1 else ""
+    centre = f"{np.exp(c[1]):.4g} Hz" if len(c) > 1 else ""
     match law.form:
         case "linear":
             return f"|H| = 1 {c[0]:+.4g} f/{top:.4g} Hz up to twice that, level above, minimum phase"
@@ -79,14 +81,14 @@ def _along_frequency(law: Law, top: float) -> str:
         case "exponential":
             return f"H = exp(-{c[0]:.4g} √(if/{top:.4g} Hz))"
         case "saturating":
-            return f"H = 1 {c[0]:+.4g} if/({place} + if)"
+            return f"H = 1 {c[0]:+.4g} if/({centre} + if)"
         case "threshold":
-            return f"H = (1 + if/{place})^{c[0]:.4g}"
+            return f"H = (1 + if/{centre})^{c[0]:.4g}"
         case "step":
-            return f"ln|H| {c[0]:+.4g} above {place}, minimum phase"
+            return f"ln|H| {c[0]:+.4g} above {centre}, minimum phase"
         case "periodic":
-            return f"H = 1 {c[0]:+.4g} exp(-2πif/{place})"
+            return f"H = 1 {c[0]:+.4g} exp(-2πif/{centre})"
         case "peak":
-            return f"H = (1 - v² + 2iz(1 {c[0]:+.4g})v)/(1 - v² + 2izv), v = f/{place}, z = {np.exp(c[2]):.3g}"
+            return f"H = (1 - v² + 2iz(1 {c[0]:+.4g})v)/(1 - v² + 2izv), v = f/{centre}, z = {np.exp(c[2]):.3g}"
         case _:
             return f"ln|H| a spline of ln f through 0, {', '.join(f'{v:.3g}' for v in c)}, minimum phase"

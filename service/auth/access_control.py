@@ -1,4 +1,4 @@
-"""Which requests are accepted: known Host, own Origin, a key where keys are needed, a body within the limit."""
+"""Access control: allowed Host and Origin headers, API key where one is required, body size within the limit."""
 
 import logging
 from collections.abc import Iterator, Mapping
@@ -24,10 +24,10 @@ SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 @dataclass(kw_only=True, eq=False)
 class AccessControl:
-    """Refuses requests before they reach a route.
+    """Rejects requests before they reach a route.
 
-    `keys_always`: to be reached from other machines, so that no request passes without a key; otherwise keys are needed
-    once one has been made, by `requirement`.
+    `keys_always`: the server is reachable from other machines, so every request needs a key; otherwise keys are
+    required once one was created, according to `requirement`.
     """
 
     host_names: frozenset[str]
@@ -43,8 +43,8 @@ class AccessControl:
         self._damage = ""  # of keys.json, as it was logged last
 
     def check(self, method: str, path: str, headers: Mapping[bytes, bytes], query: bytes = b"") -> Key | None:
-        """The key that came with the request, None where none is needed; raises Refusal. `query`: of the address, to
-        which a browser comes back once it is logged in."""
+        """The key sent with the request, None if none is required; raises Refusal. `query`: query string of the
+        address, to which a browser returns after the login."""
         host = headers.get(b"host", b"")
         if _name(host) not in self._hosts:
             raise Refusal(
@@ -56,18 +56,18 @@ class AccessControl:
         return None if path in OPEN else self._check_key(method, path, headers, query)
 
     def keys_needed(self) -> bool:
-        """Whether a request without a key is refused."""
+        """Whether a request without a key is rejected."""
         return self.keys_always or self.requirement.needed or self.keys.in_use()
 
     def keys_missing(self) -> bool:
-        """Whether keys are needed and keys.json is not there."""
+        """Whether keys are required although keys.json does not exist."""
         return self.keys_needed() and not self.keys.in_use()
 
     def check_size(self, size: int, path: str, headers: Mapping[bytes, bytes]) -> None:
-        """Refuses a body of more bytes than `path` takes.
+        """Rejects a body larger than the limit of `path`.
 
-        The connection stays open, so that the server reads and drops what is still under way: a client, or a proxy,
-        that cannot finish sending would report a broken connection instead of the refusal.
+        The connection stays open and the rest of the body is read and dropped: a client or proxy that cannot finish
+        sending would report a broken connection instead of the error.
         """
         if path in OPEN or path.startswith(_OPEN_PAGES):
             most, setting, smaller = _MOST_OPEN_BYTES, "", "a key and nothing else"
@@ -80,7 +80,7 @@ class AccessControl:
             raise Refusal(413, f"The body exceeds {limit}; send {smaller}.", title="Body too large")
 
     def key_of_login(self, token: str) -> Key | None:
-        """The key that somebody typed, None where it is not known; raises Refusal."""
+        """The key that was typed at the login, None if it is unknown; raises Refusal."""
         with self._readable_keys():
             return self.keys.find(token.strip().encode())
 
@@ -107,7 +107,7 @@ class AccessControl:
 
     @contextmanager
     def _readable_keys(self) -> Iterator[None]:
-        """Refuses a request that needs the keys while they cannot be read; the log says why, once a change."""
+        """Rejects a request that needs the keys while they cannot be read; the reason is logged once per change."""
         try:
             self.keys.entries()
             self._damage = ""
@@ -125,7 +125,8 @@ class AccessControl:
         return self.keys.find(token.strip()) if scheme.lower() == b"bearer" else None
 
     def _key_of_session(self, method: str, headers: Mapping[bytes, bytes]) -> Key | None:
-        """A browser sends its cookie by itself, so a request that changes something must say whose page it is of."""
+        """The key of a session cookie. A browser sends the cookie automatically, so a request that changes something
+        must also carry the token of a form."""
         if method not in SAFE and b"origin" not in headers:
             return None
         cookie = session.cookie_in(headers)
@@ -134,41 +135,41 @@ class AccessControl:
 
 
 def goes_to_disk(path: str) -> bool:
-    """Whether a body is written to the disk as it comes, and not held in memory."""
+    """Whether a body is streamed to disk instead of being held in memory."""
     return path in _UPLOADS
 
 
 def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
-    """Whether a body may be as large as uploads may: files are not read in memory, JSON is."""
+    """Whether the upload limit applies to a body: files are not read into memory, JSON is."""
     return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
 
 
 def _login_first(method: str, path: str, query: bytes, headers: Mapping[bytes, bytes]) -> Refusal:
-    """To the login, and back from it to what was asked for or, where a form was sent, to the page of the form."""
+    """Redirect to the login and then to the requested page or, for a submitted form, to the form's page."""
     if method in SAFE:
-        asked = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
-        return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={quote(asked)}"})
+        target = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
+        return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={quote(target)}"})
     form = "/" + headers.get(b"referer", b"").decode("latin-1").partition("//")[2].partition("/")[2]
     lost = {"Location": f"/login?next={quote(form)}&unsent=1"}
     return Refusal(303, "The session has ended: log in and send the form again.", headers=lost)
 
 
 def _key_first(authorization: bytes, missing: bool) -> Refusal:
-    known = "This key is not known; it may have been revoked." if authorization else "A key is needed."
+    reason = "This key is not known; it may have been revoked." if authorization else "A key is needed."
     if missing:
-        known = (
+        reason = (
             "A key is needed, and the service knows none: keys.json is missing from its data folder. "
             "Put it back, or make a key."
         )
     return Refusal(
         401,
-        f"{known} Send Authorization: Bearer KEY (`underskin key create NAME` makes one).",
+        f"{reason} Send Authorization: Bearer KEY (`underskin key create NAME` makes one).",
         headers={"WWW-Authenticate": "Bearer"},
     )
 
 
 def _check_origin(origin: bytes | None, host: bytes) -> None:
-    """A page of another origin must not change anything here, nor spend this machine's time."""
+    """Pages of another origin may neither change data nor use computing time here."""
     if origin is not None and origin.lower().partition(b"://")[2] != host.lower():
         raise Refusal(
             403,

@@ -1,4 +1,4 @@
-"""Whose request it is: the address of the client, also where it comes through a proxy."""
+"""The client's address, also behind a proxy."""
 
 import ipaddress
 from collections.abc import Sequence
@@ -12,26 +12,26 @@ _IPV6_PREFIX = 64  # one subscriber has all the addresses of such a network
 
 
 def client_address(request: Request, proxies: Sequence[_Network] = ()) -> str:
-    """The peer's address; of a peer on this machine, or in one of `proxies`, the last in `X-Forwarded-For`, which the
-    proxy there has set."""
+    """The peer's address; for a peer on this machine or in one of `proxies`, the last address in `X-Forwarded-For`,
+    which that proxy has set."""
     peer = request.client.host if request.client else ""
-    own = _parsed(peer)
-    if own is not None and (own.is_loopback or any(own in network for network in proxies)):
+    address = _parsed(peer)
+    if address is not None and (address.is_loopback or any(address in network for network in proxies)):
         forwarded = _parsed(request.headers.get("x-forwarded-for", "").rpartition(",")[2].strip())
-        own = own if forwarded is None else forwarded
-    return peer if own is None else str(own)
+        address = address if forwarded is None else forwarded
+    return peer if address is None else str(address)
 
 
 def network_of(address: str) -> str:
-    """What tries are counted by: an address, of IPv6 its network of 64 bits."""
-    known = _parsed(address)
-    if known is None or known.version == 4:
-        return str(known or address)
-    return str(ipaddress.ip_network((int(known), _IPV6_PREFIX), strict=False))
+    """The key by which login attempts are counted: the address, for IPv6 its /64 network."""
+    parsed = _parsed(address)
+    if parsed is None or parsed.version == 4:
+        return str(parsed or address)
+    return str(ipaddress.ip_network((int(parsed), _IPV6_PREFIX), strict=False))
 
 
 def _parsed(text: str) -> _Address | None:
-    """An address; one of IPv4 also where a socket of IPv6 writes it as `::ffff:192.0.2.7`. None where it is none."""
+    """An IP address, None if invalid; an IPv4-mapped IPv6 address (`::ffff:192.0.2.7`) gives the IPv4 address."""
     try:
         address = ipaddress.ip_address(text)
     except ValueError:

@@ -16,14 +16,14 @@ _JOIN_S = 10.0
 
 
 class KeyRequirement:
-    """What the store says, and keys.json where it is there; a thread of the server looks between `start` and `stop`.
+    """Whether keys are required, from the store and from keys.json; a thread polls both between `start` and `stop`.
 
-    What was needed stays needed until the store says that it was lifted: neither a store that does not answer nor one
-    that was restored from before the first key opens anything.
+    Once required, keys stay required until the store says that the requirement was lifted: neither a store that does
+    not answer nor one restored from before the first key opens the server.
     """
 
     def __init__(self, keys: KeyStore, store: Database) -> None:
-        """Nothing is looked at yet."""
+        """Polls nothing yet."""
         self.needed = False
         self._keys = keys
         self._store = store
@@ -33,7 +33,7 @@ class KeyRequirement:
         self._thread = threading.Thread(target=self._watch, name="key requirement", daemon=True)
 
     def look(self) -> None:
-        """Bring `needed` up to date, and the store where keys.json shows that a key was made."""
+        """Update `needed`, and the store if keys.json shows that a key was created."""
         row = self._store.read(key_requirement.find)
         if self._keys.file_exists():
             self.needed = True
@@ -43,11 +43,11 @@ class KeyRequirement:
             self._note()
 
     def start(self) -> None:
-        """Look from now on."""
+        """Start polling."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop polling."""
         self._ending.set()
         if self._thread.ident is not None:
             self._thread.join(_JOIN_S)

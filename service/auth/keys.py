@@ -1,4 +1,4 @@
-"""API keys: 256 random bits each, kept as SHA-256, which suffices for tokens that cannot be guessed."""
+"""API keys: 256 random bits each, stored as SHA-256 digests, which suffices for tokens that cannot be guessed."""
 
 import fcntl
 import hmac
@@ -31,7 +31,7 @@ class KeysUnreadable(ValueError):
 
 @dataclass(frozen=True)
 class Key:
-    """A key as it is kept. Scope `write` includes `read`."""
+    """A stored key. Scope `write` includes `read`."""
 
     name: str
     scope: Scope
@@ -40,7 +40,7 @@ class Key:
 
 
 class KeyStore:
-    """The keys in `folder`/keys.json, read again within a second of a change, so that revoking needs no restart."""
+    """The keys in `folder`/keys.json, read again within a second of a change, so revoking needs no restart."""
 
     def __init__(self, folder: Path) -> None:
         """Nothing is read yet."""
@@ -51,11 +51,12 @@ class KeyStore:
         self._fresh_until = 0.0
 
     def file_exists(self) -> bool:
-        """Whether there is a file of keys, now."""
+        """Whether the file of keys exists now."""
         return self.path.exists()
 
     def in_use(self) -> bool:
-        """Whether there is a file of keys: revoking the last one, or damaging the file, opens nothing."""
+        """Whether the file of keys exists: it does after the last key was revoked and if it is damaged, so neither
+        opens the server."""
         self._keep_fresh()
         return self._stamp is not None
 
@@ -89,7 +90,7 @@ class KeyStore:
         return self._keys
 
     def find(self, token: bytes) -> Key | None:
-        """The key that `token` is, compared in constant time; one that has just been created is known at once."""
+        """The key of `token`, compared in constant time; a key created just now is found at once."""
         digest = sha256(token).hexdigest()
         match = _match(digest, self.entries())
         if match is None:
@@ -98,7 +99,7 @@ class KeyStore:
         return match
 
     def create(self, name: str, scope: Scope) -> str:
-        """Keep a new key and return its token, which is shown once and kept nowhere."""
+        """Store a new key and return its token, which is shown once and stored nowhere."""
         token = "us_" + secrets.token_urlsafe(32)
         created = datetime.now(UTC).isoformat(timespec="seconds")
         with self._changing() as keys:
@@ -108,7 +109,7 @@ class KeyStore:
         return token
 
     def revoke(self, name: str) -> None:
-        """Forget a key; raises InvalidInput where there is none of that name."""
+        """Delete a key; raises InvalidInput if no key has that name."""
         with self._changing() as keys:
             remaining = [key for key in keys if key.name != name]
             if len(remaining) == len(keys):
@@ -116,13 +117,13 @@ class KeyStore:
             keys[:] = remaining
 
     def remove(self) -> None:
-        """Forget all keys, and that there were any; a damaged file goes, too."""
+        """Delete all keys and the requirement for them; a damaged file is deleted too."""
         with self._locked():
             self.path.unlink(missing_ok=True)
 
     @contextmanager
     def _changing(self) -> Iterator[list[Key]]:
-        """The keys, to be changed in place by one process at a time; written whole or not at all."""
+        """The keys for modification in place, by one process at a time; the file is written completely or not."""
         with self._locked():
             self._refresh()
             keys = list(self._readable())
@@ -146,7 +147,7 @@ def _match(digest: str, keys: tuple[Key, ...]) -> Key | None:
 
 
 def keys_missing(keys: KeyStore) -> str:
-    """What is said where keys are needed and there is no file of them."""
+    """The message if keys are required and there is no file of keys."""
     return (
         f"keys are needed, and {keys.path}, which no backup holds, is missing: put it back, or make a key with "
         "`underskin key create NAME`"
@@ -154,7 +155,7 @@ def keys_missing(keys: KeyStore) -> str:
 
 
 def _read(path: Path) -> tuple[Key, ...]:
-    keys = tuple(Key(**entry) for entry in json.loads(path.read_text())["keys"])
+    keys = tuple(Key(**fields) for fields in json.loads(path.read_text())["keys"])
     for key in keys:
         if not (isinstance(key.name, str) and len(bytes.fromhex(key.sha256)) == sha256().digest_size):
             raise ValueError(f"key {key.name!r} has no digest")
@@ -176,7 +177,7 @@ def _write(path: Path, keys: list[Key]) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """Of a file of keys that cannot be read, in words."""
+    """Why a file of keys cannot be read, in words."""
     if isinstance(error, OSError):
         return str(error.strerror)
     return str(error) if isinstance(error, ValueError) else "it lacks what a key has"

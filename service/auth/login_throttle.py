@@ -1,4 +1,4 @@
-"""How often an address may try a key on the login page: a few at once, then one every few seconds."""
+"""Rate limit of login attempts by address: a few at once, then one every few seconds."""
 
 import threading
 import time
@@ -9,15 +9,15 @@ _MOST_ADDRESSES = 10_000  # remembered; the one that was not heard of for the lo
 
 
 class LoginThrottle:
-    """Failed tries, and those under way, by address; each is forgotten after a while. For any number of threads."""
+    """Failed and pending attempts by address, each forgotten after a while. Thread-safe."""
 
     def __init__(self) -> None:
-        """Nobody has failed yet."""
+        """Without failed attempts."""
         self._lock = threading.Lock()
         self._used: OrderedDict[str, tuple[float, float]] = OrderedDict()  # tries that count still, and when they did
 
     def begin(self, address: str) -> float:
-        """Count a try; else the seconds until this address may try again, where it may not now."""
+        """Count an attempt and return 0, or return the seconds until this address may try again."""
         with self._lock:
             counting = self._counting(address)
             if counting + 1 > AT_ONCE:
@@ -26,7 +26,7 @@ class LoginThrottle:
             return 0.0
 
     def succeeded(self, address: str) -> None:
-        """Forget a try: the key was right."""
+        """Forget an attempt: the key was right."""
         with self._lock:
             self._count(address, max(0.0, self._counting(address) - 1))
 

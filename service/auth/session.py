@@ -1,8 +1,8 @@
-"""The browser's session: a cookie that says which key was logged in with, and the token that its forms must carry.
+"""The browser's session: a cookie that names the key used at the login, and the token that its forms must carry.
 
-A session is signed with the kept digest of its key, so that the cookie is stored nowhere, a restart ends none, and a
-revoked key ends all of its own; one alone is ended by its id (sessions.py). Before a login, or where no key is needed,
-the cookie is a random text that binds the forms alone.
+The cookie is signed with the stored digest of its key, so it is stored nowhere, survives a restart, and ends when the
+key is revoked; a single session is ended by its id (sessions.py). Before a login, or if no key is required, the cookie
+is a random text that only binds the forms.
 """
 
 import base64
@@ -22,28 +22,28 @@ _TIME = re.compile("[0-9]{1,12}")  # in seconds since 1970
 
 
 def anonymous() -> str:
-    """A cookie for who has not logged in."""
+    """A cookie for a browser that has not logged in."""
     return secrets.token_urlsafe(24)
 
 
 def logged_in(key: Key) -> str:
-    """A cookie for who has shown a key."""
+    """A cookie for a browser that has logged in with a key."""
     body = f"{anonymous()}.{key.sha256[:_ID_DIGITS]}.{int(time.time()) + LASTS_S}"
     return f"{body}.{_signature(key, body)}"
 
 
 def id_of(cookie: str) -> str:
-    """What a session is called in lists: it tells nothing of the cookie."""
+    """The public id of a session in lists; it reveals nothing of the cookie."""
     return sha256(cookie.encode("utf-8", "replace")).hexdigest()[:_ID_DIGITS]
 
 
 def expires(cookie: str) -> int:
-    """When a session that `logged_in` made expires, in seconds since 1970."""
+    """When a session made by `logged_in` expires, in seconds since 1970."""
     return int(cookie.split(".")[2])
 
 
 def key_of(cookie: str, keys: KeyStore) -> Key | None:
-    """The key that was logged in with; None where the cookie is anonymous, too old, or not of a key that is known."""
+    """The key of the login; None for a cookie that is anonymous, expired, or of an unknown key."""
     body, dot, signature = cookie.rpartition(".")
     parts = body.split(".")
     if not dot or len(parts) != 3 or not _TIME.fullmatch(parts[2]) or int(parts[2]) < time.time():
@@ -55,17 +55,17 @@ def key_of(cookie: str, keys: KeyStore) -> Key | None:
 
 
 def form_token(cookie: str) -> str:
-    """What a form of this session carries: another site can neither read the cookie nor guess it."""
+    """The token in this session's forms: another site can neither read the cookie nor guess it."""
     return _digest(cookie.encode(), b"form")
 
 
 def is_form_token(cookie: str, token: str) -> bool:
-    """Whether a form was made for this session."""
+    """Whether a form's token belongs to this session."""
     return bool(cookie) and hmac.compare_digest(form_token(cookie).encode(), token.encode("utf-8", "replace"))
 
 
 def cookie_in(headers: Mapping[bytes, bytes]) -> str:
-    """The session's cookie of a request; empty where it has none."""
+    """The session cookie of a request, empty if there is none."""
     # By hand: other services of the same host may have set cookies that http.cookies stops at.
     for part in headers.get(b"cookie", b"").decode("latin-1").split(";"):
         name, _, value = part.strip().partition("=")

@@ -1,4 +1,4 @@
-"""The sessions that go on, as the store knows them: each login is noted, and ending one ends it on every server."""
+"""Open sessions in the store: each login is recorded, and ending a session ends it on every server."""
 
 import logging
 import threading
@@ -23,13 +23,13 @@ _STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
 class Sessions:
-    """Which sessions were ended; a thread of the server looks between `start` and `stop`.
+    """Ended sessions; a thread polls the store between `start` and `stop`.
 
-    What was ended stays so for this process, whatever store is restored meanwhile.
+    An ended session stays ended for this process, whatever store is restored meanwhile.
     """
 
     def __init__(self, store: Database) -> None:
-        """Nothing is looked at yet."""
+        """Polls nothing yet."""
         self._store = store
         self._ended: frozenset[str] = frozenset()
         self._adding = threading.Lock()
@@ -38,23 +38,24 @@ class Sessions:
         self._thread = threading.Thread(target=self._watch, name="sessions", daemon=True)
 
     def has_ended(self, cookie: str) -> bool:
-        """Whether the session of a cookie was ended, as of the last look."""
+        """Whether the session of a cookie was ended, as of the last poll."""
         return session.id_of(cookie) in self._ended
 
     def begin(self, key: Key, address: str, browser: str) -> str:
-        """The cookie of a new session; noted where the store takes it, else the log says why it is listed nowhere."""
+        """The cookie of a new session, recorded in the store; if that fails, the log says why the session is not
+        listed."""
         cookie = session.logged_in(key)
         expires_at = stored(datetime.fromtimestamp(session.expires(cookie), UTC).isoformat())
         shown = "".join(letter for letter in browser if letter.isprintable())[:_LONGEST_BROWSER]
         noted = sessions.NewSession(session.id_of(cookie), key.name, key.sha256, address, shown, expires_at)
         try:
             self._store.write(sessions.add, noted)
-        except _STORE_FAILED as error:  # on a full disk what is kept can be read, by who logs in now, too
+        except _STORE_FAILED as error:  # on a full disk stored data can still be read, also by those who log in now
             self._failure.log("a login cannot be noted: the session ends with its key, or when it expires", error)
         return cookie
 
     def listed(self, key: Key) -> Sequence[AnyRow]:
-        """The sessions of a key that go on, the latest first."""
+        """The open sessions of a key, the latest first."""
         return self._store.read(sessions.listed, key.sha256)
 
     def end(self, session_id: str, key: Key) -> None:
@@ -63,7 +64,7 @@ class Sessions:
         self._add({session_id})
 
     def log_out(self, cookie: str, key: Key) -> None:
-        """End the session of a cookie on this server whatever happens to the store; the log says what did."""
+        """End the session of a cookie on this server even if the store fails; a failure is logged."""
         self._add({session.id_of(cookie)})
         try:
             self._store.write(sessions.end, session.id_of(cookie), key.sha256)
@@ -73,21 +74,21 @@ class Sessions:
             self._failure.log("a logout cannot be kept: the session ends on this server alone", error)
 
     def look(self) -> None:
-        """Bring what was ended up to date."""
+        """Update the set of ended sessions."""
         self._add(self._store.read(sessions.ended))
 
     def start(self) -> None:
-        """Look from now on."""
+        """Start polling."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop polling."""
         self._ending.set()
         if self._thread.ident is not None:
             self._thread.join(_JOIN_S)
 
     def _add(self, ended: AbstractSet[str]) -> None:
-        """One at a time, lest what another thread adds meanwhile is lost."""
+        """Add under a lock, so that no addition of another thread is lost."""
         with self._adding:
             self._ended |= ended
 

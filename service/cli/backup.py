@@ -41,7 +41,7 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
     try:
         make_data_folder(settings.data)
         store = database(settings.database_url, settings.data)
-        before = backups.place(store, settings.data, "before-restore")
+        before = backups.path_for(store, settings.data, "before-restore")
         store.make()
         if migrate.version(store) is not None:
             _remember_mechanisms(store)
@@ -52,7 +52,7 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
         raise UnderskinError(first_line(error)) from error
     typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))
     try:
-        _say_of_mechanisms(store.read(mechanism_files.put_back))
+        _report_mechanisms(store.read(mechanism_files.put_back))
     except OSError as error:
         raise UnderskinError(f"the store is restored, but the mechanisms of the lab's own are not: {error}") from error
     if needed:
@@ -67,10 +67,10 @@ def _remember_mechanisms(store: Database) -> None:
         typer.echo(f"mechanisms of the lab's own are in the backup as they were at the last one: {error}", err=True)
 
 
-def _say_of_mechanisms(found: mechanism_files.PutBack) -> None:
+def _report_mechanisms(outcome: mechanism_files.PutBack) -> None:
     for names, became in (
-        (found.written, "put back"),
-        (found.replaced, "put back; what the folder has in their place is set aside in discarded"),
+        (outcome.written, "put back"),
+        (outcome.replaced, "put back; what the folder has in their place is set aside in discarded"),
     ):
         if names:
             typer.echo(f"mechanisms of the lab's own in {os.environ[FOLDER]} {became}: {', '.join(names)}")

@@ -7,7 +7,7 @@ import typer
 
 from service.cli.shared import read_settings, use_folder_of_lab
 from service.jobs import WorkerProcesses
-from service.jobs.process import Given
+from service.jobs.process import CampaignInput
 from service.settings import Settings
 from service.usecases.checkup import examine
 from service.usecases.observation import Level, Observation
@@ -54,19 +54,24 @@ def doctor(
     settings = read_settings()  # one that is wrong ends this with 2 as well: no server starts with it
     use_folder_of_lab(settings)
     findings = list(examine(settings))
-    tables = next(one for one in findings if one.check == "tables")
+    tables = next(observation for observation in findings if observation.check == "tables")
     findings.append(_of_workers(settings, has_tables=tables.level is Level.OK))
     if as_json:
         entries = [
-            {"check": one.check, "level": one.level.name.lower(), "found": one.found, "advice": one.advice}
-            for one in findings
+            {
+                "check": observation.check,
+                "level": observation.level.name.lower(),
+                "found": observation.found,
+                "advice": observation.advice,
+            }
+            for observation in findings
         ]
         typer.echo(json.dumps(entries, indent=1, ensure_ascii=False))
     else:
-        for one in findings:
-            advice = f"\n{'':31}→ {one.advice}" if one.advice else ""
-            typer.echo(f"{_MARKS[one.level]:>9}  {one.check:20}{one.found}{advice}")
-    raise typer.Exit(max(one.level for one in findings))
+        for observation in findings:
+            advice = f"\n{'':31}→ {observation.advice}" if observation.advice else ""
+            typer.echo(f"{_MARKS[observation.level]:>9}  {observation.check:20}{observation.found}{advice}")
+    raise typer.Exit(max(observation.level for observation in findings))
 
 
 def _of_workers(settings: Settings, *, has_tables: bool) -> Observation:
@@ -84,10 +89,10 @@ def _of_workers(settings: Settings, *, has_tables: bool) -> Observation:
             settings.diagnosis_seconds,
             keeps_ready=False,
         )
-        with processes.at_work([Given(json.dumps(_TRIAL).encode(), "trial")]) as worker:
+        with processes.at_work([CampaignInput(json.dumps(_TRIAL).encode(), "trial")]) as worker:
             while not worker.ended and worker.news.wait(_LIMIT_S):
                 worker.news.clear()
-            failure = "" if "report" in worker.said else worker.failure if worker.ended else "it did not end"
+            failure = "" if "report" in worker.messages else worker.failure if worker.ended else "it did not end"
         processes.stop()
     except OSError as error:
         failure = str(error)

@@ -42,8 +42,8 @@ def list_keys() -> None:
     settings = read_settings()
     keys = KeyStore(settings.data)
     try:
-        for entry in keys.entries():
-            typer.echo(f"{entry.name}\t{entry.scope}\t{entry.created}")
+        for stored_key in keys.entries():
+            typer.echo(f"{stored_key.name}\t{stored_key.scope}\t{stored_key.created}")
         if not keys.file_exists() and _keys_needed(settings):
             typer.echo(f"underskin: {keys_missing(keys)}", err=True)
     except (*STORE_ERRORS, OSError, ValueError) as error:
@@ -65,10 +65,10 @@ def list_sessions() -> None:
     settings = read_settings()
     try:
         with closing(database(settings.database_url, settings.data)) as store:
-            known = store.is_made() and store.read(sessions.is_known)
-            for row in store.read(sessions.listed) if known else ():
-                entry = (row.id, row.key_name, row.started_at, row.expires_at, row.address, row.browser)
-                typer.echo("\t".join(entry))
+            has_sessions = store.is_made() and store.read(sessions.has_table)
+            for row in store.read(sessions.listed) if has_sessions else ():
+                cells = (row.id, row.key_name, row.started_at, row.expires_at, row.address, row.browser)
+                typer.echo("\t".join(cells))
     except (*STORE_ERRORS, OSError) as error:
         fail(error)
 
@@ -79,7 +79,7 @@ def end_session(session_id: Annotated[str, typer.Argument(help="As `underskin ke
     settings = read_settings()
     try:
         with closing(database(settings.database_url, settings.data)) as store:
-            if not store.is_made() or not store.read(sessions.is_known):
+            if not store.is_made() or not store.read(sessions.has_table):
                 raise StoreError("the store has no sessions yet")
             store.write(sessions.end, session_id)
     except (*STORE_ERRORS, Missing, OSError) as error:
@@ -121,7 +121,7 @@ def _note(settings: Settings, change: Callable[[Connection], None]) -> None:
         if not store.is_made():
             return
         with store.writing() as connection:
-            if key_requirement.is_known(connection):
+            if key_requirement.has_table(connection):
                 change(connection)
 
 

@@ -45,13 +45,13 @@ def serve(
     private = _is_loopback(host) and settings.host_names <= LOOPBACK_NAMES
     try:
         _require_writable(settings.data)
-        known = keys.entries()  # a damaged file ends the start, not every request
-        if not private and not known:
+        entries = keys.entries()  # a damaged file ends the start, not every request
+        if not private and not entries:
             where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
             fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
         use_folder_of_lab(settings)
-        CATALOGUE.load()  # what other packages add is refused here, not at the first file or diagnosis
+        CATALOGUE.load()  # errors of other packages' extensions end the start, not the first file or diagnosis
         formats_of_other_packages()
         ParsingLimits.from_environment()
         store = open_store(settings.database_url, settings.data)

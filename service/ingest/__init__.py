@@ -1,1 +1,1 @@
-"""From uploaded files to what the store keeps."""
+"""From uploaded files to stored campaigns."""

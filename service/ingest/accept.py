@@ -1,4 +1,4 @@
-"""Storing the campaigns of uploads in one transaction; a repeated request is answered as before."""
+"""Stores the campaigns of uploads in one transaction; a repeated request gets the earlier answer."""
 
 import hashlib
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from sqlalchemy import Connection
 from service.ingest import instruments, repeats
 from service.ingest.held_arrays import HeldArrays
 from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, look, require_few
-from service.ingest.rig_words import said_of
+from service.ingest.rig_words import rig_sentences
 from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, instrument_templates, skins
@@ -25,13 +25,13 @@ from underskin.recordings.rig_description import parse as parse_rig
 from underskin.several_errors import SeveralInvalid, errors_of
 
 RIG = "rig"  # name of the form's part that is a rig description
-_MOST_ERRORS = 100  # in the problem of a request of which nothing is kept
-_MOST_TOLD = 3  # of them in its sentence
+_MOST_ERRORS = 100  # in the problem of a request of which nothing is stored
+_MOST_LISTED_ERRORS = 3  # of them in its sentence
 
 
 @dataclass(frozen=True)
 class IngestOptions:
-    """What a client says about its uploads."""
+    """Options of an upload request."""
 
     skin: str | None
     corrects: str | None
@@ -44,7 +44,7 @@ class IngestOptions:
     most_unfolded_bytes: int
     estimator: Estimator | None = None
     turn_curves: bool = False  # that count pressing negative
-    by_kept_rig: bool = True  # whether the rig description kept with the skin counts where none is sent
+    use_stored_rig: bool = True  # whether the stored rig description of the skin is used if none is sent
     signed: str | None = None  # who corrects a campaign, as typed on a page; None: the sender
 
     def __post_init__(self) -> None:
@@ -58,7 +58,7 @@ class IngestOptions:
             validation.name("together", self.together, False)
 
     def request(self, uploads: Sequence[Upload]) -> answers.KnownRequest | None:
-        """What makes a repetition of this request recognisable."""
+        """Identity of this request, by which a repetition is recognised."""
         if self.idempotency_key is None:
             return None
         options: list[Any] = [self.skin, self.corrects, self.reason, self.all_or_nothing]
@@ -72,10 +72,8 @@ class IngestOptions:
 
 
 def accept(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> tuple[dict[str, Any], bool]:
-    """Keep what is good; the answer is a CampaignResult, or a BatchResult for a form or a list; True: it is repeated.
-
-    Raises Refusal where nothing is kept.
-    """
+    """Store the valid campaigns. Returns a CampaignResult, or a BatchResult for a form or a list, and whether the
+    request is a repetition. Raises Refusal if nothing is stored."""
     request = options.request(uploads)
     if request is not None:
         before = store.read(answers.replayed, request)
@@ -86,14 +84,14 @@ def accept(store: Database, uploads: Sequence[Upload], options: IngestOptions) -
     _require_keepable(arrived, options)
 
     def keep(connection: Connection) -> dict[str, Any]:
-        results = [_kept(connection, campaign, options, rig) for campaign in arrived]
+        results = [_store_campaign(connection, campaign, options, rig) for campaign in arrived]
         return {"campaigns": results} if uploads[0].in_form or arrived[0].in_list else results[0]
 
     return store.write(answers.once, request, keep)
 
 
 def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> RigDescription | None:
-    """The rig description that was sent, or else the one kept with the skin or with that of the corrected campaign."""
+    """The rig description of the request, or else the one stored with the skin or the corrected campaign."""
     for upload in uploads:
         if upload.field == RIG:
             try:
@@ -102,14 +100,14 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
                 raise error.of_field(RIG, upload.label) from None
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
-                raise SeveralInvalid([one.at(f"{label}{one.field}") for one in errors_of(error)]) from None
-    if not options.by_kept_rig:
+                raise SeveralInvalid([invalid.at(f"{label}{invalid.field}") for invalid in errors_of(error)]) from None
+    if not options.use_stored_rig:
         return None
     with store.reading() as connection:
         names = [options.skin] if options.skin is not None else []
         if options.corrects is not None:
             names.append(campaigns.find(connection, options.corrects).skin_id)
-        rigs = (kept_rig(connection, name) for name in names)
+        rigs = (stored_rig(connection, name) for name in names)
         return next((rig for rig in rigs if rig is not None), None)
 
 
@@ -121,76 +119,85 @@ def sent_rig(upload: Upload) -> RigDescription:
     return parse_rig(upload.start(LARGEST_BYTES), upload.label or RIG)
 
 
-def kept_rig(connection: Connection, skin_id: str) -> RigDescription | None:
-    """The rig description that is kept with a skin."""
+def stored_rig(connection: Connection, skin_id: str) -> RigDescription | None:
+    """The rig description stored with a skin."""
     document = skins.rig_of(connection, skin_id)
     return None if document is None else from_dict(orjson.loads(document))
 
 
 def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: IngestOptions) -> list[CheckedCampaign]:
-    """The campaigns of all files; one of them all where they go together."""
+    """The campaigns of all files; a single one if the files belong together."""
     files: list[ReadCampaign] = []
     recordings = 0
     held = HeldArrays(options.most_unfolded_bytes)
     for upload in uploads:
         if upload.field != RIG:
             more = look(upload, rig, options.most_json_bytes).campaigns
-            more = [one.with_curves_turned() for one in more] if options.turn_curves else more
-            files += [one.with_estimator(options.estimator) for one in more]
+            more = [file.with_curves_turned() for file in more] if options.turn_curves else more
+            files += [file.with_estimator(options.estimator) for file in more]
             held.add(more)
-            recordings += sum(one.recordings for one in more)
+            recordings += sum(file.recordings for file in more)
             require_few(len(files), recordings)
     if options.together is None or not files:
-        return [checked(one) for one in files]
+        return [checked(file) for file in files]
     return [joined(files, options.together, options.skin)]
 
 
 def _require_keepable(arrived: Sequence[CheckedCampaign], options: IngestOptions) -> None:
-    good = [entry for entry in arrived if entry.campaign is not None]
+    good = [campaign_file for campaign_file in arrived if campaign_file.campaign is not None]
     if options.corrects is not None and len(arrived) > 1:
         raise conflicting("corrects", options.corrects, f"needs one campaign in its place, not {len(arrived)}")
-    spoilt = any(entry.campaign is None or entry.refused for entry in arrived)
+    spoilt = any(campaign_file.campaign is None or campaign_file.refused for campaign_file in arrived)
     if good and not (options.all_or_nothing and spoilt):
         return
-    errors = [error for entry in arrived for error in _flat(entry, many=len(arrived) > 1)]
+    errors = [error for campaign_file in arrived for error in _flat(campaign_file, many=len(arrived) > 1)]
     raise Refusal(422, _in_words(arrived), title="Invalid input", errors=errors[:_MOST_ERRORS])
 
 
 def _in_words(arrived: Sequence[CheckedCampaign]) -> str:
-    """The first errors; those alike of many recordings are one."""
-    told = [line for entry in arrived for line in _lines(entry)]
-    if not told:
+    """The first errors in words; equal errors of many recordings are merged."""
+    messages = [line for file in arrived for line in _lines(file)]
+    if not messages:
         return "No campaign was sent."
-    more = max(0, len(told) - _MOST_TOLD) + sum(entry.unlisted for entry in arrived)
-    return "; ".join([f"Nothing was kept: {told[0]}", *told[1:_MOST_TOLD], *([f"and {more} more"] if more else [])])
+    more = max(0, len(messages) - _MOST_LISTED_ERRORS) + sum(file.unlisted for file in arrived)
+    return "; ".join(
+        [f"Nothing was kept: {messages[0]}", *messages[1:_MOST_LISTED_ERRORS], *([f"and {more} more"] if more else [])]
+    )
 
 
 def _lines(campaign: CheckedCampaign) -> list[str]:
     file = f"{campaign.file}: " if campaign.file else ""
-    alike = told_together((entry["id"], why_refused(error)) for entry in campaign.refused for error in entry["errors"])
+    alike = told_together(
+        (refused["id"], why_refused(error)) for refused in campaign.refused for error in refused["errors"]
+    )
     lines = [f"{file}{recordings_called(names)}: {why}" for names, why in alike]
     return lines or [f"{file}{why_refused(error)}" for error in campaign.errors]
 
 
 def _flat(campaign: CheckedCampaign, *, many: bool) -> list[dict[str, Any]]:
-    """All errors of a campaign as a problem lists them."""
+    """All errors of a campaign, in the form of a problem document."""
     prefix = f"{campaign.file}: " if many and campaign.file else ""
-    placed = [(f"{_place(entry['id'])}.", error) for entry in campaign.refused for error in entry["errors"]]
+    placed = [
+        (f"{_recording_prefix(refused['id'])}.", error) for refused in campaign.refused for error in refused["errors"]
+    ]
     if not placed:  # or they say no more than that every recording is refused
         placed = [("", error) for error in campaign.errors]
-    return [{**error, "index": None, "field": f"{prefix}{place}{error['field']}"} for place, error in placed]
+    return [
+        {**error, "index": None, "field": f"{prefix}{prefix_of_recording}{error['field']}"}
+        for prefix_of_recording, error in placed
+    ]
 
 
-def _place(recording: str) -> str:
+def _recording_prefix(recording: str) -> str:
     return recording if recording.startswith("recordings[") else f"recordings[{recording}]"
 
 
-def _kept(
+def _store_campaign(
     connection: Connection, checked: CheckedCampaign, options: IngestOptions, rig: RigDescription | None
 ) -> dict[str, Any]:
     campaign = checked.campaign
-    notes = [*(said_of(rig) if checked.by_rig and rig is not None else []), *checked.notes]
-    refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in checked.refused]
+    notes = [*(rig_sentences(rig) if checked.by_rig and rig is not None else []), *checked.notes]
+    refused = [{"id": refusal["id"], "status": "refused", "errors": refusal["errors"]} for refusal in checked.refused]
     result: dict[str, Any] = {"file": checked.file, "errors": checked.errors, "notes": notes, "findings": []}
     if campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
@@ -210,19 +217,19 @@ def _kept(
 
 
 def _of_corrected(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
-    """What is said of a correction that changes nothing, or names another skin than the campaign it corrects is on."""
+    """Notes on a correction that changes nothing, or that names another skin than the corrected campaign's."""
     same = repeats.changes_nothing(connection, campaign, options.skin, options.corrects)
     notes = ["it says the same as the campaign that it corrects"] if same else []
-    kept_on = None if options.skin else repeats.otherwise_named(connection, campaign, options.corrects)
-    if kept_on is not None:
+    stored_skin = None if options.skin else repeats.otherwise_named(connection, campaign, options.corrects)
+    if stored_skin is not None:
         named = f"it names skin {campaign.skin.id!r}"
-        notes.append(f"{named}, and was kept on skin {kept_on!r}, as the campaign that it corrects")
+        notes.append(f"{named}, and was kept on skin {stored_skin!r}, as the campaign that it corrects")
     return notes
 
 
 def _repeats(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
-    """What is said of recordings that are here already."""
-    earlier = repeats.already_kept(connection, campaign, options.skin, options.corrects)
+    """Notes on recordings that are already stored."""
+    earlier = repeats.earlier_campaign(connection, campaign, options.skin, options.corrects)
     if earlier is None:
         return []
     sentence, campaign_id = earlier

@@ -1,6 +1,6 @@
-"""Files that a request brings, written beside the event loop, a megabyte at a time.
+"""Uploaded files, written outside the event loop, one megabyte at a time.
 
-A disk may hang, or be slow: who then waits are uploads alone, in threads of their own.
+A slow or hanging disk delays only uploads, which have their own threads.
 """
 
 import hashlib
@@ -20,22 +20,22 @@ _Result = TypeVar("_Result")
 
 
 class DiskThreads:
-    """The few threads that wait for the disk of uploads; those that answer other requests are not among them."""
+    """A small thread pool for writing uploads, separate from the threads that answer other requests."""
 
     def __init__(self) -> None:
         """Within the event loop."""
         self._limiter = CapacityLimiter(_THREADS)
 
     async def run(self, work: Callable[[], _Result]) -> _Result:
-        """What `work` gives, or raises."""
+        """The result of `work`, or its exception."""
         return await to_thread.run_sync(work, limiter=self._limiter)
 
 
 class ArrivingFile:
-    """A file under way: what came of it is held until it is written."""
+    """A file being received; data are buffered until written."""
 
     def __init__(self, path: Path) -> None:
-        """Nothing came yet; it is made when it is first written."""
+        """Empty; the file is created at the first write."""
         self.path = path
         self.held = bytearray()
         self.ended = False
@@ -44,11 +44,11 @@ class ArrivingFile:
 
     @property
     def sha256(self) -> str:
-        """Of what was written."""
+        """SHA-256 digest of the written data."""
         return self._digest.hexdigest()
 
     def write(self) -> None:
-        """Write what is held, and close it where it has ended."""
+        """Write the buffer, and close the file if it is complete."""
         if self._file is None:
             self._file = self.path.open("xb")
         self._file.write(self.held)
@@ -58,7 +58,7 @@ class ArrivingFile:
             self._file.close()
 
     def close(self) -> None:
-        """Give it up where it has not ended."""
+        """Discard the file if it is incomplete."""
         if self._file is not None:
             self._file.close()
 
@@ -70,14 +70,14 @@ class ArrivingFiles:
         """An empty folder."""
         self._folder = folder
         self._threads = threads
-        self._begun = 0
+        self._count = 0
         self._unwritten: list[ArrivingFile] = []  # the last of them is the one that comes
         self._held_bytes = 0
 
     @classmethod
     @asynccontextmanager
     async def below(cls, parent: Path, threads: DiskThreads) -> AsyncIterator[Self]:
-        """In a new folder, which is gone at the end of the block."""
+        """In a new folder, removed at the end of the block."""
         folder = await threads.run(partial(tempfile.TemporaryDirectory, dir=parent))
         files = cls(Path(folder.name), threads)
 
@@ -93,28 +93,28 @@ class ArrivingFiles:
                 await threads.run(remove)
 
     def begin(self) -> ArrivingFile:
-        """The next file comes."""
-        file = ArrivingFile(self._folder / str(self._begun))
-        self._begun += 1
+        """Start the next file."""
+        file = ArrivingFile(self._folder / str(self._count))
+        self._count += 1
         self._unwritten.append(file)
         return file
 
     def take(self, data: bytes | memoryview) -> None:
-        """More of the file that comes."""
+        """Append data to the current file."""
         self._unwritten[-1].held += data
         self._held_bytes += len(data)
 
     def end(self) -> None:
-        """That file has ended."""
+        """The current file is complete."""
         self._unwritten[-1].ended = True
 
     async def write_much(self) -> None:
-        """Write what is held where that is much."""
+        """Write the buffers if they are large."""
         if self._held_bytes >= _AT_ONCE_BYTES:
             await self.write()
 
     async def write(self) -> None:
-        """Write what is held."""
+        """Write the buffers."""
         await self._threads.run(self._write)
 
     def _write(self) -> None:

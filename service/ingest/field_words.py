@@ -35,4 +35,4 @@ CHANNELS = {
     "frf_magnitude_pc_per_n": "FRF, magnitude",
     "frf_phase_deg": "FRF, phase",
     "coherence": "coherence γ²",
-}  # what a channel can be, of one kind or another
+}  # possible roles of a channel, for either kind

@@ -1,4 +1,4 @@
-"""The parts of a multipart form by their names: files, and texts, of which a request knows some."""
+"""The parts of a multipart form: files, and the text fields that a request knows."""
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
@@ -14,10 +14,11 @@ _LONGEST_TEXT = 4096  # bytes
 def split(
     uploads: Sequence[Upload], texts: Collection[str] = (), single_files: Collection[str] = ()
 ) -> tuple[dict[str, str], list[Upload]]:
-    """The values of the fields `texts`, and all other parts, which are files; a body that is no form is a file.
+    """The values of the text fields `texts`, and all other parts, which are files; a body that is not a form is one
+    file.
 
-    A part with a file name is a file, whatever the part is called; `single_files` are called what comes once at most.
-    Raises Refusal (422) that names each field that is unknown, given twice, or a file where a text belongs.
+    A part with a file name is a file, whatever its field name; a field of `single_files` may come once. Raises Refusal
+    (422) naming each field that is unknown, given twice, or a file in place of a text.
     """
     form = [upload for upload in uploads if upload.in_form]
     errors = [error for upload in form for error in _errors(upload, texts, single_files)]
@@ -26,16 +27,16 @@ def split(
     errors += [not_unique(name, f"{count[name]} parts") for name in once if count[name] > 1]
     if errors:
         raise invalid_input(errors)
-    values = {str(one.field): one.path.read_bytes().decode() for one in form if one.field in texts}
-    return values, [one for one in uploads if one.field not in texts]
+    values = {str(upload.field): upload.path.read_bytes().decode() for upload in form if upload.field in texts}
+    return values, [upload for upload in uploads if upload.field not in texts]
 
 
 def _errors(upload: Upload, texts: Collection[str], single_files: Collection[str]) -> Iterator[InvalidInput]:
-    """What is wrong with one part of a form."""
+    """Errors of one part of a form."""
     name = upload.field or ""
-    known = (*texts, FILE, *single_files)
-    if upload.label is None and name not in known:
-        yield unknown_name(name, _start(upload), known, "form field")
+    names = (*texts, FILE, *single_files)
+    if upload.label is None and name not in names:
+        yield unknown_name(name, _start(upload), names, "form field")
     elif name in texts and upload.label is not None:
         yield wrong_type(name, upload.label, "must be a text, not a file")
     elif name in texts and not _is_short_text(upload):
@@ -53,5 +54,5 @@ def _is_short_text(upload: Upload) -> bool:
 
 
 def _start(upload: Upload) -> str:
-    """As much of a text as an error shows."""
+    """The start of a text, as long as an error message shows."""
     return upload.start(100).decode("utf-8", "replace")

@@ -1,4 +1,4 @@
-"""How much memory the arrays of a request's campaigns take, which are all held until they are stored together."""
+"""Memory taken by the arrays of a request's campaigns, which are all held until they are stored together."""
 
 from collections.abc import Iterable, Iterator
 
@@ -10,7 +10,7 @@ from service.problems import Refusal
 
 
 class HeldArrays:
-    """The arrays of the campaigns that were read so far, all of them still held; `most_bytes` may be."""
+    """Total size of the arrays of the campaigns read so far; at most `most_bytes`."""
 
     def __init__(self, most_bytes: int) -> None:
         """Nothing was read yet."""
@@ -19,7 +19,7 @@ class HeldArrays:
         self._counted: set[int] = set()  # arrays that own their numbers: recordings may share one, or parts of it
 
     def add(self, campaigns: Iterable[ReadCampaign]) -> None:
-        """More was read; raises Refusal (413) where that is too much."""
+        """Add the arrays of a campaign; raises Refusal (413) beyond the limit."""
         for array in _arrays(campaigns):
             owner = array
             while isinstance(owner.base, np.ndarray):

@@ -1,4 +1,4 @@
-"""Instruments, recognised by the headings of their files, and what of a rig description is theirs."""
+"""Instruments, recognised by the headings of their files, and the reusable part of a rig description."""
 
 import hashlib
 from collections.abc import Mapping
@@ -13,8 +13,7 @@ _OF_INSTRUMENT = ("indenter_radius_mm", "stage_stiffness_n_per_mm", "sample_rate
 
 
 def recognised(kind: str, contents: Contents) -> str | None:
-    """What files of the same format with the same channels and units have in common, as a digest; None of a file
-    without channels."""
+    """A digest of format, channels and units, equal for files of one instrument; None for a file without channels."""
     headings = {(channel.name, channel.unit) for block in contents.blocks for channel in block.channels}
     if not headings:
         return None
@@ -22,8 +21,8 @@ def recognised(kind: str, contents: Contents) -> str | None:
 
 
 def template_of(rig: RigDescription) -> str:
-    """The part of a rig description (JSON) that holds for all files of an instrument: without the skin, and without
-    what was typed of one recording."""
+    """The part of a rig description (JSON) that holds for all files of an instrument: without the skin and without
+    values typed for one recording."""
     document = rig.document
     recording = {
         name: value
@@ -34,17 +33,17 @@ def template_of(rig: RigDescription) -> str:
 
 
 def of_skin(rig: RigDescription) -> str:
-    """The part of a rig description (JSON) that holds for later files of its skin: without a time that was typed, which
-    is that of these recordings alone."""
+    """The part of a rig description (JSON) that holds for later files of its skin: without a typed time, which belongs
+    to these recordings only."""
     recording = {
         name: value
         for name, value in rig.document.get("recording", {}).items()
         if name != "recorded_at" or isinstance(value, Mapping)
     }
-    said = {"recording": recording} if "recording" in rig.document else {}
-    return orjson.dumps({**rig.document, **said}).decode()
+    recording_part = {"recording": recording} if "recording" in rig.document else {}
+    return orjson.dumps({**rig.document, **recording_part}).decode()
 
 
 def with_skin(template: str, skin: Mapping[str, Any]) -> dict[str, Any]:
-    """The rig description (`rig/1`) of a template, for a skin of which these fields are known."""
+    """The rig description (`rig/1`) of a template, completed with the known fields of a skin."""
     return {**orjson.loads(template), "skin": dict(skin)}

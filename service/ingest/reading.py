@@ -1,4 +1,4 @@
-"""From uploaded files to campaigns, with what is wrong in each."""
+"""Reads uploaded files as campaigns, with the errors in each."""
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
@@ -9,7 +9,7 @@ from typing import Any
 import orjson
 
 from service.ingest import instruments
-from service.ingest.rig_words import said_of_file
+from service.ingest.rig_words import template_sentence
 from service.ingest.uploads import Upload
 from service.middleware import long_json
 from service.middleware.unique_keys import require_unique_keys
@@ -25,7 +25,7 @@ from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
 
 _BOM = b"\xef\xbb\xbf"
-_UNNAMED = "the upload"
+_UNLABELLED = "the upload"
 _LISTED = ("code", "field", "value", "allowed")  # of an error
 
 # Reading a campaign takes memory many times its size: few at a time, the others wait. What is kept as soon as it was
@@ -40,7 +40,7 @@ _MOST_ERRORS = 100  # listed of each campaign
 
 @asynccontextmanager
 async def keeping(store: Database) -> AsyncIterator[None]:
-    """A place for reading what is kept at once; raises OperationalError where others have just waited in vain."""
+    """A slot for reading data that is stored at once; raises OperationalError if writers have just waited in vain."""
     async with _KEEPING_SLOTS:
         store.require_hope()
         yield
@@ -48,7 +48,7 @@ async def keeping(store: Database) -> AsyncIterator[None]:
 
 @dataclass(frozen=True)
 class ReadCampaign:
-    """What was read of one campaign, or why the whole is refused."""
+    """A campaign as read, or the reason why it is rejected as a whole."""
 
     file: str | None
     reading: Reading | None = None
@@ -59,24 +59,24 @@ class ReadCampaign:
 
     @property
     def recordings(self) -> int:
-        """How many were sent, good or not."""
+        """Number of recordings sent, valid or not."""
         if self.reading is None:
             return 0
         refused = {problem.recording for problem in self.reading.problems}
         return len(refused) + len(self.reading.campaign.recordings)
 
     def with_estimator(self, estimator: Estimator | None) -> "ReadCampaign":
-        """The same with the FRFs of its time series estimated so."""
+        """The same with the FRFs of its time series estimated by this estimator."""
         return replace(self, reading=None if self.reading is None else self.reading.with_estimator(estimator))
 
     def with_curves_turned(self) -> "ReadCampaign":
-        """The same with curves that count pressing negative turned."""
+        """The same with the sign of curves reversed that count pressing negative."""
         return replace(self, reading=None if self.reading is None else self.reading.with_curves_turned())
 
 
 @dataclass(frozen=True)
 class CheckedCampaign:
-    """What one campaign became: None where the whole was refused; `refused` has one entry a recording."""
+    """A checked campaign, None if it was rejected as a whole; `refused` has one entry per rejected recording."""
 
     file: str | None
     campaign: Campaign | None = None
@@ -91,7 +91,7 @@ class CheckedCampaign:
 
 @dataclass(frozen=True)
 class InspectedFile:
-    """A file that was read and not stored: its format, its channels where it has any, and its campaigns."""
+    """A file that was read but not stored: its format, its channels if any, and its campaigns."""
 
     kind: str
     contents: Contents | None
@@ -99,8 +99,8 @@ class InspectedFile:
 
 
 def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> InspectedFile:
-    """The campaigns of a file, by its content, with its format and channels: JSON may hold one or a list of them."""
-    label = upload.label or _UNNAMED
+    """The campaigns of a file, by its content, with its format and channels; JSON may hold one or a list of them."""
+    label = upload.label or _UNLABELLED
     kind, contents = "", None
     try:
         with upload.path.open("rb") as stream:
@@ -114,7 +114,7 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
         campaign = ReadCampaign(upload.label, reading, by_rig=rig is not None)
     except FileError as error:
         allowed = Requirement(Mention(error.place), ": ", error.reason) if error.place else error.reason
-        campaign = ReadCampaign(upload.label, errors=[error_entry("file", upload.label, allowed, error.code)])
+        campaign = ReadCampaign(upload.label, errors=[field_error("file", upload.label, allowed, error.code)])
     except InvalidInput as error:
         campaign = ReadCampaign(upload.label, errors=[_invalid(error)])
     instrument = None if contents is None else instruments.recognised(kind, contents)
@@ -122,60 +122,58 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
 
 
 def _understood(
-    held: Contents | Document, label: str, rig: RigDescription | None, said: Mapping[str, Any] | None
+    held: Contents | Document, label: str, rig: RigDescription | None, stated: Mapping[str, Any] | None
 ) -> Reading:
-    """A file by its rig description and what was said of it alone, which is then told."""
-    if rig is None or not said or not isinstance(held, Contents):
+    """A file read by its rig description and by the values stated for this file alone, which are reported as a note."""
+    if rig is None or not stated or not isinstance(held, Contents):
         return understood(held, label, rig)
-    reading = understood(held, label, rig.with_recording(said))
-    return replace(reading, warnings=[said_of_file(said), *reading.warnings])
+    reading = understood(held, label, rig.with_recording(stated))
+    return replace(reading, warnings=[template_sentence(stated), *reading.warnings])
 
 
 def checked(read: ReadCampaign) -> CheckedCampaign:
-    """A campaign with its refused recordings; one of which nothing is left is refused as a whole."""
+    """A campaign with its rejected recordings; a campaign without a valid recording is rejected as a whole."""
     written_by = () if read.instrument is None else (read.instrument,)
-    whole = CheckedCampaign(
+    campaign_checked = CheckedCampaign(
         read.file, errors=read.errors, by_rig=read.by_rig, in_list=read.in_list, instruments=written_by
     )
     if read.reading is None:
-        return whole
+        return campaign_checked
     campaign, notes = read.reading.campaign, read.reading.warnings
     refused: dict[str, list[Mapping[str, Any]]] = {}
     for number, problem in enumerate(read.reading.problems):
         errors = refused.setdefault(problem.recording, [])
         if number < _MOST_ERRORS:
-            errors.append(error_entry(problem.field, problem.value, problem.allowed, problem.code))
+            errors.append(field_error(problem.field, problem.value, problem.allowed, problem.code))
     count = len(read.reading.problems)
     unlisted = max(0, count - _MOST_ERRORS)
     if unlisted:
         notes = [*notes, f"{len(refused)} recordings have {count} errors; the first {_MOST_ERRORS} are told"]
     entries = [{"id": name, "errors": errors} for name, errors in refused.items()]
-    whole = replace(whole, refused=entries, notes=notes, unlisted=unlisted)
+    campaign_checked = replace(campaign_checked, refused=entries, notes=notes, unlisted=unlisted)
     if campaign.recordings:
-        return replace(whole, campaign=campaign)
-    return replace(whole, errors=[_nothing(len(entries))])
+        return replace(campaign_checked, campaign=campaign)
+    return replace(campaign_checked, errors=[_nothing(len(entries))])
 
 
 def joined(files_read: Sequence[ReadCampaign], name: str, skin_id: str | None) -> CheckedCampaign:
-    """All of them as one campaign; a file that cannot be read is a refused recording, by the file's name.
-
-    Raises InvalidInput where they are not of one skin.
-    """
-    files = [(one.file or _UNNAMED, one.reading) for one in files_read if one.reading is not None]
-    unread = [{"id": one.file or _UNNAMED, "errors": one.errors} for one in files_read if one.reading is None]
+    """All files as one campaign; an unreadable file counts as a rejected recording with the file's name. Raises
+    InvalidInput if the files are of several skins."""
+    files = [(file.file or _UNLABELLED, file.reading) for file in files_read if file.reading is not None]
+    unread = [{"id": file.file or _UNLABELLED, "errors": file.errors} for file in files_read if file.reading is None]
     in_list = files_read[0].in_list
     if not files:
         return CheckedCampaign(None, errors=[_nothing(len(unread))], refused=unread, in_list=in_list)
-    by_rig = any(one.by_rig for one in files_read)
+    by_rig = any(file.by_rig for file in files_read)
     together = checked(ReadCampaign(None, join(name, files, skin_id), by_rig=by_rig, in_list=in_list))
     origin = f"joined from {files[0][0]}" + (f" to {files[-1][0]}, {len(files)} files" if len(files) > 1 else "")
-    written_by = tuple(dict.fromkeys(one.instrument for one in files_read if one.instrument is not None))
+    written_by = tuple(dict.fromkeys(file.instrument for file in files_read if file.instrument is not None))
     notes = [origin, *together.notes]
     return replace(together, refused=unread + together.refused, notes=notes, instruments=written_by)
 
 
 def require_few(campaigns: int, recordings: int) -> None:
-    """Refuses a request of more than can be answered in one go."""
+    """Rejects a request with more recordings than one answer can hold."""
     for count, most, noun in ((campaigns, MOST_CAMPAIGNS, "campaigns"), (recordings, MOST_RECORDINGS, "recordings")):
         if count > most:
             raise Refusal(413, f"A request may bring up to {most} {noun}; send more in several requests.")
@@ -196,8 +194,8 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
     except long_json.NotJson as wrong:
         if not upload.in_form:
             raise Refusal(400, f"The body is not JSON: {wrong}.") from None
-        entry = error_entry("file", upload.label, f"must be JSON; {wrong}", ErrorCode.UNREADABLE_FILE)
-        return [ReadCampaign(upload.label, errors=[entry])]
+        unreadable = field_error("file", upload.label, f"must be JSON; {wrong}", ErrorCode.UNREADABLE_FILE)
+        return [ReadCampaign(upload.label, errors=[unreadable])]
     except Refusal as twice:
         if not twice.errors:
             raise
@@ -207,7 +205,7 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
         require_few(1, _recordings_in(document))
         return [_checked(upload.label, document)]
     require_few(len(document), sum(map(_recordings_in, document)))
-    return [replace(_checked(upload.label, entry), in_list=True) for entry in document]
+    return [replace(_checked(upload.label, campaign), in_list=True) for campaign in document]
 
 
 def _document(upload: Upload) -> Any:
@@ -240,15 +238,15 @@ def _checked(label: str | None, document: Any) -> ReadCampaign:
 
 
 def _nothing(refused: int) -> dict[str, Any]:
-    return error_entry(
+    return field_error(
         "recordings", f"{refused} refused", "must hold at least one recording without errors", ErrorCode.TOO_FEW
     )
 
 
 def _invalid(error: InvalidInput) -> dict[str, Any]:
-    return error_entry(error.place, error.value, error.allowed, error.code)
+    return field_error(error.place, error.value, error.allowed, error.code)
 
 
-def error_entry(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
-    """An error as answers and pages list it."""
+def field_error(name: str, value: Any, allowed: str, code: ErrorCode) -> dict[str, Any]:
+    """An error in the form of answers and pages."""
     return dict(zip(_LISTED, (str(code), name, value, allowed), strict=True))

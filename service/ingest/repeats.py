@@ -1,6 +1,5 @@
-"""Identical recordings in several campaigns: noted when they arrive, as is a correction that names another skin or
-changes nothing, and counted once in histories.
-"""
+"""Identical recordings in several campaigns: noted on arrival, and counted once in histories. Also notes on corrections
+that change nothing or name another skin."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -32,12 +31,12 @@ class Repeat:
         return f"{which} in campaign {self.campaign_id}: identical recordings count once"
 
 
-def already_kept(
+def earlier_campaign(
     connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None
 ) -> tuple[str, str] | None:
-    """In which campaign a campaign's recordings are already, as a sentence, and its id; `corrects` is not looked at.
+    """The campaign that already has these recordings, as a sentence and as its id; `corrects` is not considered.
 
-    `skin_id`: the skin that it is sent for, where that is said.
+    `skin_id`: the skin of the request, if stated.
     """
     if skin_id is None:
         skin_id = campaign.skin.id if corrects is None else campaigns.find(connection, corrects).skin_id
@@ -52,13 +51,12 @@ def already_kept(
 
 
 def changes_nothing(connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None) -> bool:
-    """Whether the campaign that is corrected says the same already, of the skin and of each recording in its order, and
-    is on the skin that this one is sent for, with all of its recordings in use: a correction takes excluded ones in
-    again."""
+    """Whether the corrected campaign already has the same skin values and the same recordings in the same order, on the
+    skin of this request and with none excluded: a correction re-includes excluded recordings."""
     if corrects is None:
         return False
     row = campaigns.find(connection, corrects)
-    if row.excluded or (skin_id is not None and not skins.are_one(connection, skin_id, row.skin_id)):
+    if row.excluded or (skin_id is not None and not skins.are_joined(connection, skin_id, row.skin_id)):
         return False
     before = campaigns.load(connection, row)
     if codec.about(before) != codec.about(campaign) or len(before.recordings) != len(campaign.recordings):
@@ -68,18 +66,17 @@ def changes_nothing(connection: Connection, campaign: Campaign, skin_id: str | N
 
 
 def otherwise_named(connection: Connection, campaign: Campaign, corrects: str | None) -> str | None:
-    """The skin of the campaign that is corrected, where its correction names another one."""
+    """The skin of the corrected campaign if the correction names another one."""
     if corrects is None or campaign.skin.id is None:
         return None
     skin_id = str(campaigns.find(connection, corrects).skin_id)
-    return None if skins.are_one(connection, campaign.skin.id, skin_id) else skin_id
+    return None if skins.are_joined(connection, campaign.skin.id, skin_id) else skin_id
 
 
 def left_out(connection: Connection, root: str, points: Collection[HistoryPoint]) -> dict[HistoryPoint, Repeat]:
-    """The points of a skin's history that do not count, since no recording counts in two.
+    """The points of a skin's history that do not count, because a recording counts only once.
 
-    Of points that share a recording, the one of more recordings counts; of equal ones that of the campaign that came
-    first.
+    Of points that share a recording, the one with more recordings counts; if equal, that of the earlier campaign.
     """
     rows = [row for row in repeated.shared(connection, root) if (row.id, row.sensor) in points]
     if not rows:
@@ -100,7 +97,7 @@ def left_out(connection: Connection, root: str, points: Collection[HistoryPoint]
 
 
 def of_campaigns(repeats: Mapping[HistoryPoint, Repeat]) -> dict[str, Repeat]:
-    """The same of all points of a campaign together, by its id."""
+    """The same for all points of a campaign, by its id."""
     by_campaign: dict[str, list[Repeat]] = {}
     for (campaign_id, _), repeat in repeats.items():
         by_campaign.setdefault(campaign_id, []).append(repeat)

@@ -1,4 +1,4 @@
-"""What a rig description says, in sentences that are kept with the campaigns that were read by it."""
+"""A rig description in sentences, stored with the campaigns that were read with it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,9 +10,9 @@ _SIGNS = {-1: "turned round", AUTOMATIC: "turned round where it falls as it is p
 _CURVES = {"file": "a curve is the whole file", "groups": "a curve is each group of rows"}
 
 
-def said_of(rig: RigDescription) -> list[str]:
-    """A sentence for each channel, one for all that is said of the recordings, and one for what a curve is, if that is
-    said. Of formulas, tare and trim the reading's own notes tell."""
+def rig_sentences(rig: RigDescription) -> list[str]:
+    """A sentence for each channel, one for the values stated for the recordings, and one for the definition of a curve,
+    if stated. Formulas, tare and trim are in the reader's own notes."""
     channels = [f"{CHANNELS[field]}: {_channel(rig, mapping)}" for field, mapping in rig.channels.items()]
     values = _values(rig.recording)
     recordings = [f"said of its recordings: {'; '.join(values)}"] if values else []
@@ -20,13 +20,13 @@ def said_of(rig: RigDescription) -> list[str]:
     return [*_instrument(rig.document), *channels, *recordings, *_curve(rig), *checked]
 
 
-def said_of_file(fields: Mapping[str, Any]) -> str:
+def template_sentence(fields: Mapping[str, Any]) -> str:
     """`said of this file alone: sensor that was pressed s0; preload F 1 N`."""
     return f"said of this file alone: {'; '.join(_values(fields))}"
 
 
 def typed_of(rig: RigDescription) -> list[str]:
-    """What was typed of all recordings alike, a value each, and is not read from each file."""
+    """The values typed for all recordings, as opposed to values read from each file."""
     return _values({field: value for field, value in rig.recording.items() if not isinstance(value, Property)})
 
 

@@ -1,4 +1,4 @@
-"""An exported skin: looked at, and brought in. Every part of its file is checked before the first is kept."""
+"""Import of an exported skin. Every part of its file is checked before anything is stored."""
 
 import asyncio
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from underskin.errors import FileError, InvalidInput, unreadable
 from underskin.recordings.skin_export import ExportedCampaign, Overview, read_campaigns, read_overview
 
 _AT_A_TIME = 8  # campaigns in memory
-one = asyncio.Semaphore(1)  # export that is looked at or brought in at a time
+one_at_a_time = asyncio.Semaphore(1)  # export that is looked at or brought in at a time
 
 
 class Imported(BaseModel):
@@ -40,18 +40,18 @@ class ExportedCampaignSummary:
 
 @dataclass(frozen=True)
 class CheckedExport:
-    """A file of which every part was checked; `clashes`: sentences, what of it contradicts the store."""
+    """A file of which every part was checked; `clashes`: contradictions with the store, in sentences."""
 
     overview: Overview
     skins: import_checks.CheckedOverview
     diagnosed: diagnosis_export.Checked
     campaigns: list[ExportedCampaignSummary]
-    known: set[str]  # ids of those diagnoses and models that are in the store
+    stored_ids: set[str]  # ids of those diagnoses and models that are in the store
     clashes: list[str]
 
 
 def look(store: Database, upload: Upload) -> CheckedExport:
-    """Check a file against itself and against the store; raises InvalidInput that names what in it is wrong."""
+    """Check a file in itself and against the store; raises InvalidInput naming the invalid part."""
     with upload.path.open("rb") as stream, _naming_the_part(upload, ""):
         overview = read_overview(stream, _label(upload))
         skins = import_checks.overview(overview)
@@ -61,8 +61,8 @@ def look(store: Database, upload: Upload) -> CheckedExport:
         with store.reading() as connection:
             clashes = export.otherwise_joined(connection, skins.skins)
             clashes += diagnosis_export.clashes(connection, diagnosed)
-            diagnosed_here = diagnosis_export.known(connection, diagnosed)
-            campaigns_here = export.known(connection, overview.campaigns)
+            diagnosed_here = diagnosis_export.stored_ids(connection, diagnosed)
+            campaigns_here = export.stored_rows(connection, overview.campaigns)
         summaries = []
         for name, campaign in _campaigns(stream, upload, overview.campaigns):
             row = campaigns_here.get(name)
@@ -73,12 +73,16 @@ def look(store: Database, upload: Upload) -> CheckedExport:
                 continue
             differs = store.read(export.differs, row, campaign)
             summaries.append(_campaign(row._mapping, present=True, differs=differs))
-    clashes += [f"Campaign {one.name!r} ({one.id}) is there already and differs" for one in summaries if one.differs]
+    clashes += [
+        f"Campaign {summary.name!r} ({summary.id}) is there already and differs"
+        for summary in summaries
+        if summary.differs
+    ]
     return CheckedExport(overview, skins, diagnosed, summaries, diagnosed_here, clashes)
 
 
 def bring_in(store: Database, upload: Upload) -> Imported:
-    """Keep what is not there; raises as `look`, and Conflict, with nothing kept, where it contradicts the store."""
+    """Store what is not there yet; raises as `look`, and Conflict, with nothing stored, if it contradicts the store."""
     checked = look(store, upload)
     if checked.clashes:
         more = f", and {len(checked.clashes) - 1} more clashes" if len(checked.clashes) > 1 else ""
@@ -108,20 +112,20 @@ def _label(upload: Upload) -> str:
 
 
 @contextmanager
-def _naming_the_part(upload: Upload, place: str) -> Iterator[None]:
-    """Turns what is raised about a part of a file into InvalidInput that names the part."""
+def _naming_the_part(upload: Upload, part: str) -> Iterator[None]:
+    """Turns exceptions about a part of a file into InvalidInput that names the part."""
     try:
         yield
     except InvalidInput as error:
-        raise error.at(f"{place}{error.field}") from None
+        raise error.at(f"{part}{error.field}") from None
     except FileError as error:
         raise error.of_field("file", upload.label) from None
     except (ValidationError, KeyError, TypeError) as error:
-        raise unreadable("file", upload.label, f"{place}is not as underskin exports it: {_words(error)}") from None
+        raise unreadable("file", upload.label, f"{part}is not as underskin exports it: {_words(error)}") from None
 
 
 def _words(error: Exception) -> str:
-    """What is wrong, where pydantic and look-ups say it in many lines."""
+    """An error of pydantic or of a look-up in one line."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False)[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg'][:1].lower()}{first['msg'][1:]}"[:500]

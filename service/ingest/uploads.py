@@ -1,6 +1,6 @@
-"""What a request uploads, streamed into files of our own naming; its limits hold as it comes in.
+"""Uploads, streamed into files under names of our own; the limits are enforced while data arrive.
 
-A file's own name is kept as a label. It never becomes a path, and says nothing about the file's type.
+A file's own name is stored as a label. It is never used as a path, and does not determine the file's type.
 """
 
 import fcntl
@@ -34,8 +34,8 @@ _LONGEST_LABEL = 200
 
 @dataclass(frozen=True)
 class Upload:
-    """One file: where it was put, what the client calls it, which field it was if it was part of a form, its digest;
-    `said`: fields of its recordings, as a page's reader said them of this file alone."""
+    """One file: its path, the client's name for it, its form field if any, its digest, and in `said` the values of its
+    recordings stated for this file alone."""
 
     path: Path
     label: str | None
@@ -50,26 +50,26 @@ class Upload:
             return file.read(most)
 
     def text(self, most: int) -> str:
-        """What a field of a form says, up to so many bytes."""
+        """The value of a text field, up to so many bytes."""
         return self.start(most).decode("utf-8", "replace").strip()
 
 
 def texts(fields: Iterable[Upload], most: int) -> dict[str, str]:
-    """What fields of a form say, by name, each up to so many bytes."""
-    return {one.field or "": one.text(most) for one in fields}
+    """The values of text fields by name, each up to so many bytes."""
+    return {upload.field or "": upload.text(most) for upload in fields}
 
 
 class UploadFolder:
-    """This server's folder of uploads under way; what servers that were killed left behind is removed."""
+    """This server's folder of current uploads; remains of servers that were killed are removed."""
 
     def __init__(self, data_folder: Path) -> None:
         parent = data_folder / FOLDER
         parent.mkdir(parents=True, exist_ok=True)
         with (parent / ".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            for left in parent.iterdir():
-                if left.is_dir() and _nobody_uses(left):
-                    shutil.rmtree(left)
+            for leftover in parent.iterdir():
+                if leftover.is_dir() and _is_unused(leftover):
+                    shutil.rmtree(leftover)
             self.path = Path(tempfile.mkdtemp(dir=parent))
             self._in_use = (self.path / ".lock").open("w")  # held as long as the process lives
             fcntl.flock(self._in_use, fcntl.LOCK_EX)
@@ -81,7 +81,7 @@ class UploadFolder:
         self._in_use.close()
 
 
-def _nobody_uses(folder: Path) -> bool:
+def _is_unused(folder: Path) -> bool:
     try:
         with (folder / ".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -92,12 +92,12 @@ def _nobody_uses(folder: Path) -> bool:
 
 @asynccontextmanager
 async def received(request: Request, parent: UploadFolder, most_bytes: float = math.inf) -> AsyncIterator[list[Upload]]:
-    """The files of a multipart form, or the whole body as one file; gone at the end of the block.
+    """The files of a multipart form, or the whole body as one file; removed at the end of the block.
 
-    Raises Refusal where a form cannot be read (400), is of the other kind (415) or the body has more than `most_bytes`,
-    besides the limit of all uploads (413), StorageFailed where the disk is full or takes nothing.
+    Raises Refusal if a form cannot be read (400), the content type does not match (415) or the body exceeds
+    `most_bytes` or the limit of all uploads (413); StorageFailed if the disk is full or not writable.
     """
-    with disk_errors_said(parent):
+    with disk_errors_refused(parent):
         async with ArrivingFiles.below(parent.path, parent.threads) as files:
             content_type, options = parse_options_header(request.headers.get("content-type", ""))
             if content_type == b"application/x-www-form-urlencoded":
@@ -106,13 +106,13 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
             if content_type == b"multipart/form-data":
                 yield await _take_parts(_body(request, most_bytes), files, options.get(b"boundary", b""))
             else:
-                yield [await _take_whole(_body(request, most_bytes), files)]
+                yield [await _receive_body(_body(request, most_bytes), files)]
 
 
 @contextmanager
-def disk_errors_said(folder: UploadFolder) -> Iterator[None]:
-    """Turns the system's error for a full disk into StorageFull, for one that takes nothing into StorageFailed, and for
-    uploads' folder gone into StoreMoved."""
+def disk_errors_refused(folder: UploadFolder) -> Iterator[None]:
+    """Turns the system's errors into StorageFull (disk full), StorageFailed (disk not writable) and StoreMoved (upload
+    folder gone)."""
     try:
         yield
     except OSError as error:
@@ -136,7 +136,7 @@ async def _body(request: Request, most_bytes: float) -> AsyncIterator[bytes]:
         yield chunk
 
 
-async def _take_whole(body: AsyncIterator[bytes], files: ArrivingFiles) -> Upload:
+async def _receive_body(body: AsyncIterator[bytes], files: ArrivingFiles) -> Upload:
     file = files.begin()
     async for chunk in body:
         files.take(chunk)
@@ -164,7 +164,7 @@ async def _take_parts(body: AsyncIterator[bytes], files: ArrivingFiles, boundary
 
 @dataclass
 class _FormPart:
-    """A part under way."""
+    """A part being received."""
 
     file: ArrivingFile
     headers: dict[bytes, bytes] = field(default_factory=dict)
@@ -186,7 +186,7 @@ class _Form:
         self.ended = False
 
     def callbacks(self) -> "MultipartCallbacks":
-        """By the names that the parser has for them."""
+        """The parser's callbacks by name."""
         return {
             "on_part_begin": self._begin,
             "on_header_field": self._header_field,
@@ -226,7 +226,7 @@ def _short(header: bytes) -> bytes:
 
 
 def _text(value: bytes | None) -> str | None:
-    """What a client calls something, as a label: printable and short."""
+    """A client's name for something, as a short printable label."""
     if value is None:
         return None
     text = "".join(letter for letter in value.decode("utf-8", "replace") if letter.isprintable())

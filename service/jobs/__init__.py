@@ -1,7 +1,7 @@
-"""Diagnoses in worker processes: the queue in the store is worked off while the server answers.
+"""Diagnoses in worker processes: the queue in the store is processed while the server answers requests.
 
-runner.py claims and keeps them alive, process.py is the server's end of a worker, worker.py the worker itself;
-planner.py plans next experiments within a rig's limits, which are not kept.
+runner.py claims diagnoses and keeps them alive, process.py is the server's side of a worker, worker.py the worker;
+planner.py plans next experiments within a rig's limits, which are not stored.
 """
 
 from service.jobs.planner import Planner

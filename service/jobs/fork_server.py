@@ -1,11 +1,11 @@
-"""A process that has the program and the table loaded, and forks a worker for each job (worker.py).
+"""A process with the program and the table loaded, which forks a worker for each job (worker.py).
 
-A fork takes a hundredth of a second where loading takes one to two, and shares the memory of what is loaded. Its name
-in a list of processes is `underskin-ready`, its workers' `underskin-works`.
+A fork takes 10 ms where loading takes 1 to 2 s, and shares the loaded memory. The process is called `underskin-ready`
+in process lists, its workers `underskin-works`.
 
 Standard input is a socket: each byte comes with four file descriptors, a worker's standard input, output and error, and
-one to which its exit status is written once it has ended. The answer is a byte with a process descriptor of the worker.
-The end of the socket is the end of this process; workers end with the server, whose end of their input closes.
+one to which its exit status is written. The answer is a byte with a process descriptor of the worker. This process ends
+when the socket closes; workers end with the server, whose end of their input closes.
 """
 
 import os
@@ -27,7 +27,7 @@ _DESCRIPTORS = 4
 
 
 def main() -> None:
-    """The process; its argument is the table's path."""
+    """Entry point; the argument is the table's path."""
     os.nice(_NICENESS)
     be_called("underskin-ready")
     for module in _LOADED:
@@ -52,20 +52,20 @@ def main() -> None:
 
 
 def be_called(name: str) -> None:
-    """Of this process, in lists of processes; at most 15 characters."""
+    """Set this process's name in process lists; at most 15 characters."""
     with suppress(OSError):
         Path("/proc/self/comm").write_text(name)
 
 
 def _serve(connection: socket.socket, work: Callable[[], None]) -> None:
-    """Fork workers when asked to, and tell how they ended."""
+    """Fork workers on request and report their exit status."""
     with selectors.DefaultSelector() as waiting:
         waiting.register(connection, selectors.EVENT_READ)
         while True:
             for key, _ in waiting.select():
                 if key.fileobj is not connection:
                     pid, status = key.data
-                    _tell_the_end(pid, status)
+                    _report_exit(pid, status)
                     waiting.unregister(key.fd)
                     os.close(key.fd)
                     continue
@@ -83,7 +83,7 @@ def _serve(connection: socket.socket, work: Callable[[], None]) -> None:
 
 
 def _become(descriptors: list[int], work: Callable[[], None]) -> NoReturn:
-    """A worker, in the forked process, with these descriptors as its own and none else."""
+    """Run a worker in the forked process, with only these descriptors open."""
     code = 1
     try:
         for number, descriptor in enumerate(descriptors[:-1]):
@@ -98,10 +98,10 @@ def _become(descriptors: list[int], work: Callable[[], None]) -> NoReturn:
         os._exit(code)
 
 
-def _tell_the_end(pid: int, status: int) -> None:
+def _report_exit(pid: int, status: int) -> None:
     """Write how a worker ended to the descriptor `status`: its exit code, or −signal."""
     code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    with suppress(OSError):  # nobody wants to know any more
+    with suppress(OSError):  # the server has ended
         os.write(status, b"%d" % code)
     os.close(status)
 

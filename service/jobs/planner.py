@@ -1,6 +1,6 @@
-"""Next experiments within the limits of a rig: each is planned in a worker process, one at a time.
+"""Next experiments within the limits of a rig, each planned in a worker process, one at a time.
 
-Plans are not stored: a server remembers the latest ones, and plans again after a restart.
+Plans are not stored: a server caches the latest, and computes them again after a restart.
 """
 
 import threading
@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal
 
-from service.jobs.process import Given, WorkerProcesses
+from service.jobs.process import CampaignInput, WorkerProcesses
 from service.jobs.runner import logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
@@ -26,7 +26,7 @@ _RETRY_S = 60.0  # how long a failure is answered before the plan is tried again
 
 @dataclass
 class Planned:
-    """One plan; `plan` is empty where no experiment would separate the explanations better."""
+    """One plan; `plan` is empty if no experiment would separate the explanations better."""
 
     state: Literal["queued", "running", "done", "failed"] = "queued"
     progress: float = 0.0
@@ -40,42 +40,44 @@ class Planned:
 
 
 class Planner:
-    """Plans next experiments one after another, until `stop`, and remembers the latest."""
+    """Plans next experiments one after another until `stop`, and caches the latest."""
 
     def __init__(self, store: Database, processes: WorkerProcesses, workers: int) -> None:
         """`workers`: 0 where this server runs no diagnoses and plans nothing."""
         self._store = store
         self._processes = processes
         self._workers = workers
-        self._known: OrderedDict[tuple[str, str], Planned] = OrderedDict()
+        self._plans: OrderedDict[tuple[str, str], Planned] = OrderedDict()
         self._lock = threading.Lock()
         self._waiting: SimpleQueue[tuple[AnyRow, RigLimits, Planned] | None] = SimpleQueue()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._work, name="planning", daemon=True)
 
     def plan(self, row: AnyRow, limits: "RigLimits") -> Planned:
-        """That of a diagnosis within these limits: begun where it is not known, or failed a minute ago; raises
-        Refusal 503 where too many wait, or where this server runs no diagnoses."""
+        """The plan of a diagnosis within these limits; computed if it is not cached, or failed over a minute ago.
+        Raises Refusal 503 if too many are waiting, or if this server runs no diagnoses."""
         key = (str(row.id), repr(limits))
         with self._lock:
-            known = self._known.get(key)
-            if known is not None and (known.state != "failed" or time.monotonic() < known.failed_at + _RETRY_S):
-                self._known.move_to_end(key)
-                return known
+            remembered = self._plans.get(key)
+            if remembered is not None and (
+                remembered.state != "failed" or time.monotonic() < remembered.failed_at + _RETRY_S
+            ):
+                self._plans.move_to_end(key)
+                return remembered
             if not self._workers:
                 raise Refusal(503, "This server runs no diagnoses and plans nothing; use the command below.")
-            if sum(one.state in ("queued", "running") for one in self._known.values()) >= _MOST_WAITING:
+            if sum(job.state in ("queued", "running") for job in self._plans.values()) >= _MOST_WAITING:
                 raise Refusal(503, "Many plans are being worked out: try again in a minute.")
-            planned = self._known[key] = Planned()
-            while len(self._known) > _REMEMBERED:
-                self._known.popitem(last=False)
+            planned = self._plans[key] = Planned()
+            while len(self._plans) > _REMEMBERED:
+                self._plans.popitem(last=False)
             self._waiting.put((row, limits, planned))
             if self._thread.ident is None:
                 self._thread.start()
         return planned
 
     def stop(self) -> None:
-        """End what is being worked out."""
+        """Stop the computation under way."""
         self._ending.set()
         self._waiting.put(None)
         if self._thread.ident is not None:
@@ -94,12 +96,12 @@ class Planner:
         planned.state = "running"
         campaign, _ = self._store.read(diagnoses.campaign_of, row)
         without = diagnoses.without(row)
-        given = [Given.of(campaign, row.skin_id)]
+        given = [CampaignInput.of(campaign, row.skin_id)]
         with self._processes.at_work(given, limits=asdict(limits), without=without) as worker:
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)
-                planned.progress = worker.said["progress"]
-            if "plan" in worker.said:
-                planned.plan, planned.state = worker.said["plan"], "done"
+                planned.progress = worker.messages["progress"]
+            if "plan" in worker.messages:
+                planned.plan, planned.state = worker.messages["plan"], "done"
             else:
                 planned.fail(worker.failure if worker.ended else "the server ended")

@@ -1,4 +1,4 @@
-"""The server's end of worker processes: a fork server (fork_server.py), and the workers that it forks."""
+"""The server's side of worker processes: a fork server (fork_server.py) and the workers that it forks."""
 
 import os
 import select
@@ -22,7 +22,7 @@ from underskin.recordings.campaign import Campaign
 from underskin.recordings.readers import json_file
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", "UNDERSKIN_MECHANISMS", "UNDERSKIN_TIME_ZONE")
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LAST_WORDS = 2000
 _WAIT_TIMES = 5  # as long by the clock as on a processor: a busy machine is no reason to end a diagnosis
 _LOADING_S = (
@@ -31,11 +31,11 @@ _LOADING_S = (
 
 
 class ForkServer:
-    """A process that forks workers; it loads the program and a table first."""
+    """A process that forks workers after loading the program and a table."""
 
     def __init__(self, table: Path) -> None:
         """Start it; raises OSError where the system has no room for a process."""
-        environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _ONE_THREAD
+        environment = {key: os.environ[key] for key in _INHERITED if key in os.environ} | _SINGLE_THREAD
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
         command = [sys.executable, "-P", "-m", "service.jobs.fork_server", str(table)]
         with ExitStack() as shared:
@@ -50,19 +50,19 @@ class ForkServer:
 
     @property
     def runs(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the process is alive."""
         return self._process.poll() is None
 
     def fork(self) -> "WorkerProcess":
-        """A new worker; raises OSError with the process' last words where it has ended or does not answer."""
+        """A new worker; raises OSError with the process's last message if it has ended or does not answer."""
         with ExitStack() as ours, ExitStack() as theirs:
 
             def pipe(*, to_worker: bool) -> BinaryIO:
                 reads, writes = os.pipe()
-                own, other = (writes, reads) if to_worker else (reads, writes)
-                descriptors.append(other)
-                theirs.callback(os.close, other)
-                return ours.enter_context(os.fdopen(own, "wb" if to_worker else "rb"))
+                of_server, of_worker = (writes, reads) if to_worker else (reads, writes)
+                descriptors.append(of_worker)
+                theirs.callback(os.close, of_worker)
+                return ours.enter_context(os.fdopen(of_server, "wb" if to_worker else "rb"))
 
             descriptors: list[int] = []
             stdin, stdout = pipe(to_worker=True), pipe(to_worker=False)
@@ -93,7 +93,7 @@ class ForkServer:
 
 @dataclass(frozen=True)
 class WorkerProcess:
-    """A worker's process descriptor and what is shared with it; from `status` its exit code can be read at its end."""
+    """A worker's process descriptor and pipes; its exit code can be read from `status` when it has ended."""
 
     descriptor: int
     stdin: BinaryIO
@@ -103,12 +103,12 @@ class WorkerProcess:
     _shared: ExitStack
 
     def kill(self) -> None:
-        """End it, whatever it does."""
+        """Kill the worker."""
         with suppress(ProcessLookupError):
             signal.pidfd_send_signal(self.descriptor, signal.SIGKILL)
 
     def wait(self) -> int | None:
-        """Its exit code, or −signal, once it has ended; None where the process that forked it has ended before."""
+        """Its exit code, or −signal, once it has ended; None if the process that forked it ended before."""
         ended = select.poll()  # select() takes no descriptor beyond 1,023
         ended.register(self.descriptor, select.POLLIN)
         ended.poll()
@@ -116,14 +116,14 @@ class WorkerProcess:
         return int(code) if code else None
 
     def close(self) -> None:
-        """Close what is shared with it."""
-        with suppress(OSError):  # what it had not read is lost with it
+        """Close its pipes."""
+        with suppress(OSError):  # unread input is lost with it
             self._shared.close()
 
 
 @dataclass(frozen=True)
-class Given:
-    """A campaign for a worker: its document, its skin, and the recordings left out of it, each with the reason."""
+class CampaignInput:
+    """A campaign for a worker: its document, its skin, and the excluded recordings, each with the reason."""
 
     document: bytes
     skin_id: str
@@ -131,7 +131,7 @@ class Given:
 
     @classmethod
     def of(cls, campaign: Campaign, skin_id: str, excluded: Sequence[tuple[str, str]] = ()) -> Self:
-        """From a campaign that lacks what is left out."""
+        """From a campaign without its excluded recordings."""
         return cls(json_file.write(campaign), skin_id, excluded)
 
 
@@ -141,8 +141,8 @@ def _end_of(stderr: BinaryIO) -> str:
 
 
 class WorkerProcesses:
-    """Workers for jobs. Their fork server starts with the first one, or when it is to be ready, and goes on until
-    `stop` or, where none is to be kept ready, until the last worker has ended."""
+    """Workers for jobs. Their fork server starts with the first worker, or by `get_ready`, and runs until `stop` or, if
+    none is to be kept ready, until the last worker has ended."""
 
     def __init__(
         self, table: Path, table_sha256: str, memory_bytes: int, cpu_seconds: float, *, keeps_ready: bool
@@ -159,23 +159,23 @@ class WorkerProcesses:
         self._lock = threading.Lock()
 
     def get_ready(self) -> None:
-        """See to it that the fork server runs, if it is to be kept ready; without room for it now, a job starts it."""
+        """Start the fork server if it is to be kept ready; if the system has no room now, a job starts it."""
         if self._keeps_ready:
             with self._lock, suppress(OSError):
                 self._running()
 
     def at_work(
         self,
-        campaigns: Sequence[Given],
+        campaigns: Sequence[CampaignInput],
         limits: dict[str, Any] | None = None,
         without: Sequence[str] = (),
         kind: DiagnosisKind = "campaign",
         name: str | None = None,
     ) -> "Worker":
-        """A worker at its job, on campaigns; see `Job`."""
-        parts = [Part(one.skin_id, len(one.document), one.excluded) for one in campaigns]
+        """A worker for a job on campaigns; see `Job`."""
+        parts = [Part(campaign.skin_id, len(campaign.document), campaign.excluded) for campaign in campaigns]
         job = Job(parts, self.table_sha256, self._memory_bytes, self._cpu_seconds, limits, without, kind, name)
-        content = [one.document for one in campaigns]
+        content = [campaign.document for campaign in campaigns]
         with self._lock:
             try:
                 process = self._running().fork()
@@ -198,7 +198,7 @@ class WorkerProcesses:
         return self._server
 
     def _is_done(self) -> None:
-        """A worker has ended."""
+        """Count a worker that has ended."""
         with self._lock:
             self._at_work -= 1
             if not self._at_work and not self._keeps_ready:
@@ -211,13 +211,13 @@ class WorkerProcesses:
 
 
 class Worker:
-    """A worker at its job. `news` is set when it has ended. Leaving the block ends it in any case."""
+    """A running worker. `news` is set when it has ended. Leaving the block kills it if it still runs."""
 
     def __init__(
         self, job: Job, documents: Sequence[bytes], process: WorkerProcess, is_done: Callable[[], None]
     ) -> None:
         """`is_done` is called once the process has ended and nothing is shared with it any more."""
-        self.said: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
+        self.messages: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
         self.news = threading.Event()
         self.ended = False
         self.too_long = f"it takes more than {job.cpu_seconds:g} s on a processor (UNDERSKIN_DIAGNOSIS_SECONDS)"
@@ -239,8 +239,8 @@ class Worker:
     @property
     def failure(self) -> str:
         """Why there is no report, once it has ended."""
-        if "error" in self.said:
-            return str(self.said["error"])
+        if "error" in self.messages:
+            return str(self.messages["error"])
         if self._code is None:
             return "its process ended with the one that had started it"
         if self._code == -signal.SIGXCPU:
@@ -252,7 +252,7 @@ class Worker:
 
     @property
     def last_words(self) -> str:
-        """The end of what it wrote to stderr."""
+        """The end of its stderr."""
         return _end_of(self._process.stderr)
 
     def _send(self, job: Job, documents: Sequence[bytes]) -> None:
@@ -265,7 +265,7 @@ class Worker:
     def _listen(self) -> None:
         for line in self._process.stdout:
             try:
-                self.said |= orjson.loads(line)
+                self.messages |= orjson.loads(line)
             except orjson.JSONDecodeError:  # killed in the midst of a line
                 break
         self._code = self._process.wait()

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.jobs.process import Given, Worker, WorkerProcesses
+from service.jobs.process import CampaignInput, Worker, WorkerProcesses
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFailed, StoreMoved, diagnoses
 from underskin import __version__
@@ -20,36 +20,36 @@ from underskin.recordings.validation import LONGEST_NAME
 logger = logging.getLogger("underskin")
 
 _POLL_S = 2.0  # how often the queue is looked at: another server may have put something in
-_BEAT_S = 2.0  # how often a running one is kept alive and its progress kept
+_BEAT_S = 2.0  # interval of heartbeats and of stored progress
 _JOIN_S = 10.0
 _LONG_S = 30.0  # from which on a diagnosis that runs holds up others no more
-_SHORT_S = 60.0  # within which one must end that runs beside as many long ones as there are workers
+_SHORT_S = 60.0  # within which a diagnosis must end that runs in addition to as many long ones as there are workers
 _STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
 def basis(table_sha256: str) -> diagnoses.Basis:
-    """What this server diagnoses with, as it is now."""
+    """The versions with which this server diagnoses at present."""
     return diagnoses.Basis(table_sha256, __version__, digest())
 
 
 @dataclass
 class _Job:
-    """A diagnosis in a thread of this server; without a worker while that starts.
+    """A diagnosis in a thread of this server; it has no worker while that starts.
 
-    One that is `aside` runs beside as many as there are workers, all of them long, and goes back into the queue where
-    it is long itself.
+    A job that is `aside` runs in addition to the regular workers while all of those are busy with long jobs, and
+    returns to the queue if it takes long itself.
     """
 
     row: AnyRow
     thread: threading.Thread
     aside: bool
     worker: Worker | None = None
-    begun: float = field(default_factory=time.monotonic)
+    started: float = field(default_factory=time.monotonic)
 
     @property
     def lasted_s(self) -> float:
-        """How long it runs."""
-        return time.monotonic() - self.begun
+        """Its running time [s]."""
+        return time.monotonic() - self.started
 
 
 class Runner:
@@ -70,12 +70,12 @@ class Runner:
         self._dispatcher = threading.Thread(target=self._dispatch, name="diagnosing", daemon=True)
 
     def start(self) -> None:
-        """Take up what is in the queue, and what was running when its server ended."""
+        """Process the queue, including diagnoses that ran when their server ended."""
         if self._workers:
             self._dispatcher.start()
 
     def stir(self) -> None:
-        """Look at once at what has changed: something new in the queue, or cancelled."""
+        """Check at once for new or cancelled diagnoses."""
         self._stirred.set()
         with self._lock:
             for job in self._jobs.values():
@@ -83,7 +83,7 @@ class Runner:
                     job.worker.news.set()
 
     def stop(self) -> None:
-        """End all workers; what they were at goes back into the queue."""
+        """Kill all workers; their diagnoses return to the queue."""
         self._ending.set()
         self.stir()
         if self._dispatcher.ident is not None:
@@ -102,7 +102,7 @@ class Runner:
                     pass
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            # Not while one starts: it may hold for minutes what this would wait for.
+            # Not while one starts: it may hold for minutes the lock for which this would wait.
             if not self._stirred.wait(_POLL_S) and not self._starting():
                 self._processes.get_ready()
 
@@ -126,8 +126,8 @@ class Runner:
             raise OSError(str(error)) from error
 
     def _claim(self) -> bool:
-        """Start the next diagnosis, where there is one and a place for it: that of a worker, or, where all of those
-        have been at theirs for long, one aside, for the smallest."""
+        """Start the next diagnosis if there is one and a free worker or, where all workers have been busy for long, one
+        aside for the smallest."""
         jobs = self._under_way()
         aside = sum(not job.aside for job in jobs) >= self._workers
         if aside and any(job.aside or job.lasted_s < _LONG_S for job in jobs):
@@ -155,16 +155,16 @@ class Runner:
             self._stirred.set()
 
     def _run(self, row: AnyRow) -> None:
-        """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
+        """Run a diagnosis until it has ended, another server has claimed it, or this server ends."""
         without = diagnoses.without(row)
-        with self._processes.at_work(self._given(row), None, without, row.kind, row.name) as worker:
+        with self._processes.at_work(self._campaign_inputs(row), None, without, row.kind, row.name) as worker:
             with self._lock:
                 job = self._jobs[row.number]
-                job.worker, job.begun = worker, time.monotonic()
+                job.worker, job.started = worker, time.monotonic()
             while not worker.ended and not self._ending.is_set():
                 worker.news.wait(_BEAT_S)
                 worker.news.clear()
-                if not self._is_ours(row, worker.said["progress"]):
+                if not self._is_ours(row, worker.messages["progress"]):
                     return
                 if job.aside and job.lasted_s > _SHORT_S and not worker.ended:
                     self._long.add(row.number)
@@ -174,27 +174,28 @@ class Runner:
                     return
             if not worker.ended:
                 self._release(row)
-            elif "report" in worker.said:
-                self._end(row, diagnoses.finish, worker.said["report"], worker.said.get("figures"))
+            elif "report" in worker.messages:
+                self._end(row, diagnoses.finish, worker.messages["report"], worker.messages.get("figures"))
             else:
                 logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
                 self._end(row, diagnoses.fail, worker.failure)
 
-    def _given(self, row: AnyRow) -> list[Given]:
-        """The campaigns of a diagnosis, read one after another; those of one name are told apart by their ids."""
+    def _campaign_inputs(self, row: AnyRow) -> list[CampaignInput]:
+        """The campaigns of a diagnosis, read one after another; campaigns with the same name are distinguished by their
+        ids."""
         members = self._store.read(diagnoses.members, row)
         names = [member.name for member in members]
-        given = []
+        campaigns = []
         for member in members:
-            campaign, excluded = self._store.read(diagnoses.as_asked, member)
+            campaign, excluded = self._store.read(diagnoses.as_diagnosed, member)
             if names.count(member.name) > 1:
                 campaign = replace(campaign, name=f"{member.name[: LONGEST_NAME // 2]} ({member.campaign_id})")
-            left_out = [(left.recording, left.reason) for left in excluded]
-            given.append(Given.of(campaign, member.skin_id, left_out))
-        return given
+            excluded_names = [(exclusion.recording, exclusion.reason) for exclusion in excluded]
+            campaigns.append(CampaignInput.of(campaign, member.skin_id, excluded_names))
+        return campaigns
 
     def _is_ours(self, row: AnyRow, progress: float) -> bool:
-        """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
+        """Renew the claim; False if it was cancelled or another server claimed it, True if the store fails."""
         try:
             ours = self._store.write(diagnoses.keep_alive, row.number, self._server, progress)
         except _STORE_FAILED as error:
@@ -204,7 +205,7 @@ class Runner:
         return ours
 
     def _end(self, row: AnyRow, change: Callable[..., bool], *outcome: Any) -> None:
-        """Store the outcome, and try again where the store fails: it took long to compute."""
+        """Store the outcome, and retry if the store fails: it took long to compute."""
         while True:
             try:
                 self._store.write(change, row.number, self._server, *outcome)

@@ -1,10 +1,9 @@
-"""A worker: campaigns in, one or several, their report or next experiment out, within a limit on memory.
+"""A worker process: one or several campaigns in, their report or next experiment out, within a memory limit.
 
-It is a process that fork_server.py forks for one job, so that nothing of a job is left for the next.
-
-Standard input: a line of JSON (`Job`), then its campaigns (`campaign/1`), then nothing until the runner ends: a worker
-whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and, of one
-campaign, one with its figures, or one with the plan where the job has limits of a rig, or one with the error.
+fork_server.py forks one process for each job, so no state of a job reaches the next. Standard input: a line of JSON
+(`Job`), then its campaigns (`campaign/1`), then nothing; a worker ends when the runner closes it. Standard output: a
+line of JSON for each progress, then one with the report and, for a single campaign, one with its figures; or one with
+the plan if the job has limits of a rig; or one with the error.
 """
 
 import math
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from underskin.recordings.reading import Reading
     from underskin.surrogate.sigma_table import SigmaTable
 
-Say = Callable[[dict[str, Any]], None]
+SendMessage = Callable[[dict[str, Any]], None]
 
 _FEW_NUMBERS: dict[str, Any] = {
     "schema": "campaign/1",
@@ -55,7 +54,7 @@ _FEW_NUMBERS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Part:
-    """A campaign of a job: its skin, how many bytes its document has, and what was left out of it and why."""
+    """A campaign of a job: its skin, the size of its document in bytes, and excluded recordings with the reasons."""
 
     skin_id: str
     size: int
@@ -64,12 +63,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker needs beside the campaigns: what each of them is, the table's hash, the memory and the time on a
-    processor that it may take.
+    """What a worker needs besides the campaigns: a `Part` for each, the table's hash, and limits on memory and CPU
+    time.
 
-    With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report. Mechanisms
-    `without` which it is to be explained are left out. Where it is of several campaigns, of one skin or of a fleet by
-    `kind`, the report bears `name`.
+    With `limits` (of `RigLimits`, by name) it plans the next experiment within them and makes no report. The mechanisms
+    `without` are not used to explain the data. The report of several campaigns, of one skin or of a fleet (`kind`), has
+    the name `name`.
     """
 
     parts: Sequence[Part]
@@ -82,7 +81,7 @@ class Job:
     name: str | None = None
 
     def line(self) -> bytes:
-        """As the worker reads it."""
+        """As one line of JSON."""
         return orjson.dumps(asdict(self), option=orjson.OPT_APPEND_NEWLINE)
 
     @classmethod
@@ -93,13 +92,13 @@ class Job:
 
 
 def work(table: "SigmaTable | None", problem: str) -> None:
-    """The job on standard input; `problem` says why there is no table."""
+    """Do the job on standard input; `problem` says why there is no table."""
     from underskin.errors import UnderskinError
 
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # output that a library prints is no answer
 
-    def say(message: dict[str, Any]) -> None:
+    def send_message(message: dict[str, Any]) -> None:
         answers.write(orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
 
     stdin = os.fdopen(0, "rb", closefd=False)
@@ -110,18 +109,20 @@ def work(table: "SigmaTable | None", problem: str) -> None:
     documents = [stdin.read(part.size) for part in job.parts]
     threading.Thread(target=_end_with_the_runner, args=(stdin,), daemon=True).start()
     if table is None:
-        say({"error": problem})
+        send_message({"error": problem})
         return
     try:
-        _work(job, documents, table, say)
+        _work(job, documents, table, send_message)
     except UnderskinError as error:
-        say({"error": str(error)})
+        send_message({"error": str(error)})
     except MemoryError:
-        say({"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"})
+        send_message(
+            {"error": f"it takes more than {job.memory_bytes / 1e6:g} MB of memory (UNDERSKIN_DIAGNOSIS_MEMORY_MB)"}
+        )
 
 
 def warm_up(table: "SigmaTable") -> None:
-    """Diagnose a few numbers, so that what is loaded at its first use is loaded before the first job."""
+    """Diagnose a few numbers, so that lazily loaded code is loaded before the first job."""
     from underskin.diagnosis.pipeline import diagnose
     from underskin.diagnosis.reporting.figures import figures
     from underskin.diagnosis.reporting.report import report
@@ -132,8 +133,8 @@ def warm_up(table: "SigmaTable") -> None:
         figure.to_json()
 
 
-def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", say: Say) -> None:
-    """The report, with what was left out of it among the findings, within the limit on memory."""
+def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", send_message: SendMessage) -> None:
+    """The report, with exclusions among its findings, within the memory limit."""
     from underskin.errors import TableError
     from underskin.mechanisms.registry import CATALOGUE
     from underskin.parallel import limit_process
@@ -146,36 +147,38 @@ def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", say: Say) -
     limit_process(job.memory_bytes, cpu_seconds=math.ceil(job.cpu_seconds))
     readings = [Reading(*from_dict(_read(document)), []) for document in documents]  # an older server read otherwise
     if job.kind == "campaign":
-        _diagnose(job, readings[0], table, say)
+        _diagnose(job, readings[0], table, send_message)
     else:
-        say({"report": _with_left_out(job, _together(job, readings, table, say), readings)})
+        send_message({"report": _with_exclusions(job, _together(job, readings, table, send_message), readings)})
 
 
-def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", say: Say) -> None:
-    """One campaign; its figures come after the report, which is kept without them too."""
+def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", send_message: SendMessage) -> None:
+    """Diagnose one campaign; its figures follow the report, which is stored even without them."""
     from underskin.diagnosis.pipeline import diagnose, with_refused
     from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.diagnosis.reporting.figures import figures
     from underskin.diagnosis.reporting.report import report
 
     limits = RigLimits(**job.limits or {})
-    diagnosis = diagnose(reading.campaign, table, lambda share: say({"progress": share}), limits, job.without)
+    diagnosis = diagnose(reading.campaign, table, lambda share: send_message({"progress": share}), limits, job.without)
     if job.limits is not None:
-        say({"plan": diagnosis.next_experiment})
+        send_message({"plan": diagnosis.next_experiment})
         return
     diagnosis = with_refused(diagnosis, reading.problems)
     document = report(diagnosis)
-    say({"report": _with_left_out(job, document, [reading])})
-    say({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
+    send_message({"report": _with_exclusions(job, document, [reading])})
+    send_message({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
 
 
-def _together(job: Job, readings: "Sequence[Reading]", table: "SigmaTable", say: Say) -> dict[str, Any]:
-    """The report of several campaigns of a skin, or of those of a fleet."""
+def _together(
+    job: Job, readings: "Sequence[Reading]", table: "SigmaTable", send_message: SendMessage
+) -> dict[str, Any]:
+    """The report on several campaigns of a skin, or on those of a fleet."""
     name = job.name or ""
     campaigns = [reading.campaign for reading in readings]
 
     def progress(share: float) -> None:
-        say({"progress": share})
+        send_message({"progress": share})
 
     if job.kind == "skin":
         from underskin.diagnosis.several.campaigns import diagnose_together
@@ -189,29 +192,33 @@ def _together(job: Job, readings: "Sequence[Reading]", table: "SigmaTable", say:
     return diagnose_fleet(skins, table, name, job.without, progress)
 
 
-def _with_left_out(job: Job, document: dict[str, Any], readings: "Sequence[Reading]") -> dict[str, Any]:
-    """A report whose findings begin with the recordings that had been excluded; of several campaigns with its name, and
-    with those that are refused."""
+def _with_exclusions(job: Job, document: dict[str, Any], readings: "Sequence[Reading]") -> dict[str, Any]:
+    """A report whose findings start with the recordings excluded beforehand; for several campaigns each finding names
+    its campaign, and rejected recordings follow."""
     from underskin.diagnosis.pipeline import refused
     from underskin.findings.codes import Reason
     from underskin.findings.finding import Finding
 
-    left_out = [
+    exclusions = [
         (reading.campaign.name, Finding(Reason.EXCLUDED, recording, "", {"excluded_for": reason}).in_report())
         for part, reading in zip(job.parts, readings, strict=True)
         for recording, reason in part.excluded
     ]
     if job.kind != "campaign":
-        left_out += [(one.campaign.name, entry.in_report()) for one in readings for entry in refused(one.problems)]
-    said = [
+        exclusions += [
+            (reading.campaign.name, refusal.in_report())
+            for reading in readings
+            for refusal in refused(reading.problems)
+        ]
+    sentences = [
         finding if job.kind == "campaign" else {**finding, "statement": f"{name}: {finding['statement']}"}
-        for name, finding in left_out
+        for name, finding in exclusions
     ]
-    return {**document, "findings": said + list(document["findings"])}
+    return {**document, "findings": sentences + list(document["findings"])}
 
 
 def _read(document: bytes) -> Any:
-    """A campaign's JSON, which the server has written: where it cannot be read, memory is short."""
+    """A campaign's JSON as written by the server: if it cannot be read, memory was short (MemoryError)."""
     try:
         return orjson.loads(document)
     except orjson.JSONDecodeError as error:

@@ -1,8 +1,8 @@
-"""The outermost layer, plain ASGI: access control, request id, body limit, metrics and log for every request.
+"""The outermost layer, plain ASGI: access control, request id, body limit, metrics and log of every request.
 
-It also answers the two requests that clients send one by one in great number, before FastAPI's own layers, which
-would take longer than the answer. Such a hot route treats the plain case only and leaves all else to the route of the
-same path in the API, which is the authority on what is valid and on the errors.
+It also answers the two requests that clients send one by one in great number before FastAPI's layers, which would take
+longer than the answer. Such a hot route handles only the plain case; everything else goes to the API route of the same
+path, which defines what is valid and the errors.
 """
 
 import itertools
@@ -37,12 +37,12 @@ HotRoute = Callable[[bytes], bytes | None]
 
 
 def are_numbers(values: Iterable[object]) -> bool:
-    """Whether all are numbers as JSON knows them: what is not is left to the API."""
+    """Whether all are JSON numbers; everything else is left to the API."""
     return _NUMBERS.issuperset(map(type, values))
 
 
 class AsgiMiddleware:
-    """The layer in front of the API; one for the process."""
+    """The layer in front of the API; one per process."""
 
     def __init__(
         self, api: ASGIApp, access: AccessControl, hot: Mapping[tuple[str, str], HotRoute], problem_page: ProblemPage
@@ -128,7 +128,7 @@ class AsgiMiddleware:
     def _limited(
         self, receive: Receive, path: str, headers: Mapping[bytes, bytes], hold: Callable[[int], None]
     ) -> Receive:
-        """`receive`, refusing the body once it exceeds the limit, whatever its Content-Length said."""
+        """`receive` that rejects the body once it exceeds the limit, whatever its Content-Length said."""
         size = 0
 
         async def counted() -> Message:
@@ -144,7 +144,7 @@ class AsgiMiddleware:
 
 
 class _Exchange:
-    """The answer on its way: puts the request id into it and remembers its status."""
+    """The answer in progress: adds the request id and records the status."""
 
     def __init__(self, send: Send, request_id: str) -> None:
         self._send = send
@@ -168,7 +168,7 @@ class _Exchange:
 
 
 def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
-    """Whether JSON is asked for and, where there is a body, sent."""
+    """Whether JSON is requested and, if there is a body, sent."""
     accept = headers.get(b"accept", b"").lower()
     if b"csv" in accept or b"npz" in accept:
         return False
@@ -176,7 +176,7 @@ def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:
-    """A body that was read already, and then what follows."""
+    """A body that was read already, followed by the remaining messages."""
     pending = True
 
     async def replayed() -> Message:

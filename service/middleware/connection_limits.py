@@ -1,4 +1,4 @@
-"""What a connection may take: bytes of headers, time without progress, and how many there may be at once."""
+"""Limits of a connection: bytes of headers, time without progress, and how many there may be at once."""
 
 import logging
 import resource
@@ -27,16 +27,16 @@ _reached = Counter(
 
 
 class Connection(Protocol):
-    """What is known of a connection here."""
+    """The properties of a connection that the limits use."""
 
     def waits_for_client_s(self) -> float | None:
-        """Seconds since the client sent something, while it is the client's turn; None while it is the server's."""
+        """Seconds since the client sent something, while the server waits for it; None while the client waits."""
 
     def is_served(self) -> bool:
-        """Whether a body, or an answer, is under way."""
+        """Whether a body or an answer is being transferred."""
 
     def give_way(self) -> None:
-        """Close it, since others need its place."""
+        """Close it to free its place."""
 
 
 @dataclass(eq=False)
@@ -50,8 +50,8 @@ class ConnectionLimits:
     _logged: dict[Limit, tuple[float, int]] = field(default_factory=dict)
 
     def within_descriptors(self) -> "ConnectionLimits":
-        """The same with no more connections than this process has descriptors for: two each, since what is uploaded on
-        one is kept in a file. Raises the process's soft limit on them where that is needed and allowed."""
+        """The same with no more connections than the process has file descriptors for: two each, because uploads are
+        written to a file. Raises the process's soft limit if necessary and allowed."""
         needed = _FILES + _PER_CONNECTION * (self.connections + SPARE)
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         allowed, most = (needed if limit == resource.RLIM_INFINITY else limit for limit in (soft, hard))
@@ -66,20 +66,22 @@ class ConnectionLimits:
         return received < _LEAST_BODY_BYTES
 
     def make_room(self, connections: Iterable[Connection], places: int, *, urgently: bool) -> bool:
-        """Close so many connections that have kept the server waiting for the longest, and say whether there were as
-        many: those without a request, or that are answered, before those whose body or answer has stopped; `urgently`
-        for however short a time."""
+        """Close so many of the connections that have kept the server waiting longest, and return whether there were
+        as many: first idle or answered ones, then those whose body or answer has stalled; `urgently`: however short
+        the wait."""
         waiting = [
-            (one.is_served(), -wait, one) for one in connections if (wait := one.waits_for_client_s()) is not None
+            (connection.is_served(), -wait, connection)
+            for connection in connections
+            if (wait := connection.waits_for_client_s()) is not None
         ]
-        waiting.sort(key=lambda entry: entry[:2])
-        idle = [one for served, wait, one in waiting if urgently or not served or -wait > _SERVED_WAIT_S]
-        for one in idle[:places]:
-            one.give_way()
+        waiting.sort(key=lambda candidate: candidate[:2])
+        idle = [connection for served, wait, connection in waiting if urgently or not served or -wait > _SERVED_WAIT_S]
+        for connection in idle[:places]:
+            connection.give_way()
         return len(idle) >= places
 
     def reached(self, limit: Limit, what: str) -> None:
-        """Count a connection that reached a limit; `what` is logged, with how many were not."""
+        """Count a connection that reached a limit; `what` is logged with the number of those not logged."""
         _reached.labels(limit).inc()
         now = time.monotonic()
         last, more = self._logged.get(limit, (-_LOG_EVERY_S, 0))

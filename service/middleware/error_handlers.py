@@ -1,4 +1,4 @@
-"""Every error that a route raises, as a problem."""
+"""Turns every exception of a route into a problem document."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -35,7 +35,7 @@ Methods = Callable[[FastAPI, str], Sequence[str]]  # of a path
 
 
 def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) -> None:
-    """One shape for what we raise, what FastAPI raises, and what nobody expected; a page for who looks at pages."""
+    """One form for our exceptions, FastAPI's and unexpected ones; a page for browsers."""
 
     async def handle(request: Request, error: Exception) -> Response:
         refusal = _as_refusal(request, _of_the_disk(error) or error, methods)
@@ -48,7 +48,7 @@ def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) 
 
 
 def problem_response(scope: Scope, refusal: Refusal, problem_page: ProblemPage) -> Response:
-    """A problem as the answer to a request: as a page for who looks at pages."""
+    """A problem as the answer to a request, as a page for browsers."""
     path, request_id = scope["path"], scope["request_id"]
     if is_browsing(path, Headers(scope=scope).get("accept", "")):
         return problem_page(refusal, request_id)
@@ -57,7 +57,7 @@ def problem_response(scope: Scope, refusal: Refusal, problem_page: ProblemPage) 
 
 
 def _of_the_disk(error: Exception) -> StorageFailed | None:
-    """What an error says of a disk, as that of temporary files, where long bodies lie; FastAPI wraps it then."""
+    """The problem of a disk error, such as on temporary files of long bodies, which FastAPI wraps."""
     cause = error.__cause__ if isinstance(error, HTTPException) else error
     return storage_failure(cause) if isinstance(cause, OSError) else None
 
@@ -66,7 +66,9 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
     match error:
         case Refusal():
             return error
-        case HTTPException(__cause__=Refusal() as refusal):  # FastAPI wraps what ends the reading of a body
+        case HTTPException(
+            __cause__=Refusal() as refusal
+        ):  # FastAPI wraps the exception that ends the reading of a body
             return refusal
         case HTTPException(__cause__=ClientDisconnect()):
             return Refusal(499, "The client left before its body was complete.", title="Client closed request")
@@ -88,7 +90,7 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
 
 
 def _of_the_store(request: Request, error: Exception) -> Refusal:
-    """What the store raises, and what nobody expected."""
+    """The problem of the store's exceptions and of unexpected ones."""
     match error:
         case Missing() | Conflict() | OtherRequest():
             return Refusal(_STATUS[type(error)], str(error))
@@ -112,6 +114,6 @@ def _of_the_store(request: Request, error: Exception) -> Refusal:
 
 
 def _unreadable(error: RequestValidationError) -> Refusal | None:
-    """A body that is not JSON is no question of fields."""
-    reasons = [entry["ctx"]["error"] for entry in error.errors() if entry["type"] == "json_invalid"]
+    """A body that is not JSON is not a field error."""
+    reasons = [detail["ctx"]["error"] for detail in error.errors() if detail["type"] == "json_invalid"]
     return Refusal(400, f"The body is not JSON: {reasons[0]}.") if reasons else None

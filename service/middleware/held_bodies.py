@@ -1,4 +1,4 @@
-"""Memory of the bodies of requests under way: short ones, and of the others no more than so much in all."""
+"""Memory for the bodies of current requests: short ones are free, the others share a total limit."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ _SHORT_BYTES = 1_000_000  # of each body that are not counted
 
 
 class HeldBodies:
-    """Bytes of all bodies that are held; those of uploads go to the disk and are none."""
+    """Total bytes of the bodies held in memory; uploads go to disk and do not count."""
 
     def __init__(self, most_bytes: int) -> None:
         """None yet."""
@@ -18,20 +18,19 @@ class HeldBodies:
 
     @contextmanager
     def one(self) -> Iterator[Callable[[int], None]]:
-        """One of them while its request is under way: to be told how many bytes it has by now. That raises Refusal 503
-        where there is no room for them.
-        """
-        own = 0
+        """Context of one request: a function to be called with the number of bytes received so far. It raises
+        Refusal 503 if there is no room for them."""
+        counted = 0
 
         def hold(size: int) -> None:
-            nonlocal own
-            self._bytes -= own
-            own = max(0, size - _SHORT_BYTES)
-            self._bytes += own
-            if own and self._bytes > self._most_bytes:
+            nonlocal counted
+            self._bytes -= counted
+            counted = max(0, size - _SHORT_BYTES)
+            self._bytes += counted
+            if counted and self._bytes > self._most_bytes:
                 raise Refusal(503, "Other large bodies are under way; try again in a while.", headers=RETRY_LATER)
 
         try:
             yield hold
         finally:
-            self._bytes -= own
+            self._bytes -= counted

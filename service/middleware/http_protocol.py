@@ -1,6 +1,5 @@
-"""HTTP/1.1 as uvicorn speaks it, with limits on what takes memory, time and places without a key: headers and trailers
-without end, requests sent ahead of their answers, clients that stop sending or reading, and many connections.
-"""
+"""HTTP/1.1 by uvicorn, with limits on the use of memory, time and connections by clients without a key: endless
+headers and trailers, pipelined requests, clients that stop sending or reading, and many connections."""
 
 from collections.abc import Sized
 from typing import Any
@@ -18,11 +17,11 @@ _SELDOMEST_CHECK_S = 1.0
 
 
 class _RefusedError(Exception):
-    """A request that is not parsed further; its client was told."""
+    """A request that is not parsed further; the client has been answered."""
 
 
 class _Flow(FlowControl):
-    """Reads no more while requests wait for the answers before theirs."""
+    """Stops reading while pipelined requests wait for earlier answers."""
 
     def __init__(self, transport: Any, waiting: Sized) -> None:
         super().__init__(transport)
@@ -46,10 +45,10 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         self._body_bytes = 0  # since `_progress`
         self._progress = self._heard = self.loop.time()
         self._unsent = 0
-        self._answered: float | None = None  # when a request was whose body still comes
+        self._answered: float | None = None  # time of a request whose body is still coming
 
     def connection_made(self, transport: Any) -> None:
-        """Beyond the limit others give way, or `/health` alone is answered."""
+        """Beyond the limit idle connections are closed, or only `/health` is answered."""
         super().connection_made(transport)
         self.flow = _Flow(transport, self.pipeline)
         if len(self.connections) > self.limits.connections:
@@ -100,7 +99,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         super().on_response_complete()
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse what was sent; without a word where that would stand within, before or after another answer."""
+        """Reject the request; silently if an answer would interfere with another one."""
         if self.transport.is_closing():
             return
         if self.pipeline or (self.cycle is not None and self.cycle.response_started and not self._is_answered()):
@@ -137,7 +136,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
             self.transport.close()
 
     def _is_turn_of_server(self) -> bool:
-        """Whether a request is being answered, or the server does not take more of its body now."""
+        """Whether a request is being answered, or the server currently does not read more of its body."""
         if self.cycle is None or self._is_answered():
             return False
         return not self._in_body or self.flow.read_paused or self.cycle.waiting_for_100_continue
@@ -146,30 +145,30 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         """Whether the last request is."""
         return self.cycle is not None and bool(self.cycle.response_complete)
 
-    def _others(self) -> list["LimitedHttpProtocol"]:
+    def _other_connections(self) -> list["LimitedHttpProtocol"]:
         """The other connections that are open."""
-        ours = [one for one in self.connections if isinstance(one, LimitedHttpProtocol)]
-        return [one for one in ours if one is not self and not one.transport.is_closing()]
+        ours = [protocol for protocol in self.connections if isinstance(protocol, LimitedHttpProtocol)]
+        return [protocol for protocol in ours if protocol is not self and not protocol.transport.is_closing()]
 
     def _find_room(self) -> None:
-        """For this connection, which is one too many unless others are closing."""
-        others, most = self._others(), self.limits.connections
-        if len(others) < most:
+        """Free a place for this connection, which is one too many unless others are closing."""
+        open_protocols, most = self._other_connections(), self.limits.connections
+        if len(open_protocols) < most:
             return
-        said = f"{most} connections are open (UNDERSKIN_MAX_CONNECTIONS): new ones take the place of idle ones"
-        self.limits.reached("connections", said)
-        if self.limits.make_room(others, len(others) - most + 1, urgently=False):
+        message = f"{most} connections are open (UNDERSKIN_MAX_CONNECTIONS): new ones take the place of idle ones"
+        self.limits.reached("connections", message)
+        if self.limits.make_room(open_protocols, len(open_protocols) - most + 1, urgently=False):
             return
-        left = self._others()
-        if len(left) < most + SPARE or self.limits.make_room(left, 1, urgently=True):
+        still_open = self._other_connections()
+        if len(still_open) < most + SPARE or self.limits.make_room(still_open, 1, urgently=True):
             self.app = _overloaded(self.app)
         else:
             self.transport.abort()
 
     def _check_all(self) -> None:
-        for one in list(self.connections):
-            if isinstance(one, LimitedHttpProtocol):
-                one.check_progress()
+        for protocol in list(self.connections):
+            if isinstance(protocol, LimitedHttpProtocol):
+                protocol.check_progress()
         self.loop.call_later(min(_SELDOMEST_CHECK_S, self.limits.idle_s / _CHECKS), self._check_all)
 
     def check_progress(self) -> None:
@@ -201,7 +200,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         if limit == "idle_answer" or (self.cycle is not None and self.cycle.response_started):
             self.transport.abort()
             return
-        if self._in_body or self._head_bytes:  # who has said nothing is told nothing
+        if self._in_body or self._head_bytes:  # no answer to a client that has sent nothing
             self.transport.write(b"".join((STATUS_LINE[408], b"connection: close\r\ncontent-length: 0\r\n\r\n")))
         self.transport.close()
 

@@ -1,4 +1,4 @@
-"""Long bodies of JSON are parsed in a process of their own: in this one they would hold up all other requests."""
+"""Long JSON bodies are parsed in a separate process, because parsing in this one would block all other requests."""
 
 import sys
 import tempfile
@@ -14,7 +14,7 @@ from underskin.recordings.readers.sandbox import call_apart
 LONG_BYTES = 1_000_000  # beyond which a body is parsed apart: up to here it takes some hundredths of a second
 _MOST_NUMBERS = 2_000_000  # in one list of a body: its answer takes many times the memory of a column
 _READ = "underskin.recordings.readers.long_json:read"
-_MOST_PLAIN_BYTES = 12_000_000  # beside long lists of numbers: this part goes through this process's parser
+_MOST_PLAIN_BYTES = 12_000_000  # besides long lists of numbers: this part goes through this process's parser
 _MEMORY_TIMES, _LEAST_MEMORY_BYTES = 5, 150_000_000  # of the parsing process; the body itself is held here
 
 
@@ -23,7 +23,8 @@ class NotJson(Exception):
 
 
 def document_of(body: bytes) -> Any:
-    """What a JSON body holds, long lists of numbers as arrays; raises as `read`, and 413 where a list is too long."""
+    """The content of a JSON body, long lists of numbers as arrays; raises as `read`, and 413 for a list that is too
+    long."""
     with tempfile.TemporaryFile() as stream:
         stream.write(body)
         stream.flush()
@@ -31,38 +32,38 @@ def document_of(body: bytes) -> Any:
 
 
 def read(stream: BinaryIO, most_numbers: int = sys.maxsize) -> Any:
-    """What an open JSON file holds, long lists of numbers as arrays; `most_numbers` may be in one.
+    """The content of an open JSON file, long lists of numbers as arrays; each may have `most_numbers`.
 
-    Raises NotJson, Refusal 422 where a key comes twice, and 413 where it takes too much memory or time.
+    Raises NotJson, Refusal 422 for a repeated key, and 413 if it takes too much memory or time.
     """
     size = stream.seek(0, 2)
     memory_bytes = max(_LEAST_MEMORY_BYTES, _MEMORY_TIMES * size)
     limits = ParsingLimits(memory_bytes, ParsingLimits.from_environment().seconds)
     try:
         most = str(_MOST_PLAIN_BYTES), str(most_numbers)
-        found = call_apart(_READ, stream, "body", *most, what="JSON", limits=limits)
+        value = call_apart(_READ, stream, "body", *most, what="JSON", limits=limits)
     except FileError as error:
         raise _too_large(f"cannot be read: {error.reason}") from None
-    if "plain" in found:
+    if "plain" in value:
         raise _too_large(
-            f"has {found['plain'] / 1e6:.1f} MB beside its long lists of numbers; {_MOST_PLAIN_BYTES / 1e6:g} MB may be"
+            f"has {value['plain'] / 1e6:.1f} MB beside its long lists of numbers; {_MOST_PLAIN_BYTES / 1e6:g} MB may be"
         )
-    if "numbers" in found:
-        raise _too_large(f"has a list of {found['numbers']:,} numbers; {most_numbers:,} may be in one")
-    if "invalid" in found:
-        line, column, wrong = found["invalid"]
+    if "numbers" in value:
+        raise _too_large(f"has a list of {value['numbers']:,} numbers; {most_numbers:,} may be in one")
+    if "invalid" in value:
+        line, column, wrong = value["invalid"]
         raise NotJson(f"line {line}, column {column}: {wrong}")
-    if "repeated" in found:
-        raise given_twice(*found["repeated"])
-    return found["document"]
+    if "repeated" in value:
+        raise given_twice(*value["repeated"])
+    return value["document"]
 
 
 def as_lists(value: Any) -> Any:
     """The same with lists in place of arrays."""
     if isinstance(value, dict):
-        return {name: as_lists(entry) for name, entry in value.items()}
+        return {name: as_lists(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [as_lists(entry) for entry in value]
+        return [as_lists(item) for item in value]
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 

@@ -56,7 +56,7 @@ def flush() -> None:
     for request in _waiting:
         _series(request.method, request.route, request.status).observe(request.seconds)
     _waiting.clear()
-    with suppress(OSError):  # a log that nobody reads, or a full disk, must not stop the answers
+    with suppress(OSError):  # an unread log or a full disk must not stop the answers
         while text:
             text = text[os.write(2, text) :]
 

@@ -1,6 +1,5 @@
-"""JSON bodies that FastAPI reads: one in which an object has a key twice is refused, since the parsers would take the
-last and say nothing, and a long one is parsed beside the event loop.
-"""
+"""Checks of JSON bodies that FastAPI reads: an object with a repeated key is rejected, because parsers would
+silently take the last, and a long body is parsed outside the event loop."""
 
 import asyncio
 from collections.abc import Callable, Coroutine

@@ -1,4 +1,4 @@
-"""The pages: what a browser sees of the service, without JavaScript to build and with nothing from outside."""
+"""The pages that a browser shows: no JavaScript build and nothing loaded from outside."""
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -41,12 +41,12 @@ for _page in _PAGES:
 
 
 def add_to(api: FastAPI) -> None:
-    """Let the service have them; they are not in the OpenAPI document."""
+    """Add the pages to the service; they are not in the OpenAPI document."""
     for page in _PAGES:
         api.include_router(page.router, include_in_schema=False)
 
 
 def methods(path: str) -> list[str]:
-    """All methods of a page's path; the OpenAPI document does not tell them."""
+    """All methods of a page's path, which the OpenAPI document does not list."""
     routes = [route for page in _PAGES for route in page.router.routes if isinstance(route, APIRoute)]
     return sorted({method for route in routes if route.path == path for method in route.methods or ()})

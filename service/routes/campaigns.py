@@ -131,8 +131,8 @@ async def post(
             most_unfolded_bytes=settings.max_unfolded_bytes,
         )
         answer, repeats = await run_in_threadpool(accept, store, uploads, options)
-        kept = [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]
-        await run_in_threadpool(d33_cache.derive, store, table, kept)
+        campaign_ids = [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]
+        await run_in_threadpool(d33_cache.derive, store, table, campaign_ids)
     headers = {"Idempotency-Replayed": "true"} if repeats else {}
     return Response(orjson.dumps(answer), status_code=201, headers=headers, media_type="application/json")
 

@@ -19,7 +19,7 @@ from service.usecases import changes as usecase
 from service.usecases import skins as of_skins
 
 router = APIRouter(prefix="/v1", route_class=JsonRoute)
-_KEPT: Mapping[str, Callable[[Any], str | None]] = {
+_CHECKS: Mapping[str, Callable[[Any], str | None]] = {
     "name": written.name,
     "title": written.title,
     "remark": written.remark,
@@ -135,4 +135,4 @@ def undo_change(
 
 def _values(annotation: BaseModel) -> dict[str, str | None]:
     """What was sent, as it is kept; raises InvalidInput."""
-    return {name: _KEPT[name](getattr(annotation, name)) for name in sorted(annotation.model_fields_set)}
+    return {name: _CHECKS[name](getattr(annotation, name)) for name in sorted(annotation.model_fields_set)}

@@ -36,7 +36,7 @@ _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
 
 @dataclass(frozen=True)
-class Told:
+class UploadedNames:
     """What a CSV or workbook says beside the fields: columns of words (`labels`), which only say what a row is; and in
     `notes` what was left out or read otherwise than its heading says."""
 
@@ -46,25 +46,25 @@ class Told:
 
 def parse(
     kind: type[_Kind], body: bytes, content_type: str, most_bytes: int, sheet: str | None = None
-) -> tuple[_Kind, Told]:
+) -> tuple[_Kind, UploadedNames]:
     """The request in `body`, and what else a CSV or workbook says; an .npz may have `most_bytes` when it is expanded;
     `sheet`: of a workbook, which is read in a process of its own, as files are.
 
     Raises Refusal 400 (unreadable), 413 (too large), 415 (another type) or 422 (a field is wrong), and InvalidInput.
     """
-    told = Told({}, ())
+    names_of_columns = UploadedNames({}, ())
     if sheet is not None and not is_workbook(content_type):
         raise conflicting("sheet", sheet, f"must be left out: the body is no workbook ({XLSX})")
     match media_type_of(content_type):
         case "text/csv":
             fields: Any
-            fields, told = _from_csv(kind, body, "The CSV of the body")
+            fields, names_of_columns = _from_csv(kind, body, "The CSV of the body")
         case _ if is_workbook(content_type):
             try:
                 text = sheet_text(body, _WORKBOOK, sheet)
             except FileError as error:
                 raise Refusal(400, f"{error}.") from None
-            fields, told = _from_csv(kind, text.encode(), "The workbook of the body")
+            fields, names_of_columns = _from_csv(kind, text.encode(), "The workbook of the body")
         case "application/x-npz":
             fields = fields_of_npz(kind, body, most_bytes)
         case "" | "application/json" if (
@@ -75,7 +75,7 @@ def parse(
             fields = _long_json(kind, body)
         case _:
             fields = json_document(body, content_type, f", {CSV}, {NPZ} or {XLSX}")
-    return validated(kind, fields), told
+    return validated(kind, fields), names_of_columns
 
 
 def json_document(body: bytes, content_type: str, also: str = "") -> Any:
@@ -154,28 +154,28 @@ def _plain(kind: type[ColumnsRequest], name: str, value: Any) -> Any:
 
 
 def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
-    place = -1
+    index = -1
     for _ in range(times + 1):
-        place = body.find(mark, place + 1)
-        if place < 0:
+        index = body.find(mark, index + 1)
+        if index < 0:
             return False
     return True
 
 
-def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[str, Any], Told]:
+def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[str, Any], UploadedNames]:
     cells = sum(map(body.count, (b",", b";", b"\t", b"\n", b"\r")))  # or fewer, where numbers have decimal commas
     if cells > _MOST_CSV_CELLS:
         most = f"{_MOST_CSV_CELLS:,} may be in one; send less at once, or JSON or {NPZ}."
         raise Refusal(413, f"{what} has some {cells:,} cells; {most}", title="Body too large")
     try:
-        found = from_csv(body, kind.model_fields)
+        parsed = from_csv(body, kind.model_fields)
     except CsvError as error:
         raise Refusal(400, f"{what} {error}.") from None
     # The request's own checks refuse unknown columns, by their first values.
     return {
-        **{name: cells[0] for name, cells in found.unknown.items()},
-        **{name: _cells(kind, name, column) for name, column in found.fields.items()},
-    }, Told(found.labels, found.notes)
+        **{name: cells[0] for name, cells in parsed.unknown.items()},
+        **{name: _cells(kind, name, column) for name, column in parsed.fields.items()},
+    }, UploadedNames(parsed.labels, parsed.notes)
 
 
 def _cells(kind: type[ColumnsRequest], name: str, column: CsvColumn | RealPart) -> Any:

@@ -30,16 +30,16 @@ Sheet = Annotated[
     Query(min_length=1, max_length=200, description="Of a workbook with several sheets: which of them, by its name."),
 ]
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
-# Beside JSON, what an answer in columns may be, for OpenAPI.
+# Formats of an answer in columns besides JSON, for OpenAPI.
 OTHER_ANSWERS: dict[str, Any] = {CSV: {}, NPZ: _BINARY}
 
 NOTES = "Underskin-Notes"
 _MOST_NOTES, _LONGEST_NOTE = 10, 120
-_NOTES_SAID = (
+_NOTES_DESCRIPTION = (
     "Of a CSV or workbook, what was read otherwise than its headings say, such as a diameter that was halved, and what "
     "was left out: a JSON list of sentences. Without it, nothing was."
 )
-_HEADERS = {NOTES: {"description": _NOTES_SAID, "schema": {"type": "string"}}}
+_HEADERS = {NOTES: {"description": _NOTES_DESCRIPTION, "schema": {"type": "string"}}}
 
 # A body up to this size is answered on the event loop (a few ms at most); a larger one in a thread, a few at a time.
 _INLINE_BYTES = 1024
@@ -68,14 +68,14 @@ def add_columns_route(
         most_bytes = request.app.state.access.max_body_bytes
 
         def work() -> Response:
-            with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-                asked, told = parse(kind, body, content_type, most_bytes, sheet)
-                found = answer(table, store, asked)
-                if preferred(accept) == CSV:  # the rows go back to where they came from, with what they are called
-                    found = replace(found, names={**told.labels, **found.names})
-                answered = respond(found, accept)
-                if told.notes:
-                    answered.headers[NOTES] = json.dumps(_few(told.notes))
+            with np.errstate(all="ignore"):  # an overflow is answered as out of the domain
+                sent, names_sent = parse(kind, body, content_type, most_bytes, sheet)
+                columns = answer(table, store, sent)
+                if preferred(accept) == CSV:  # CSV rows are returned to their source, with their labels
+                    columns = replace(columns, names={**names_sent.labels, **columns.names})
+                answered = respond(columns, accept)
+                if names_sent.notes:
+                    answered.headers[NOTES] = json.dumps(_few(names_sent.notes))
                 return answered
 
         if is_workbook(content_type):
@@ -109,7 +109,7 @@ async def answer_json(request: Request, answer: Callable[[Any], Response]) -> Re
     body = await request.body()
 
     def work() -> Response:
-        with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
+        with np.errstate(all="ignore"):  # an overflow is answered as out of the domain
             return answer(json_document(body, request.headers.get("content-type", "")))
 
     return await heavy_answers.in_turn(work)

@@ -37,8 +37,8 @@ async def post(request: Request, table: Table) -> Response:
     """
 
     def answer(document: Any) -> Response:
-        asked = validated(DesignRequest, document)
-        answer = design_answer(table, asked, design_of(table, asked))
+        demand = validated(DesignRequest, document)
+        answer = design_answer(table, demand, design_of(table, demand))
         return Response(answer.model_dump_json(), media_type="application/json")
 
     return await answer_json(request, answer)

@@ -118,7 +118,7 @@ def listed(
     filters = diagnoses.DiagnosisFilters(campaign, skin, state, kind)
     with store.reading() as connection:
         rows = diagnoses.listed(connection, filters, number_of_cursor(cursor), limit + 1)
-        page = [models.DiagnosisEntry(**entry) for entry in usecase.entries(connection, rows[:limit])]
+        page = [models.DiagnosisEntry(**fields) for fields in usecase.entries(connection, rows[:limit])]
     return models.DiagnosisList(diagnoses=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 

@@ -62,6 +62,6 @@ async def import_skin(request: Request, store: Store) -> Imported:
         _, uploads = await folder.threads.run(partial(split, parts))
         if len(uploads) != 1:
             raise Refusal(422, f"One file is imported at a time, not {len(uploads)}.")
-        async with skin_imports.one:
+        async with skin_imports.one_at_a_time:
             store.require_hope()
             return await run_in_threadpool(skin_imports.bring_in, store, uploads[0])

@@ -24,10 +24,10 @@ EXAMPLE = {
 @router.get(
     "/field", operation_id="field", summary="The stress under a sphere", responses={200: {"model": FieldAnswer}}
 )
-def field(asked: Annotated[FieldQuery, Query()], table: Table) -> Response:
+def field(query: Annotated[FieldQuery, Query()], table: Table) -> Response:
     """σ_zz in a section through the layer under a sphere; its last row is the base, where the sensors are.
 
     The surface bears the pressure of the contact: Hertz', or the layer's own. The base is that of the table; between
     them the stress is exact for small strain. `section_error` bounds what finite strain may change under Hertz'.
     """
-    return Response(field_answer(table, asked).model_dump_json(), media_type="application/json")
+    return Response(field_answer(table, query).model_dump_json(), media_type="application/json")

@@ -79,13 +79,11 @@ async def keep(request: Request, store: Store) -> MechanismEntry:
     body = await request.body()
     if len(body) > LARGEST_BYTES:
         raise Refusal(413, f"A mechanism may have up to {LARGEST_BYTES} bytes.")
-    found = _found(request.headers.get("content-type", _YAML[0]), body)
+    law = _law_of_diagnosis(request.headers.get("content-type", _YAML[0]), body)
     try:
-        if found is None:
+        if law is None:
             return await run_in_threadpool(usecase.keep, body)
-        return await run_in_threadpool(
-            store.read, usecase.keep_found, found.diagnosis_id, found.name, found.description
-        )
+        return await run_in_threadpool(store.read, usecase.keep_found, law.diagnosis_id, law.name, law.description)
     except FileError as error:
         raise error.of_field("mechanism", None) from None
 
@@ -104,7 +102,7 @@ def discard(
     return store.read(usecase.discard, name)
 
 
-def _found(content_type: str, body: bytes) -> KeepFound | None:
+def _law_of_diagnosis(content_type: str, body: bytes) -> KeepFound | None:
     """The diagnosis whose law is to be kept; None where the body is a document of its own."""
     kind = content_type.partition(";")[0].strip().lower()
     if kind in _YAML:
@@ -116,5 +114,5 @@ def _found(content_type: str, body: bytes) -> KeepFound | None:
     except orjson.JSONDecodeError as error:
         raise Refusal(400, f"The body is not JSON: {error.msg}.") from None
     require_unique_keys(body)
-    own = isinstance(document, dict) and "schema" not in document
-    return validated(KeepFound, document) if own else None
+    is_request = isinstance(document, dict) and "schema" not in document
+    return validated(KeepFound, document) if is_request else None

@@ -28,7 +28,7 @@ NPZ = "application/x-npz"
 _MOST_HEADER = 1000  # characters; np.savez writes some hundred
 _MOST_MEMBERS = 64
 _DIRECTORY_END = 22  # bytes of a zip archive's last record
-_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what np.savez and np.savez_compressed write
+_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # the methods of np.savez and np.savez_compressed
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
@@ -49,8 +49,10 @@ def fields_of_npz(kind: type[ColumnsRequest], body: bytes, most_bytes: int) -> d
     expanded = sum(member.file_size for member in members)
     if expanded > most_bytes:
         limit = f"{most_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
-        said = f"The arrays of the body take {expanded / 1e6:.4g} MB, which exceeds {limit}; send fewer rows a request."
-        raise Refusal(413, said, title="Body too large")
+        message = (
+            f"The arrays of the body take {expanded / 1e6:.4g} MB, which exceeds {limit}; send fewer rows a request."
+        )
+        raise Refusal(413, message, title="Body too large")
     fields: dict[str, Any] = {}
     for member in members:
         name = member.filename.removesuffix(".npy")
@@ -94,19 +96,19 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> Arra
 
 def _value(kind: type[ColumnsRequest], name: str, array: Array) -> Any:
     """The array itself for a column; single values and lists as JSON has them."""
-    found = f"{array.dtype.name} {array.shape}"
+    array_type = f"{array.dtype.name} {array.shape}"
     if name in kind.constants:
         if array.ndim or array.dtype.kind not in "Ub":
-            raise wrong_type(name, found, "must be a single text or boolean, of shape ()")
+            raise wrong_type(name, array_type, "must be a single text or boolean, of shape ()")
         return _text(name, array) if array.dtype.kind == "U" else array.item()
     if array.dtype.kind not in "fiu":
-        raise wrong_type(name, found, "must be an array of floats or integers")
+        raise wrong_type(name, array_type, "must be an array of floats or integers")
     if name in kind.lists:
         return array.astype(float).tolist()
     if array.ndim > 1:
-        raise wrong_type(name, found, "must be a column, of shape (rows,), or a single number, of shape ()")
+        raise wrong_type(name, array_type, "must be a column, of shape (rows,), or a single number, of shape ()")
     if not array.size:
-        raise too_few(name, found, "must not be empty")
+        raise too_few(name, array_type, "must not be empty")
     return array.astype(float, copy=False) if array.ndim else float(array)
 
 

@@ -13,17 +13,17 @@ async def known_query(request: Request) -> None:
     """For every route under /v1: raises Refusal (422) that names each parameter that is unknown or repeated."""
     if not request.scope["query_string"]:
         return
-    known = query_parameters(request.app, request.scope["route"].path, request.method)
-    errors = list(_errors(request.query_params.multi_items(), known))
+    names = query_parameters(request.app, request.scope["route"].path, request.method)
+    errors = list(_errors(request.query_params.multi_items(), names))
     if errors:
         raise invalid_input(errors)
 
 
-def _errors(given: Iterable[tuple[str, str]], known: Collection[str]) -> Iterator[InvalidInput]:
+def _errors(given: Iterable[tuple[str, str]], names: Collection[str]) -> Iterator[InvalidInput]:
     seen: set[str] = set()
     for name, value in given:
-        if name not in known:
-            yield unknown_name(name, value, known, "query parameter")
+        if name not in names:
+            yield unknown_name(name, value, names, "query parameter")
         elif name in seen:
             yield not_unique(name, value)
         seen.add(name)

@@ -39,7 +39,7 @@ async def stress(request: Request, accept: Accept = "application/json") -> Respo
     """Linear superposition over all loads: off-centre, several, sheared, ν < 0.5, a yielding glue line."""
 
     def answer(document: Any) -> Response:
-        asked = read_request(document)
-        return respond(usecase.stress(influence_table(request.app.state.settings.tables), asked), accept)
+        stress_request = read_request(document)
+        return respond(usecase.stress(influence_table(request.app.state.settings.tables), stress_request), accept)
 
     return await answer_json(request, answer)

@@ -9,7 +9,7 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.types import Receive, Scope, Send
 
-from service.ingest.uploads import UploadFolder, disk_errors_said
+from service.ingest.uploads import UploadFolder, disk_errors_refused
 from service.middleware.asgi_middleware import WITHOUT_CONTENT
 
 
@@ -21,10 +21,10 @@ class MadeFile(FileResponse):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """The answer."""
-        whole = [(name, value) for name, value in scope["headers"] if name != b"range"]
+        headers = [(name, value) for name, value in scope["headers"] if name != b"range"]
         self.headers["Accept-Ranges"] = "none"
         try:
-            await super().__call__({**scope, "headers": whole}, receive, send)
+            await super().__call__({**scope, "headers": headers}, receive, send)
         finally:
             with anyio.CancelScope(shield=True):
                 await anyio.to_thread.run_sync(Path(self.path).unlink)
@@ -38,10 +38,10 @@ def made_file(request: Request, name: str, media_type: str, write: Callable[[Pat
     if WITHOUT_CONTENT in request.scope:
         headers = FileResponse("", media_type=media_type, filename=name).headers
         answer = Response(headers=headers)
-        del answer.headers["Content-Length"]  # as long as nothing is written, nobody knows it
+        del answer.headers["Content-Length"]  # unknown as long as nothing is written
         return answer
     folder: UploadFolder = request.app.state.uploads
-    with disk_errors_said(folder):
+    with disk_errors_refused(folder):
         with tempfile.NamedTemporaryFile(dir=folder.path, delete=False) as file:
             path = Path(file.name)
         try:

@@ -113,13 +113,13 @@ def _slopes(table: SigmaTable, request: models.Derivative) -> Floats:
 
 def _finite_product(slopes: Floats, factors: Floats) -> Floats:
     """Component by component; a slope that is infinite, ∂σ/∂L at L = 0, is refused unless it is not asked for."""
-    asked = factors != 0
+    is_needed = factors != 0
     _require(
-        bool(np.isfinite(slopes[asked]).all()),
+        bool(np.isfinite(slopes[is_needed]).all()),
         "the derivative in load_parameter is infinite at 0, where sigma grows with its cube root; use a value above 0",
     )
     with np.errstate(over="ignore"):
-        product = np.multiply(slopes, factors, where=asked, out=np.zeros_like(slopes))
+        product = np.multiply(slopes, factors, where=is_needed, out=np.zeros_like(slopes))
     _require(bool(np.isfinite(product.sum())), "the product is too large for a double")
     return product
 

@@ -173,17 +173,17 @@ def _object(model: type, words: str, kind: str | None = None) -> Schema:
     properties: dict[str, Schema] = {}
     required = []
     for name, (_, default) in field.checks_of(model).items():
-        known = _field(model, name)
+        schema_of_field = _field(model, name)
         if name == "kind":
             allowed = ["frf", None] if kind == "frf" else [kind]
-            known = {"enum": allowed, "description": known["description"]}
+            schema_of_field = {"enum": allowed, "description": schema_of_field["description"]}
         elif default is not MISSING:
-            known = {"anyOf": [{key: value for key, value in known.items() if key != "description"}, _NULL]} | {
-                "description": known["description"]
-            }
+            schema_of_field = {
+                "anyOf": [{key: value for key, value in schema_of_field.items() if key != "description"}, _NULL]
+            } | {"description": schema_of_field["description"]}
         if default is MISSING or (name == "kind" and kind != "frf"):
             required.append(name)
-        properties[name] = known
+        properties[name] = schema_of_field
     return {
         "type": "object",
         "description": words,

@@ -162,7 +162,9 @@ class Columns:
                 columns[name] = values
             elif self.line_hz is not None:
                 frequencies = self.line_hz.tolist()
-                columns |= {f"{name}[{one!r} Hz]": line for one, line in zip(frequencies, values.T, strict=True)}
+                columns |= {
+                    f"{name}[{frequency!r} Hz]": line for frequency, line in zip(frequencies, values.T, strict=True)
+                }
         return to_csv({**columns, **told(self.inside, self.limits, self.rows)}, "\r\n").encode()
 
     def npz(self) -> bytes:

@@ -1,4 +1,4 @@
-"""What the service keeps: skins, rigs, campaigns, recordings, and the d33 derived from them (docs/store.md)."""
+"""The service's store: skins, rigs, campaigns, recordings, and the d33 derived from them (docs/store.md)."""
 
 from pathlib import Path
 

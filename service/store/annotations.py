@@ -1,6 +1,5 @@
-"""What a lab writes to a skin or a campaign afterwards: its name, a remark, tags. And skins that hold nothing in use
-and campaigns that nothing builds on, put away: they are in no list, and everything of them can still be read.
-"""
+"""Annotations of skins and campaigns: name, remark, tags. Also discarding: skins without campaigns in use and campaigns
+on which nothing builds are hidden from lists but remain readable."""
 
 from collections.abc import Mapping
 
@@ -20,7 +19,7 @@ OF_SKIN = ("title", "remark", "tags")
 def of_campaign(
     connection: Connection, campaign_id: str, values: Mapping[str, str | None], made_from: str | None
 ) -> None:
-    """Change some of `OF_CAMPAIGN`; nothing is recorded where nothing differs. Raises Missing."""
+    """Change some of `OF_CAMPAIGN`; nothing is recorded if nothing differs. Raises Missing."""
     row = kept_campaigns.find(connection, campaign_id, lock=True)
     after = {name: value for name, value in values.items() if getattr(row, name) != value}
     if after:
@@ -32,7 +31,7 @@ def of_campaign(
 
 
 def of_skin(connection: Connection, root: str, values: Mapping[str, str | None], made_from: str | None) -> None:
-    """Change some of `OF_SKIN`; nothing is recorded where nothing differs. Raises Missing."""
+    """Change some of `OF_SKIN`; nothing is recorded if nothing differs. Raises Missing."""
     row = skins.lock(connection, [root]).get(root)
     if row is None:
         raise Missing(f"There is no skin {root!r}.")
@@ -44,7 +43,7 @@ def of_skin(connection: Connection, root: str, values: Mapping[str, str | None],
 
 
 def discard_campaign(connection: Connection, campaign_id: str, reason: str, made_from: str | None) -> None:
-    """Put a campaign away, withdrawn; raises Missing, or Conflict where something builds on it."""
+    """Discard and withdraw a campaign; raises Missing, or Conflict if something builds on it."""
     row = kept_campaigns.find(connection, campaign_id, lock=True)
     builds_on = _builds_on(connection, row)
     if builds_on is not None:
@@ -68,24 +67,24 @@ def discard_campaign(connection: Connection, campaign_id: str, reason: str, made
 
 
 def may_be_discarded(connection: Connection, row: AnyRow) -> bool:
-    """Whether nothing builds on a campaign, and it was not put away."""
+    """Whether nothing builds on a campaign and it is not discarded."""
     return _builds_on(connection, row) is None
 
 
 def _builds_on(connection: Connection, row: AnyRow) -> str | None:
-    """Why a campaign is no mere trial; None where it is."""
+    """Why a campaign cannot be discarded; None if it can."""
     if row.discarded_at is not None:
         return "was discarded already"
     if row.corrects is not None or row.corrected_by is not None:
         return "is part of a correction: withdraw it"
-    alone = select(diagnoses.c.number).where(diagnoses.c.campaign == row.number)
+    of_single = select(diagnoses.c.number).where(diagnoses.c.campaign == row.number)
     together = select(diagnosed_campaigns.c.diagnosis).where(diagnosed_campaigns.c.campaign == row.number)
-    diagnosed = any(connection.execute(query.limit(1)).first() is not None for query in (alone, together))
+    diagnosed = any(connection.execute(query.limit(1)).first() is not None for query in (of_single, together))
     return "was diagnosed: withdraw it" if diagnosed else None
 
 
 def discard(connection: Connection, root: str, reason: str, made_from: str | None) -> None:
-    """Put a skin away; raises Conflict where a campaign of it is in use, or it was put away already."""
+    """Discard a skin; raises Conflict if a campaign of it is in use, or if it is discarded already."""
     row = skins.lock(connection, [root])[root]
     if row.discarded_at is not None:
         raise Conflict(f"Skin {root!r} was discarded already.")
@@ -99,7 +98,7 @@ def discard(connection: Connection, root: str, reason: str, made_from: str | Non
 
 
 def in_use(connection: Connection, root: str) -> int:
-    """How many campaigns of a skin figures use."""
+    """Number of campaigns of a skin that figures use."""
     query = select(func.count()).select_from(campaigns)
     query = query.where(campaigns.c.skin_id.in_(skins.members(root)), kept_campaigns.CURRENT)
     return int(connection.execute(query).scalar_one())

@@ -1,4 +1,4 @@
-"""What was answered to requests with an Idempotency-Key, kept in the transaction that kept what they brought."""
+"""Answers to requests with an Idempotency-Key, stored in the transaction of the request itself."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -14,7 +14,7 @@ from service.store.times import now
 
 @dataclass(frozen=True)
 class KnownRequest:
-    """A request that may come again: who sent it, under which key, and the digest of what it carried."""
+    """A repeatable request: its sender, its key, and the digest of its content."""
 
     sender: str
     idempotency_key: str
@@ -22,11 +22,11 @@ class KnownRequest:
 
 
 class OtherRequest(ValueError):
-    """The key was used for a request that carried something else."""
+    """The key was used for a request with other content."""
 
 
 def replayed(connection: Connection, request: KnownRequest) -> Any | None:
-    """The answer given before; None where there is none. Raises OtherRequest."""
+    """The earlier answer; None if there is none. Raises OtherRequest."""
     row = connection.execute(select(answers.c.request_sha256, answers.c.answer).where(_is(request))).first()
     if row is None:
         return None
@@ -38,10 +38,8 @@ def replayed(connection: Connection, request: KnownRequest) -> Any | None:
 def once(
     connection: Connection, request: KnownRequest | None, act: Callable[[Connection], dict[str, Any]]
 ) -> tuple[dict[str, Any], bool]:
-    """What `act` answers in this transaction, or what it answered to the same request before; True: it was before.
-
-    A second request with the same key waits for the first one's transaction. Raises OtherRequest.
-    """
+    """The answer of `act` in this transaction, or the earlier answer to the same request, and whether it is the earlier
+    one. A second request with the same key waits for the first one's transaction. Raises OtherRequest."""
     if request is None:
         return act(connection), False
     claimed = upsert(connection, answers).on_conflict_do_nothing().returning(answers.c.idempotency_key)

@@ -1,9 +1,8 @@
 """Backup and restore of the whole store in one file, while servers run.
 
-SQLite: a copy by its online backup, an ordinary database file. PostgreSQL: pg_dump's custom format. Either is read back
-whole before it counts: by SQLite's integrity_check, by pg_restore into nothing.
-
-Progress is told as what is done, in how many bytes, of how many; None where that is not known.
+SQLite: a copy by its online backup, an ordinary database file. PostgreSQL: pg_dump's custom format. Each backup is read
+back completely before it is accepted: by SQLite's integrity_check, by pg_restore into nothing. Progress callbacks get
+the step, the bytes done and the total; None if unknown.
 """
 
 import os
@@ -25,30 +24,30 @@ STEP_PAGES = 1000  # of an SQLite database, copied between two words of progress
 
 
 def untold(_what: str, _done: int, _of: int | None) -> None:
-    """Progress that nobody looks at."""
+    """A progress callback that does nothing."""
 
 
-def place(database: Database, folder: Path, occasion: str) -> Path:
-    """Where in the data folder a backup is written that nobody asked for; a name apart within a second, too."""
+def path_for(database: Database, folder: Path, occasion: str) -> Path:
+    """The path of an automatic backup in the data folder; unique within a second too."""
     suffix = ".sqlite3" if database.is_sqlite else ".pgdump"
     return folder / "backups" / f"{occasion}-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{suffix}"
 
 
 def remove_parts(folder: Path, occasion: str) -> None:
-    """Remove what was left of backups for an occasion by processes that were killed; nobody may be writing one."""
+    """Remove partial backups of killed processes; no backup may be in progress."""
     for part in (folder / "backups").glob(f"{occasion}-*.part*"):
         part.unlink()
 
 
 def make(database: Database, file: Path, progress: Progress = untold) -> None:
-    """Write a verified backup; what bears that name is replaced only by a whole one. Raises StoreError, OSError."""
+    """Write a verified backup; an existing file is replaced only by a complete one. Raises StoreError, OSError."""
     durable.make_folder(file.parent)
     part = file.with_name(file.name + ".part")
     _remove(part)
     try:
         if database.is_sqlite:
             _copy_sqlite(_sqlite_file(database), part, _BACKING_UP, progress)
-            _make_one_file(part)
+            _as_single_file(part)
         else:
             pg_dumps.dump(database, part, partial(progress, _BACKING_UP))
         progress(_READING_BACK, 0, None)
@@ -62,13 +61,13 @@ def make(database: Database, file: Path, progress: Progress = untold) -> None:
 
 
 def _remove(part: Path) -> None:
-    """A backup that is not whole, with SQLite's own files beside it: a journal of another one would spoil the next."""
+    """Remove a partial backup with SQLite's journal files, which would spoil the next one."""
     for suffix in ("", "-journal", "-wal", "-shm"):
         part.with_name(part.name + suffix).unlink(missing_ok=True)
 
 
 def verify(database: Database, file: Path) -> str:
-    """The version of a backup's schema, after reading all of it; raises StoreError where it is none, or damaged."""
+    """The schema version of a backup, after reading all of it; raises StoreError if it is damaged or not a backup."""
     if not file.is_file():
         raise StoreError(f"{file} is not a file")
     if database.is_sqlite:
@@ -92,15 +91,15 @@ def verify(database: Database, file: Path) -> str:
 
 
 def replace_with(database: Database, file: Path, progress: Progress = untold) -> None:
-    """Put a backup in place of the store in one transaction; running servers see it from their next request on."""
+    """Replace the store by a backup in one transaction; running servers see it from their next request on."""
     verify(database, file)
     if database.is_sqlite:
         target = _sqlite_file(database)
         with closing(sqlite3.connect(target, timeout=60)) as store:
-            own = identity.number_in(store)
+            number_before = identity.number_in(store)
             _copy_sqlite(file, target, _RESTORING, progress)
-            if own and not identity.number_in(store):  # a backup of before stores had one
-                identity.put(store, own)
+            if number_before and not identity.number_in(store):  # a backup of before stores had one
+                identity.put(store, number_before)
     else:
         pg_dumps.replace(database, file, partial(progress, _RESTORING))
 
@@ -110,20 +109,20 @@ def _copy_sqlite(source: Path, target: Path, what: str, progress: Progress) -> N
         with closing(_open_sqlite(source)) as origin, closing(sqlite3.connect(target, timeout=60)) as copy:
             page_bytes = origin.execute("PRAGMA page_size").fetchone()[0]
 
-            def told(_status: int, remaining: int, pages: int) -> None:
+            def on_step(_status: int, remaining: int, pages: int) -> None:
                 progress(what, (pages - remaining) * page_bytes, pages * page_bytes)
 
             # A transaction of the source holds one state of it: its writers do not disturb a copy in steps, which
             # would begin anew with each of their commits. The target is replaced in one transaction of its own.
             origin.execute("BEGIN")
             origin.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            origin.backup(copy, pages=STEP_PAGES, progress=told)
+            origin.backup(copy, pages=STEP_PAGES, progress=on_step)
     except sqlite3.Error as error:
         raise StoreError(f"{source} cannot be copied to {target}: {error}") from error
 
 
-def _make_one_file(copy: Path) -> None:
-    """Without a write-ahead log, so that it can be read where nothing can be written beside it."""
+def _as_single_file(copy: Path) -> None:
+    """Without a write-ahead log, so that it can be read from a read-only place."""
     with closing(sqlite3.connect(copy)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")
 

@@ -1,4 +1,4 @@
-"""Campaigns and their recordings: kept, listed, read back, withdrawn, corrected; recordings excluded."""
+"""Campaigns and their recordings: stored, listed, loaded, withdrawn, corrected; recordings excluded."""
 
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,7 +31,7 @@ _IN_STATE = {
 
 @dataclass(frozen=True)
 class NewCampaign:
-    """A campaign as it came: what was refused, what its reader remarked, where it came from, who corrects with it."""
+    """A new campaign: its rejected recordings, the reader's notes, its source, and the sender of a correction."""
 
     campaign: Campaign
     skin_id: str | None
@@ -44,7 +44,7 @@ class NewCampaign:
 
 @dataclass(frozen=True)
 class CampaignFilters:
-    """Which campaigns a list shows; None does not filter. Times in the store's form."""
+    """Filters of a list of campaigns; None does not filter. Times in the store's form."""
 
     skin: str | None = None
     state: State | None = None
@@ -55,7 +55,7 @@ class CampaignFilters:
 
 @dataclass(frozen=True)
 class Excluded:
-    """A recording that figures leave out, and why."""
+    """An excluded recording and the reason."""
 
     recording: str
     reason: str
@@ -65,8 +65,8 @@ class Excluded:
 def add(
     connection: Connection, arrival: NewCampaign, *, corrects: str | None = None, reason: str | None = None
 ) -> tuple[str, str]:
-    """Keep a campaign; its id and its skin's. A correction takes the place of the other, on its skin unless
-    `arrival.skin_id` names another, whatever the campaign says of itself."""
+    """Store a campaign; returns its id and its skin's. A correction replaces the other campaign, on its skin unless
+    `arrival.skin_id` names another, whatever the campaign itself says."""
     replaced = None if corrects is None else _changeable(connection, corrects)
     campaign = arrival.campaign
     named = arrival.skin_id or (replaced.skin_id if replaced else campaign.skin.id)
@@ -101,7 +101,7 @@ def keep(
     held: Sequence[Recording],
     exclusions: Sequence[Mapping[str, str | None]],
 ) -> None:
-    """Keep a campaign by its row with its recordings in their order; `exclusions`: when and why each was excluded."""
+    """Store a campaign by its row with its recordings in order; `exclusions`: when and why each was excluded."""
     number = connection.execute(insert(campaigns).returning(campaigns.c.number), row).scalar_one()
     rows = [
         {"campaign": number, "position": position, **codec.recording_columns(recording), **exclusion}
@@ -112,7 +112,7 @@ def keep(
 
 
 def keep_digests(connection: Connection, number: int, held: Sequence[Recording]) -> None:
-    """Keep those of the recordings of the campaign `number`, beside them; not all have one."""
+    """Store the digests of the recordings of the campaign `number`; not all have one."""
     rows = [
         {"campaign": number, "position": position, "digest": made}
         for position, recording in enumerate(held)
@@ -123,7 +123,7 @@ def keep_digests(connection: Connection, number: int, held: Sequence[Recording])
 
 
 def find(connection: Connection, campaign_id: str, *, lock: bool = False) -> AnyRow:
-    """The row of a campaign, where asked locked until the transaction ends; raises Missing."""
+    """The row of a campaign, optionally locked until the transaction ends; raises Missing."""
     query = select(campaigns).where(campaigns.c.id == campaign_id)
     row = connection.execute(query.with_for_update() if lock else query).first()
     if row is None:
@@ -177,9 +177,9 @@ def latest(connection: Connection, skin_id: str) -> AnyRow | None:
 
 
 def describing(connection: Connection, skin_id: str, *, alone: bool = False) -> AnyRow | None:
-    """The row of a skin's current campaign that describes it: the latest with FRFs, which need geometry and sensors;
-    else the latest with indentations, of which the thickness may be known; else the latest. None where none is
-    current. `alone`: of campaigns sent for this very id, none of those joined with it."""
+    """The row of the current campaign that describes a skin: the latest with FRFs, which need geometry and sensors;
+    else the latest with indentations, whose thickness may be known; else the latest. None without a current campaign.
+    `alone`: only campaigns sent for this id, not for skins joined with it."""
     of_skin = campaigns.c.skin_id == skin_id if alone else _counting_as(skin_id)
     rank = case((_has("frf"), 0), (_has("indentation"), 1), else_=2)
     query = select(campaigns).where(of_skin, CURRENT).order_by(rank, TIME.desc(), campaigns.c.number.desc())
@@ -191,8 +191,8 @@ def _counting_as(skin_id: str) -> ColumnElement[bool]:
 
 
 def _has(kind: str) -> ColumnElement[bool]:
-    own = (recordings.c.campaign == campaigns.c.number) & (recordings.c.kind == kind)
-    return exists(select(recordings.c.kind).where(own).correlate(campaigns))
+    recordings_of_kind = (recordings.c.campaign == campaigns.c.number) & (recordings.c.kind == kind)
+    return exists(select(recordings.c.kind).where(recordings_of_kind).correlate(campaigns))
 
 
 def state(row: AnyRow) -> State:
@@ -203,7 +203,7 @@ def state(row: AnyRow) -> State:
 
 
 def unused(row: AnyRow) -> str | None:
-    """Why figures do not use it: withdrawn or corrected; None where it is current."""
+    """Why figures do not use it: withdrawn or corrected; None if it is current."""
     if row.withdrawn_at is not None:
         return f"withdrawn: {row.withdraw_reason}"
     return None if row.corrected_by is None else f"corrected by {row.corrected_by}"
@@ -216,14 +216,14 @@ def recordings_of(connection: Connection, number: int) -> Sequence[AnyRow]:
 
 
 def excluded_of(connection: Connection, number: int) -> list[Excluded]:
-    """The recordings of a campaign that figures leave out."""
+    """The excluded recordings of a campaign."""
     query = select(recordings.c.id, recordings.c.exclude_reason, recordings.c.excluded_at)
     query = query.where(recordings.c.campaign == number, recordings.c.excluded_at.is_not(None))
     return [Excluded(*row) for row in connection.execute(query.order_by(recordings.c.position))]
 
 
 def load(connection: Connection, row: AnyRow, *, with_excluded: bool = True) -> Campaign:
-    """The campaign as it came, arrays and all; without what was excluded where asked."""
+    """The complete campaign with arrays, optionally without excluded recordings."""
     query = select(recordings.c.kind, recordings.c.scalars, recordings.c.arrays)
     query = query.where(recordings.c.campaign == row.number).order_by(recordings.c.position)
     if not with_excluded:
@@ -232,9 +232,9 @@ def load(connection: Connection, row: AnyRow, *, with_excluded: bool = True) -> 
 
 
 def documents(store: Database, number: int) -> Iterator[dict[str, Any]]:
-    """The recordings of a campaign as campaign/1 has them, in order, a few in memory at a time.
+    """The recordings of a campaign in the form of campaign/1, in order, a few in memory at a time.
 
-    No connection is held between them: what is kept of a recording's document never changes.
+    No connection is held between them: a stored recording's document never changes.
     """
     query = select(recordings.c.kind, recordings.c.scalars, recordings.c.arrays)
     query = query.where(recordings.c.campaign == number).order_by(recordings.c.position).limit(_AT_A_TIME)
@@ -249,14 +249,14 @@ def documents(store: Database, number: int) -> Iterator[dict[str, Any]]:
 
 
 def withdraw(connection: Connection, campaign_id: str, reason: str, withdrawn_from: str | None) -> None:
-    """Take a campaign out of all figures; raises Missing, Conflict."""
+    """Remove a campaign from all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
     _change(connection, row.number, withdrawn_at=now(), withdraw_reason=reason, withdrawn_from=withdrawn_from)
     changes.record(connection, "withdraw", row.skin_id, withdrawn_from, campaign_id=campaign_id, reason=reason)
 
 
 def exclude(connection: Connection, campaign_id: str, recording_id: str, reason: str, made_from: str | None) -> None:
-    """Leave a recording out of all figures; raises Missing, Conflict."""
+    """Exclude a recording from all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
     this = (recordings.c.campaign == row.number) & (recordings.c.id == recording_id)
     recording = connection.execute(select(recordings.c.excluded_at, recordings.c.exclude_reason).where(this)).first()

@@ -1,6 +1,6 @@
-"""What was changed of skins and campaigns since they were kept: who, when, why, and what was there before.
+"""The record of changes to skins and campaigns: who, when, why, and the values before.
 
-Rows are added and never altered; what takes a change back is a change of its own, which names it.
+Rows are added and never altered; undoing a change is itself a change that names it.
 """
 
 import secrets
@@ -28,7 +28,7 @@ def record(
     after: Mapping[str, Any] | None = None,
     undoes: str | None = None,
 ) -> None:
-    """Keep one change of a skin, or of a campaign of it; `made_from`: name of the API key or, without one, as typed."""
+    """Record a change of a skin or of a campaign of it; `made_from`: name of the API key or, without one, as typed."""
     row = {
         "id": f"ch-{secrets.token_hex(8)}",
         "action": action,
@@ -54,20 +54,20 @@ def find(connection: Connection, change_id: str) -> AnyRow:
 
 
 def of_campaign(connection: Connection, campaign_id: str) -> Sequence[AnyRow]:
-    """Those of a campaign and its recordings, the latest first."""
+    """Changes of a campaign and its recordings, the latest first."""
     query = select(changes).where(changes.c.campaign_id == campaign_id)
     return connection.execute(query.order_by(changes.c.number.desc())).all()
 
 
 def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
-    """Those of a skin itself and of those joined to it, not of its campaigns, the latest first."""
-    own = select(skins.c.id).where(skins.c.root_id == root)
-    query = select(changes).where(changes.c.skin_id.in_(own), changes.c.campaign_id.is_(None))
+    """Changes of a skin itself and of those joined to it, without those of its campaigns, the latest first."""
+    skin_ids = select(skins.c.id).where(skins.c.root_id == root)
+    query = select(changes).where(changes.c.skin_id.in_(skin_ids), changes.c.campaign_id.is_(None))
     return connection.execute(query.order_by(changes.c.number.desc())).all()
 
 
 def order_of_exclusions(connection: Connection, campaign_id: str) -> dict[str, int]:
-    """The number of the change that excluded each recording of a campaign last, by the recording's id."""
+    """The number of the latest exclusion of each recording of a campaign, by the recording's id."""
     excluding = (changes.c.campaign_id == campaign_id) & (changes.c.action == "exclude")
     query = select(changes.c.recording, func.max(changes.c.number).label("number")).where(excluding)
     return {row.recording: row.number for row in connection.execute(query.group_by(changes.c.recording))}

@@ -1,8 +1,8 @@
-"""Between the campaign model and the store's rows, without loss.
+"""Conversion between the campaign model and the store's rows, without loss.
 
-The arrays of a recording are one blob, float64, byte-shuffled and deflated: length of the header (4 bytes, little
-endian), the header (JSON, [[name, count], ...]), then zlib of the shuffled bytes of all arrays one behind another.
-Shuffling puts the bytes of equal weight together, where neighbouring numbers resemble each other.
+The arrays of a recording are one blob of float64, byte-shuffled and deflated: length of the header (4 bytes, little
+endian), the header (JSON, [[name, count], ...]), then zlib of the shuffled bytes of all arrays in sequence. Shuffling
+groups bytes of equal significance, in which neighbouring numbers are similar.
 """
 
 import struct
@@ -66,7 +66,7 @@ def document_of(row: AnyRow) -> dict[str, Any]:
 
 
 def recorded_at(recording: Recording) -> str | None:
-    """When it was recorded, in the store's form; None where the recording does not say, or not usably."""
+    """When it was recorded, in the store's form; None if the recording has no valid time."""
     try:
         return None if recording.recorded_at is None else stored(recording.recorded_at)
     except ValueError:
@@ -74,7 +74,7 @@ def recorded_at(recording: Recording) -> str | None:
 
 
 def earliest(campaign: Campaign) -> str | None:
-    """When the first of its recordings that say so was made, in the store's form."""
+    """The earliest time of its recordings, in the store's form; None if none has a time."""
     return min((time for recording in campaign.recordings if (time := recorded_at(recording))), default=None)
 
 
@@ -97,7 +97,7 @@ def pack(arrays: Mapping[str, Floats]) -> bytes:
 
 
 def unpack(blob: bytes) -> dict[str, Floats]:
-    """What `pack` was given."""
+    """The arrays given to `pack`."""
     (size,) = struct.unpack_from("<I", blob)
     header = orjson.loads(blob[4 : 4 + size])
     shuffled = np.frombuffer(zlib.decompress(blob[4 + size :]), np.uint8)

@@ -1,6 +1,5 @@
-"""What a diagnosis of several campaigns is of: the campaigns as they were when it was asked for, and the skins of which
-all were asked for.
-"""
+"""The campaigns of a diagnosis of several, as they were when it was requested, and the skins of which all campaigns
+were requested."""
 
 import hashlib
 from collections.abc import Sequence
@@ -20,7 +19,7 @@ from service.store.tables import skins as skin_rows
 
 @dataclass(frozen=True)
 class Member:
-    """A campaign of a diagnosis: its number and id, the skin that was asked for, how many recordings are left out."""
+    """A campaign of a diagnosis: its number and id, the requested skin, and how many recordings are excluded."""
 
     number: int
     campaign_id: str
@@ -31,7 +30,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Together:
-    """Campaigns to diagnose together; `all_of`: the skins of which they are all."""
+    """Campaigns to diagnose together; `all_of`: the skins of which all campaigns are meant."""
 
     kind: DiagnosisKind
     name: str
@@ -40,15 +39,15 @@ class Together:
 
     @property
     def sha256(self) -> str:
-        """The same for the same campaigns in the same state, asked for in the same way."""
-        members = [[one.skin_id, one.campaign_id, one.excluded] for one in self.members]
+        """Equal for the same campaigns in the same state, requested in the same way."""
+        members = [[diagnosed.skin_id, diagnosed.campaign_id, diagnosed.excluded] for diagnosed in self.members]
         content = orjson.dumps([self.kind, self.name, members, sorted(self.all_of)])
         return hashlib.sha256(content).hexdigest()
 
 
 def usable(connection: Connection, skin_id: str) -> list[Member]:
     """The current campaigns with recordings of a skin and of those joined to it, by arrival; locked until the
-    transaction ends, so that they stay so."""
+    transaction ends."""
     query = select(campaigns).where(_usable(skin_id)).order_by(campaigns.c.number).with_for_update()
     return [member(row, skin_id) for row in connection.execute(query)]
 
@@ -60,7 +59,7 @@ def count_usable(connection: Connection, skin_id: str) -> int:
 
 def have_frfs(connection: Connection, members: Sequence[Member]) -> bool:
     """Whether one of these campaigns has FRFs that are not excluded."""
-    of_these = recordings.c.campaign.in_([one.number for one in members])
+    of_these = recordings.c.campaign.in_([diagnosed.number for diagnosed in members])
     frfs = select(recordings.c.kind).where(of_these, recordings.c.kind == "frf", recordings.c.excluded_at.is_(None))
     return connection.execute(frfs.limit(1)).first() is not None
 
@@ -76,11 +75,11 @@ def member(row: AnyRow, skin_id: str) -> Member:
 
 
 def keep(connection: Connection, diagnosis: int, together: Together) -> None:
-    """Keep what the diagnosis of this number is of."""
+    """Store the members of the diagnosis with this number."""
     rows = [
-        {"diagnosis": diagnosis, "position": position, "campaign": one.number, "skin_id": one.skin_id,
-         "excluded": one.excluded}
-        for position, one in enumerate(together.members)
+        {"diagnosis": diagnosis, "position": position, "campaign": diagnosed.number, "skin_id": diagnosed.skin_id,
+         "excluded": diagnosed.excluded}
+        for position, diagnosed in enumerate(together.members)
     ]  # fmt: skip
     connection.execute(insert(diagnosed_campaigns), rows)
     if together.all_of:
@@ -90,19 +89,19 @@ def keep(connection: Connection, diagnosis: int, together: Together) -> None:
 
 
 def members_of(connection: Connection, numbers: Sequence[int]) -> dict[int, list[Member]]:
-    """The campaigns of those of these diagnoses that are of several, by the diagnosis' number."""
+    """The members of those of these diagnoses that are of several campaigns, by the diagnosis' number."""
     columns = (campaigns.c.number, campaigns.c.id, campaigns.c.name)
-    asked = (diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.skin_id, diagnosed_campaigns.c.excluded)
-    query = select(*columns, *asked).join(campaigns, campaigns.c.number == diagnosed_campaigns.c.campaign)
+    of_diagnosis = (diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.skin_id, diagnosed_campaigns.c.excluded)
+    query = select(*columns, *of_diagnosis).join(campaigns, campaigns.c.number == diagnosed_campaigns.c.campaign)
     query = query.where(diagnosed_campaigns.c.diagnosis.in_(numbers))
-    found: dict[int, list[Member]] = {}
+    members: dict[int, list[Member]] = {}
     for row in connection.execute(query.order_by(diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.position)):
-        found.setdefault(row.diagnosis, []).append(member(row, row.skin_id))
-    return found
+        members.setdefault(row.diagnosis, []).append(member(row, row.skin_id))
+    return members
 
 
 def all_of(connection: Connection, number: int) -> list[str]:
-    """The skins of which a diagnosis has all campaigns that there were."""
+    """The skins of which a diagnosis has all campaigns that existed."""
     query = select(diagnosed_skins.c.skin_id).where(diagnosed_skins.c.diagnosis == number)
     return list(connection.execute(query.order_by(diagnosed_skins.c.skin_id)).scalars())
 
@@ -120,10 +119,10 @@ def has_other_than(numbers: Select[Any]) -> ColumnElement[bool]:
 
 
 def changed() -> ScalarSelect[str]:
-    """What became of the first campaign that is no longer as a diagnosis of several has it; null where all are."""
-    own = diagnosed_campaigns.alias("own")
+    """What became of the first campaign that is no longer as a diagnosis of several used it; null if none changed."""
+    of_diagnosis = diagnosed_campaigns.alias("own")
     its = campaigns.alias("its")
-    differs = its.c.excluded != own.c.excluded
+    differs = its.c.excluded != of_diagnosis.c.excluded
     how = case(
         (its.c.withdrawn_at.is_not(None), "withdrawn: " + its.c.withdraw_reason),
         (its.c.corrected_by.is_not(None), "corrected by " + its.c.corrected_by),
@@ -131,10 +130,10 @@ def changed() -> ScalarSelect[str]:
     )
     return (
         select("campaign " + its.c.id + " was " + how)
-        .join(own, own.c.campaign == its.c.number)
-        .where(own.c.diagnosis == diagnoses.c.number)
+        .join(of_diagnosis, of_diagnosis.c.campaign == its.c.number)
+        .where(of_diagnosis.c.diagnosis == diagnoses.c.number)
         .where(its.c.withdrawn_at.is_not(None) | its.c.corrected_by.is_not(None) | differs)
-        .order_by(own.c.position)
+        .order_by(of_diagnosis.c.position)
         .limit(1)
         .correlate(diagnoses)
         .scalar_subquery()
@@ -142,16 +141,17 @@ def changed() -> ScalarSelect[str]:
 
 
 def added() -> ScalarSelect[str]:
-    """The first campaign in use that a diagnosis of all of them lacks: it came later; null where there is none."""
-    asked, its, new = skin_rows.alias("asked"), skin_rows.alias("counting"), campaigns.alias("new")
+    """The first campaign in use that a diagnosis of all campaigns lacks because it came later; null if there is
+    none."""
+    skin_diagnosed, its, new = skin_rows.alias("asked"), skin_rows.alias("counting"), campaigns.alias("new")
     has = diagnosed_campaigns.alias("has")
     there = exists().where(has.c.diagnosis == diagnoses.c.number, has.c.campaign == new.c.number)
     there = there.correlate(diagnoses, new)  # or a campaign would count as there that another diagnosis has
     return (
         select(func.min(new.c.id))
         .select_from(diagnosed_skins)
-        .join(asked, asked.c.id == diagnosed_skins.c.skin_id)
-        .join(its, its.c.root_id == asked.c.root_id)
+        .join(skin_diagnosed, skin_diagnosed.c.id == diagnosed_skins.c.skin_id)
+        .join(its, its.c.root_id == skin_diagnosed.c.root_id)
         .join(new, new.c.skin_id == its.c.id)
         .where(diagnosed_skins.c.diagnosis == diagnoses.c.number)
         .where(new.c.withdrawn_at.is_(None), new.c.corrected_by.is_(None), new.c.recordings > new.c.excluded, ~there)
@@ -161,7 +161,7 @@ def added() -> ScalarSelect[str]:
 
 
 def outdated(row: AnyRow) -> str | None:
-    """Why a diagnosis of several campaigns is not of them as they are now, by its row; None where it is."""
+    """Why a diagnosis of several campaigns, by its row, is outdated; None if it is up to date."""
     if row.member_changed is not None:
         return str(row.member_changed)
     return None if row.member_added is None else f"campaign {row.member_added} was added"

@@ -1,7 +1,7 @@
-"""Diagnoses: asked for, claimed by one server, kept alive while they run, ended once.
+"""Diagnoses in the store: requested, claimed by one server, kept alive while they run, ended once.
 
-A server that runs a diagnosis says every few seconds that it is alive. One that has not done so for HEARTBEAT_TIMEOUT_S
-is taken for dead, and the diagnosis is claimed again, by the same server after a restart or by another.
+A server that runs a diagnosis reports every few seconds that it is alive. After HEARTBEAT_TIMEOUT_S without a report it
+is considered dead, and the diagnosis is claimed again, by the same server after a restart or by another.
 """
 
 import json
@@ -26,7 +26,7 @@ from underskin.recordings.campaign import Campaign
 HEARTBEAT_TIMEOUT_S = 10.0
 _USABLE = ("queued", "running", "done")
 
-# All but the report and its figures, and what is said of its campaign: of several, of the latest of them.
+# All but the report and its figures, with columns of its campaign, of several the latest of them.
 _LISTED = (
     *[column for column in diagnoses.c if column.name not in ("report", "figures")],
     campaigns.c.id.label("campaign_id"),
@@ -42,7 +42,7 @@ _LISTED = (
 
 @dataclass(frozen=True)
 class DiagnosisFilters:
-    """Which diagnoses a list shows; None does not filter."""
+    """Filters of a list of diagnoses; None does not filter."""
 
     campaign: str | None = None
     skin: str | None = None
@@ -51,13 +51,14 @@ class DiagnosisFilters:
 
 
 def rows() -> Select[Any]:
-    """Diagnoses without their reports, each with what is said of its campaign."""
+    """Diagnoses without their reports, each with columns of its campaign."""
     return select(*_LISTED).join(campaigns, campaigns.c.number == diagnoses.c.campaign)
 
 
 @dataclass(frozen=True)
 class Basis:
-    """What a server diagnoses with: hash of the table of σ, version of underskin, hash of the lab's own mechanisms."""
+    """The versions that a server diagnoses with: hash of the table of σ, version of underskin, hash of the lab's own
+    mechanisms."""
 
     table_sha256: str
     version: str
@@ -67,10 +68,10 @@ class Basis:
 def ask(
     connection: Connection, campaign_id: str, basis: Basis, asked_from: str | None, without: Sequence[str] = ()
 ) -> AnyRow:
-    """The diagnosis of a campaign as it is now: the one there is, or a new one in the queue. It leaves out the
-    mechanisms `without` which it is to be explained.
+    """The diagnosis of a campaign in its present state: the existing one, or a new one in the queue, without the
+    mechanisms `without`.
 
-    Raises Missing, and Conflict where the campaign is not current. One that failed or was cancelled is asked anew.
+    Raises Missing, and Conflict if the campaign is not current. A failed or cancelled diagnosis is queued anew.
     """
     campaign = kept_campaigns.find(connection, campaign_id, lock=True)
     why = kept_campaigns.unused(campaign)
@@ -84,7 +85,7 @@ def ask(
 def ask_together(
     connection: Connection, together: Together, basis: Basis, asked_from: str | None, without: Sequence[str] = ()
 ) -> AnyRow:
-    """As `ask`, of several campaigns, whose rows are locked."""
+    """As `ask`, for several campaigns, whose rows are locked."""
     wanted = {
         "campaign": max(member.number for member in together.members),
         "excluded": sum(member.excluded for member in together.members),
@@ -107,21 +108,21 @@ def _basis(basis: Basis, without: Sequence[str]) -> dict[str, Any]:
 
 
 def _same(connection: Connection, wanted: Mapping[str, Any]) -> AnyRow | None:
-    """The first diagnosis of all this that neither failed nor was cancelled."""
+    """The first equal diagnosis that neither failed nor was cancelled."""
     same = [diagnoses.c[name] == value for name, value in wanted.items()]
     return connection.execute(rows().where(*same, diagnoses.c.state.in_(_USABLE)).order_by(diagnoses.c.number)).first()
 
 
 def _queued(connection: Connection, skin_ids: Collection[str], wanted: Mapping[str, Any]) -> AnyRow:
-    """A new one, of campaigns of these skins."""
+    """A new diagnosis, of campaigns of these skins."""
     diagnosis_id = f"d-{secrets.token_hex(8)}"
-    asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": moments.next_of(connection, skin_ids)}
-    connection.execute(insert(diagnoses), {**wanted, **asked})
+    values = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": moments.next_of(connection, skin_ids)}
+    connection.execute(insert(diagnoses), {**wanted, **values})
     return find(connection, diagnosis_id)
 
 
 def without(row: AnyRow) -> list[str]:
-    """The mechanisms that a diagnosis leaves out."""
+    """The mechanisms that a diagnosis does not use."""
     return list(json.loads(row.without))
 
 
@@ -134,7 +135,7 @@ def find(connection: Connection, diagnosis_id: str) -> AnyRow:
 
 
 def report_of(connection: Connection, number: int) -> dict[str, Any] | None:
-    """Its report/1, where it is done."""
+    """Its report/1 if it is done."""
     return reports_of(connection, [number]).get(number)
 
 
@@ -146,7 +147,7 @@ def reports_of(connection: Connection, numbers: Sequence[int]) -> dict[int, dict
 
 
 def figures_of(connection: Connection, number: int) -> dict[str, str]:
-    """JSON of the figures that were made with its report, by name; none where they were not kept."""
+    """JSON of the figures made with its report, by name; none if they were not stored."""
     blob = connection.execute(select(diagnoses.c.figures).where(diagnoses.c.number == number)).scalar()
     return {} if blob is None else dict(decompressed(blob))
 
@@ -173,7 +174,7 @@ def _with_one_of(these: ColumnElement[bool]) -> ColumnElement[bool]:
 
 
 def outdated(row: AnyRow) -> str | None:
-    """Why a diagnosis is not of its campaign, or of its campaigns, as they are now; None where it is."""
+    """Why a diagnosis no longer fits its campaigns; None if it is up to date."""
     if row.kind != "campaign":
         return diagnosed_together.outdated(row)
     changed = "changed: recordings were excluded since" if row.excluded != row.excluded_now else None
@@ -181,7 +182,7 @@ def outdated(row: AnyRow) -> str | None:
 
 
 def cancel(connection: Connection, diagnosis_id: str) -> None:
-    """End it before it is done; raises Missing, and Conflict where it is done or has failed."""
+    """End a diagnosis before it is done; raises Missing, and Conflict if it is done or has failed."""
     this = diagnoses.c.id == diagnosis_id
     state = connection.execute(select(diagnoses.c.state).where(this).with_for_update()).scalar()
     if state is None:
@@ -196,12 +197,12 @@ def cancel(connection: Connection, diagnosis_id: str) -> None:
 def claim(
     connection: Connection, server: str, basis: Basis, not_these: Collection[int] = (), *, smallest: bool = False
 ) -> AnyRow | None:
-    """Take the next diagnosis to run, or the one whose campaign has the fewest recordings: a queued one, or one whose
-    server is taken for dead; None where there is none. `not_these`, by their numbers: those that this server has under
-    way are not taken again, whatever others took them for meanwhile.
+    """Claim the next diagnosis, or the one whose campaign has the fewest recordings: a queued one, or one whose
+    server is considered dead; None if there is none. `not_these`: numbers of diagnoses that this server already
+    runs.
 
-    Servers that claim at once do not get the same one. It is run with what the server that has it now diagnoses with,
-    whatever that was when it was asked for.
+    Servers that claim at the same time get different diagnoses. A diagnosis runs with the versions of the server that
+    claimed it, whatever they were when it was requested.
     """
     moment = clock(connection)
     _set_back(connection, moment)
@@ -213,34 +214,33 @@ def claim(
     row = connection.execute(query.with_for_update(skip_locked=True)).first()
     if row is None:
         return None
-    taken = {"state": "running", "claimed_by": server, "alive_at": moment, "progress": 0.0, "started_at": now()}
-    connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**taken, **asdict(basis)))
+    values = {"state": "running", "claimed_by": server, "alive_at": moment, "progress": 0.0, "started_at": now()}
+    connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**values, **asdict(basis)))
     return find(connection, row.id)
 
 
 def _set_back(connection: Connection, moment: float) -> None:
-    """Where the clock was set back, have servers be alive as of now: one that runs says so again, one that was killed
-    is taken for dead in time."""
+    """After the clock was set back, count servers as alive now: a running one reports again, a dead one times out."""
     ahead = (diagnoses.c.state == "running") & (diagnoses.c.alive_at > moment)
     connection.execute(update(diagnoses).where(ahead).values(alive_at=moment))
 
 
 def keep_alive(connection: Connection, number: int, server: str, progress: float) -> bool:
-    """Say that it still runs here, and how far it is; False where it is no longer this server's."""
+    """Report that it still runs here, and its progress; False if it is no longer this server's."""
     return _mine(connection, number, server, progress=progress, alive_at=clock(connection))
 
 
 def finish(
     connection: Connection, number: int, server: str, report: dict[str, Any], figures: dict[str, str] | None = None
 ) -> bool:
-    """Keep the report, and JSON of its figures; False where it is no longer this server's."""
+    """Store the report and JSON of its figures; False if it is no longer this server's."""
     outcome = {"verdict": report["verdict"], "probability": report["probability"], "report": compressed(report)}
     drawn = None if figures is None else compressed(figures)
     return _end(connection, number, server, state="done", progress=1.0, figures=drawn, **outcome)
 
 
 def fail(connection: Connection, number: int, server: str, reason: str) -> bool:
-    """Keep why there is no report; False where it is no longer this server's."""
+    """Store why there is no report; False if it is no longer this server's."""
     return _end(connection, number, server, state="failed", reason=reason)
 
 
@@ -259,20 +259,24 @@ def members(connection: Connection, row: AnyRow) -> list[Member]:
 
 
 def campaign_of(connection: Connection, row: AnyRow) -> tuple[Campaign, list[Excluded]]:
-    """The campaign of a diagnosis of one, as `as_asked` has it."""
+    """The campaign of a diagnosis of one, as in `as_diagnosed`."""
     (only,) = members(connection, row)
-    return as_asked(connection, only)
+    return as_diagnosed(connection, only)
 
 
-def as_asked(connection: Connection, member: Member) -> tuple[Campaign, list[Excluded]]:
-    """A campaign as it was when its diagnosis was asked for, and what had been excluded from it by then."""
-    whole = kept_campaigns.load(connection, kept_campaigns.find(connection, member.campaign_id))
+def as_diagnosed(connection: Connection, member: Member) -> tuple[Campaign, list[Excluded]]:
+    """A campaign as it was when its diagnosis was requested, and the recordings excluded by then."""
+    campaign = kept_campaigns.load(connection, kept_campaigns.find(connection, member.campaign_id))
     excluded = kept_campaigns.excluded_of(connection, member.number)
     order = changes.order_of_exclusions(connection, member.campaign_id)
     # one without a change was made by an earlier underskin, before all others
-    excluded = sorted(excluded, key=lambda left: (order.get(left.recording, 0), left.at))[: member.excluded]
-    names = {left.recording for left in excluded}
-    return replace(whole, recordings=tuple(entry for entry in whole.recordings if entry.id not in names)), excluded
+    excluded = sorted(excluded, key=lambda exclusion: (order.get(exclusion.recording, 0), exclusion.at))[
+        : member.excluded
+    ]
+    names = {exclusion.recording for exclusion in excluded}
+    return replace(
+        campaign, recordings=tuple(recording for recording in campaign.recordings if recording.id not in names)
+    ), excluded
 
 
 def _end(connection: Connection, number: int, server: str, **values: Any) -> bool:

@@ -1,7 +1,7 @@
-"""Diagnoses that have ended, and the models adopted from them, in a skin's export: out, checked, and in.
+"""Finished diagnoses, and the models adopted from them, in a skin's export: written, checked, and imported.
 
-What waits or runs stays behind: it is asked for again elsewhere. So does what is also of campaigns of other skins,
-which the file lacks. Figures derived with models are computed again.
+Pending diagnoses are not exported, nor those that include campaigns of other skins, which the file lacks. Figures
+derived with models are computed again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -57,7 +57,7 @@ class _D33(BaseModel):
 
 
 class _AnyReport(BaseModel):
-    """What is read again of every report; the rest is handed on."""
+    """The fields of every report that are checked; the rest is passed through."""
 
     document: Literal["report/1"] = Field(alias="schema")
     verdict: Verdict
@@ -70,7 +70,7 @@ class _AnyReport(BaseModel):
 
 
 class _Report(_AnyReport):
-    """Of a report on one campaign d33 too, for a model of the skin may be adopted from it."""
+    """For a report on one campaign also d33, because a model of the skin may be adopted from it."""
 
     d33: _D33 | None
 
@@ -127,7 +127,7 @@ class ModelRow(ImportedRow):
 
 @dataclass(frozen=True)
 class Checked:
-    """Diagnoses and models of an export that hold together."""
+    """Diagnoses and models of an export that are consistent."""
 
     diagnoses: Sequence[DiagnosisRow]
     models: Sequence[ModelRow]
@@ -149,21 +149,23 @@ def checked(
     diagnosed: Sequence[Mapping[str, Any]], adopted: Sequence[Mapping[str, Any]], campaign_ids: Sequence[str],
     skin_ids: Sequence[str],
 ) -> Checked:  # fmt: skip
-    """The rows of an export; raises pydantic's ValidationError, or KeyError where one refers to what is not there."""
+    """The rows of an export; raises pydantic's ValidationError, or KeyError for a reference to a missing row."""
     rows = [DiagnosisRow.model_validate(row) for row in diagnosed]
     model_rows = [ModelRow.model_validate(row) for row in adopted]
     for row in rows:
-        of_campaigns = [row.campaign_id, *(one.campaign_id for one in row.members)]
+        of_campaigns = [row.campaign_id, *(member.campaign_id for member in row.members)]
         if not set(of_campaigns) <= set(campaign_ids):
             raise KeyError(f"diagnosis {row.id}: campaign {row.campaign_id}")
-        _require_whole(row, skin_ids)
+        _require_complete(row, skin_ids)
         if (row.state == "done") != (row.report is not None):
             raise KeyError(f"diagnosis {row.id}: report")
         kind = _Report if row.kind == "campaign" else _AnyReport
         if row.report is not None and kind.model_validate(row.report).verdict != row.verdict:
             raise KeyError(f"diagnosis {row.id}: verdict")
-    alone = [row for row in rows if row.kind == "campaign"]
-    explained = {row.id for row in alone if row.report and not_adopted(row.report) is None and row.report["d33"]}
+    single_campaigns = [row for row in rows if row.kind == "campaign"]
+    explained = {
+        row.id for row in single_campaigns if row.report and not_adopted(row.report) is None and row.report["d33"]
+    }
     for model in model_rows:
         if model.diagnosis_id not in explained or model.skin_id not in set(skin_ids):
             raise KeyError(f"model {model.id}")
@@ -172,25 +174,25 @@ def checked(
     return Checked(rows, model_rows)
 
 
-def _require_whole(row: DiagnosisRow, skin_ids: Sequence[str]) -> None:
-    """What a diagnosis says of several campaigns holds together; raises KeyError."""
+def _require_complete(row: DiagnosisRow, skin_ids: Sequence[str]) -> None:
+    """Check that what a diagnosis says of several campaigns is consistent; raises KeyError."""
     several = row.kind != "campaign"
     if several != (len(row.members) > 1) or several != (row.name is not None) or (row.all_of and not several):
         raise KeyError(f"diagnosis {row.id}: members")
-    if not {*row.all_of, *(one.skin_id for one in row.members)} <= set(skin_ids):
+    if not {*row.all_of, *(member.skin_id for member in row.members)} <= set(skin_ids):
         raise KeyError(f"diagnosis {row.id}: skins of its members")
-    if several and row.campaign_id not in {one.campaign_id for one in row.members}:
+    if several and row.campaign_id not in {member.campaign_id for member in row.members}:
         raise KeyError(f"diagnosis {row.id}: campaign {row.campaign_id}")
 
 
-def known(connection: Connection, file: Checked) -> set[str]:
-    """Ids of those diagnoses and models that are in the store, the same or not."""
-    found = {row.id for row in file.diagnoses if holds(connection, diagnoses, id=row.id)}
-    return found | {row.id for row in file.models if holds(connection, models, id=row.id)}
+def stored_ids(connection: Connection, file: Checked) -> set[str]:
+    """Ids of those diagnoses and models that are in the store, identical or not."""
+    ids = {row.id for row in file.diagnoses if holds(connection, diagnoses, id=row.id)}
+    return ids | {row.id for row in file.models if holds(connection, models, id=row.id)}
 
 
 def clashes(connection: Connection, file: Checked) -> list[str]:
-    """Which diagnoses and versions of models are there already and differ."""
+    """Diagnoses and models that are in the store and differ."""
     sentences = []
     for row in file.diagnoses:
         there = connection.execute(_DIAGNOSES.where(diagnoses.c.id == row.id)).first()
@@ -204,7 +206,7 @@ def clashes(connection: Connection, file: Checked) -> list[str]:
 
 
 def add(store: Database, file: Checked) -> None:
-    """Keep what is not there; the skins and campaigns are."""
+    """Store what is missing; the skins and campaigns are stored already."""
     with store.writing() as connection:
         for row in file.diagnoses:
             if not holds(connection, diagnoses, id=row.id):
@@ -224,8 +226,10 @@ def _add(connection: Connection, row: DiagnosisRow) -> None:
         connection.execute(insert(diagnoses), values)
         return
     members = [
-        Member(_number(connection, campaigns, one.campaign_id), one.campaign_id, "", one.skin_id, one.excluded)
-        for one in row.members
+        Member(
+            _number(connection, campaigns, member.campaign_id), member.campaign_id, "", member.skin_id, member.excluded
+        )
+        for member in row.members
     ]
     together = Together(row.kind, row.name, members, row.all_of)
     connection.execute(insert(diagnoses), {**values, "together_sha256": together.sha256})
@@ -240,7 +244,7 @@ def _diagnosis(connection: Connection, row: AnyRow) -> dict[str, Any]:
     """The row of an export from that of the store."""
     members = diagnosed_together.members_of(connection, [row.number]).get(row.number, [])
     several = {
-        "members": [{name: getattr(one, name) for name in MemberRow.model_fields} for one in members],
+        "members": [{name: getattr(member, name) for name in MemberRow.model_fields} for member in members],
         "all_of": diagnosed_together.all_of(connection, row.number),
         "report": None if row.report is None else decompressed(row.report),
     }

@@ -19,7 +19,7 @@ from service.store.sqlite_files import SqliteFiles
 from service.store.write_turns import SOON_S, WAIT_S, WriteTurns, busy
 
 SQLITE_FILE = "underskin.sqlite3"
-CONNECTION_WAIT_S = 10.0  # for one of the connections of a pool, beside the wait for other writers
+CONNECTION_WAIT_S = 10.0  # for a connection of the pool, in addition to the wait for other writers
 _TAKES_NOTHING = (errno.EROFS, errno.EIO, errno.EFBIG)  # the last where files may not grow beyond some size
 _NOT_WRITTEN = (  # of SQLite, other than for a full disk
     sqlite3.SQLITE_IOERR_WRITE,
@@ -40,15 +40,15 @@ _OnConnection: TypeAlias = Callable[Concatenate[Connection, _Given], _Answer]
 
 
 class StorageFailed(Exception):
-    """The disk takes nothing: it is mounted read-only, or fails; nothing of the request was kept."""
+    """The disk cannot be written: mounted read-only, or failing; nothing of the request was stored."""
 
 
 class StorageFull(StorageFailed):
-    """There is no room to keep more; nothing of the request was kept."""
+    """The disk is full; nothing of the request was stored."""
 
 
 class Database:
-    """Transactions on one engine: a write is there for good once its block has ended, or not at all."""
+    """Transactions on one engine: a write is durable once its block has ended, or has no effect."""
 
     def __init__(self, url: URL) -> None:
         """Opens no connection yet."""
@@ -64,16 +64,16 @@ class Database:
         return self._files is not None
 
     def make(self) -> None:
-        """Make an SQLite file, empty, where there is none; all else here requires one."""
+        """Create an empty SQLite file if there is none; everything else here requires one."""
         if self._files is not None:
             self._files.make()
 
     def is_made(self) -> bool:
-        """Whether an SQLite file is there; PostgreSQL's databases are made by others."""
+        """Whether the SQLite file exists; PostgreSQL databases are created by others."""
         return self._files is None or self._files.is_made()
 
     def require_in_place(self) -> None:
-        """Raises StoreMoved where an SQLite store's files are not, or not any more, those on the disk."""
+        """Raises StoreMoved if the files of an SQLite store are missing or are not those on the disk."""
         if self._files is not None:
             self._files.require_in_place()
 
@@ -81,8 +81,8 @@ class Database:
     def reading(self) -> Iterator[Connection]:
         """A connection that sees one state of the store.
 
-        Of an SQLite store whose files were removed or replaced, connections that are open go on reading them, so that
-        what is in them can be saved; for others it raises StoreMoved.
+        If the files of an SQLite store were removed or replaced, open connections go on reading them, so that the data
+        can be saved; new ones raise StoreMoved.
         """
         with _connected(self.engine) as connection:
             if not self.is_sqlite:
@@ -93,9 +93,8 @@ class Database:
     def writing(self, *, soon: bool = False) -> Iterator[Connection]:
         """A transaction that commits at the end of the block.
 
-        Raises OperationalError where others write for too long, or too many wait to; StorageFull where there was no
-        room, StorageFailed where the disk takes nothing; StoreMoved where it would be kept in a file that is not the
-        one on the disk. `soon`: a second is too long, for what can be made again.
+        Raises OperationalError if others write for too long or too many wait; StorageFull, StorageFailed; StoreMoved if
+        the file is not the one on the disk. `soon`: wait less than a second, for data that can be made again.
         """
         wait_s = SOON_S if soon else WAIT_S
         engine = self.engine if soon else self._writers  # whose connections may all be waiting
@@ -110,7 +109,7 @@ class Database:
                     connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
                 yield connection
                 self.require_in_place()
-            self.require_in_place()  # what was moved during the commit is not acknowledged either
+            self.require_in_place()  # a move during the commit is not acknowledged either
             self._turns.note(in_vain=False)
         except (DBAPIError, OSError) as error:
             failure = storage_failure(error)
@@ -123,12 +122,12 @@ class Database:
             raise
 
     def require_hope(self, *, soon: bool = False) -> None:
-        """For what takes long before it writes: raises OperationalError where writers have just waited in vain; for
-        what is written `soon`, also where they did not wait long."""
+        """Check before long work that ends in a write: raises OperationalError if writers have just waited in vain;
+        for a `soon` write also if they did not wait long."""
         self._turns.require_hope(soon=soon)
 
     def read(self, query: _OnConnection[_Given, _Answer], *given: _Given.args, **named: _Given.kwargs) -> _Answer:
-        """What one function of a connection answers in a block of `reading`."""
+        """The result of one function of a connection in a block of `reading`."""
         with self.reading() as connection:
             return query(connection, *given, **named)
 
@@ -139,7 +138,7 @@ class Database:
 
     @contextmanager
     def without_writers(self) -> Iterator[None]:
-        """While the block lasts nobody writes, in this process or another: what is under way ends, the others wait."""
+        """Within the block nobody writes, in this process or another: current writes end, later ones wait."""
         with self._locked_file() if self.is_sqlite else self.pg_lock(_PG_WRITING):
             yield
 
@@ -155,12 +154,12 @@ class Database:
 
     @contextmanager
     def _turn(self, wait_s: float) -> Iterator[None]:
-        """SQLite has one writer at a time anyway; this lock also covers what SQLite's own cannot span, a restore."""
-        with self._turns.place():
+        """The lock of writers; SQLite has one writer at a time anyway, but its own lock cannot span a restore."""
+        with self._turns.slot():
             if not self.is_sqlite:
                 yield
                 return
-            self.require_in_place()  # a lock elsewhere, made anew, would keep nobody out
+            self.require_in_place()  # a new lock file elsewhere would exclude nobody
             with self._turns.sole(self._lock_file, wait_s):
                 yield
 
@@ -170,7 +169,7 @@ class Database:
 
     @contextmanager
     def _locked_file(self) -> Iterator[None]:
-        """For a restore, which waits as long as it takes."""
+        """The lock for a restore, which waits as long as necessary."""
         self.require_in_place()
         with self._lock_file.open("a") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
@@ -199,18 +198,18 @@ def database(database_url: str, folder: Path) -> Database:
 
 
 def storage_failure(error: OSError | DBAPIError) -> StorageFailed | None:
-    """What an error, or what caused it, says of the disk: that it is full, or takes nothing; None where neither."""
+    """StorageFull or StorageFailed if an error, or its cause, says so; None otherwise."""
     if isinstance(error, OSError):
         full, failed = error.errno in (errno.ENOSPC, errno.EDQUOT), error.errno in _TAKES_NOTHING
-        said = error.strerror
+        message = error.strerror
     else:
         code = getattr(error.orig, "sqlite_errorcode", 0)
         full = code & 0xFF == sqlite3.SQLITE_FULL or _sqlstate(error.orig) == _PG_DISK_FULL
         failed = code & 0xFF == sqlite3.SQLITE_READONLY or code in _NOT_WRITTEN
-        said = str(error.orig)
+        message = str(error.orig)
     if full:
         return StorageFull(str(error))
-    return StorageFailed(said) if failed else None
+    return StorageFailed(message) if failed else None
 
 
 def _sqlstate(error: BaseException | None) -> str | None:
@@ -225,7 +224,7 @@ def holds(connection: Connection, table: Table, **values: Any) -> bool:
 
 
 def upsert(connection: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:
-    """An insert that may say what to do where the row is there already, as each database has its own."""
+    """An insert that can define what to do if the row exists, as each database has its own."""
     return (sqlite if connection.dialect.name == "sqlite" else postgresql).insert(table)
 
 
@@ -234,7 +233,7 @@ def _engine(url: URL, files: SqliteFiles | None) -> Engine:
         "pool_timeout": CONNECTION_WAIT_S,
         "json_serializer": lambda value: orjson.dumps(value).decode(),
         "json_deserializer": orjson.loads,
-        "hide_parameters": True,  # what is kept, keys' digests included, stays out of errors, and so of the log
+        "hide_parameters": True,  # stored values, keys' digests included, stay out of errors and thus of the log
     }
     if files is not None:
         engine = create_engine(url, creator=files.connect, **options)
@@ -246,7 +245,7 @@ def _engine(url: URL, files: SqliteFiles | None) -> Engine:
 
 
 def _connected(engine: Engine) -> Connection:
-    """A connection; raises OperationalError where all are in use for too long."""
+    """A connection; raises OperationalError if all are in use for too long."""
     try:
         return engine.connect()
     except NoConnectionError:
@@ -254,6 +253,6 @@ def _connected(engine: Engine) -> Connection:
 
 
 def _begin_sqlite(connection: Connection) -> None:
-    """A write takes the lock at once: one that began as a read could not wait for another's end."""
+    """A write takes the lock at once: a transaction that began as a read could not wait for another's end."""
     write = connection.get_execution_options().get("write", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")

@@ -1,4 +1,4 @@
-"""What the store raises."""
+"""Exceptions of the store."""
 
 
 class StoreError(Exception):
@@ -10,8 +10,8 @@ class Missing(LookupError):
 
 
 class Conflict(ValueError):
-    """What was asked does not fit the state of what is kept."""
+    """The request does not fit the state of the stored data."""
 
 
 class StoreMoved(Exception):
-    """The disk has other files under the store's names than those that are open; nothing is kept there."""
+    """The disk has other files under the store's names than the open ones; nothing is stored there."""

@@ -1,9 +1,9 @@
-"""All that is kept of a skin into one file (underskin/recordings/skin_export.py), and back to the same state.
+"""Export of all stored data of a skin to one file (underskin/recordings/skin_export.py), and import to the same
+state.
 
-Derived figures are not in it: they are computed again. Neither are answers kept for Idempotency-Key.
-
-Campaign by campaign: an import that was cut short is finished by importing the file again. What is there already and
-the same is left as it is; what is there and differs refuses the file before anything is kept.
+Derived figures and answers kept for Idempotency-Keys are not exported. The import proceeds campaign by campaign: an
+interrupted one is completed by importing the file again. Identical data are left as they are; differing data reject the
+file before anything is stored.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ _AT_A_TIME = 1000  # names in one query: databases limit their number
 
 
 def export(connection: Connection, root: str, file: Path) -> None:
-    """Write the skin `root`, and all joined to it, one campaign in memory at a time."""
+    """Write the skin `root` and all skins joined to it, one campaign in memory at a time."""
     of_root = select(skins_table).where(skins_table.c.root_id == root).order_by(skins_table.c.id)
     of_rigs = select(rigs).where(rigs.c.skin_id.in_(skins.members(root))).order_by(rigs.c.number)
     of_changes = select(changes).where(changes.c.skin_id.in_(skins.members(root))).order_by(changes.c.number)
@@ -47,25 +47,25 @@ def export(connection: Connection, root: str, file: Path) -> None:
 
 
 def exported(connection: Connection, row: AnyRow) -> ExportedCampaign:
-    """A campaign of the store as its file has it."""
+    """A stored campaign in the form of the file."""
     query = select(recordings).where(recordings.c.campaign == row.number).order_by(recordings.c.position)
     rows = connection.execute(query).all()
     return ExportedCampaign(
         about=_without(row, "number", "revision"),
-        recordings=[_without(kept, "campaign", "position", "arrays") for kept in rows],
-        arrays=[unpack(kept.arrays) for kept in rows],
+        recordings=[_without(recording_row, "campaign", "position", "arrays") for recording_row in rows],
+        arrays=[unpack(recording_row.arrays) for recording_row in rows],
     )
 
 
 def _without(row: AnyRow, *names: str) -> dict[str, Any]:
-    """A row by its columns' names, as plain text: SQLAlchemy's own are of a type that JSON writers refuse. Columns that
-    older files lack are in it where they hold something."""
+    """A row by its columns' names, as plain text: SQLAlchemy's own string type is rejected by JSON writers. Columns
+    that older files lack are included if they hold something."""
     held = {str(name): value for name, value in row._mapping.items() if name not in names}
     return {name: value for name, value in held.items() if name not in import_checks.NEWER or value is not None}
 
 
 def otherwise_joined(connection: Connection, skins: Sequence[SkinRow]) -> list[str]:
-    """What clashes: skins that are there already and were joined otherwise."""
+    """Conflicts: skins in the store that were joined differently."""
     clashes = []
     for row in skins:
         stored = connection.execute(select(skins_table).where(skins_table.c.id == row.id)).first()
@@ -74,8 +74,8 @@ def otherwise_joined(connection: Connection, skins: Sequence[SkinRow]) -> list[s
     return clashes
 
 
-def known(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
-    """Rows, by id, of those of the file's campaigns that the store has."""
+def stored_rows(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
+    """Rows, by id, of those of the file's campaigns that are in the store."""
     rows: dict[str, AnyRow] = {}
     for start in range(0, len(names), _AT_A_TIME):
         these = campaigns_table.c.id.in_(names[start : start + _AT_A_TIME])
@@ -84,14 +84,13 @@ def known(connection: Connection, names: Sequence[str]) -> dict[str, AnyRow]:
 
 
 def differs(connection: Connection, row: AnyRow, campaign: ExportedCampaign) -> bool:
-    """Whether a campaign of the store, by its row, says something else."""
+    """Whether a stored campaign, by its row, differs."""
     return not exported(connection, row).same_as(campaign)
 
 
 def add_skins(store: Database, checked: CheckedOverview) -> None:
-    """Keep the skins, joined as they were, and their rigs; a skin that was put away here, but not in the file, comes
-    back. Raises Conflict as others may have joined them meanwhile.
-    """
+    """Store the skins with their joins and rigs; a skin discarded here but not in the file is restored. Raises
+    Conflict, because others may have joined them meanwhile."""
     with store.writing() as connection:
         clashes = otherwise_joined(connection, checked.skins)
         if clashes:
@@ -113,8 +112,8 @@ def add_skins(store: Database, checked: CheckedOverview) -> None:
 
 
 def add(store: Database, checked: ImportedCampaign) -> None:
-    """Keep a campaign that is not there; one that figures use has its skin be in lists."""
-    exclusions = [entry.model_dump() for entry in checked.exclusions]
+    """Store a missing campaign; if figures use it, its skin is listed again."""
+    exclusions = [exclusion.model_dump() for exclusion in checked.exclusions]
     with store.writing() as connection:
         if checked.row["withdrawn_at"] is None and checked.row["corrected_by"] is None:
             skins.bring_back(connection, skins.require_root(connection, checked.row["skin_id"]))

@@ -1,7 +1,7 @@
-"""What tells one store from another, so that two of them do not take each other's backups for their own.
+"""The identity of a store, so that two stores do not mistake each other's backups for their own.
 
-Of SQLite it is a number in the database file (its user version, of which SQLite makes no use), and so goes with the
-file and its backups; of PostgreSQL the cluster and the database in it, the same for all servers that share it.
+For SQLite a number in the database file (its user version, which SQLite does not use), which travels with the file and
+its backups; for PostgreSQL the cluster and the database, the same for all servers that share it.
 """
 
 import secrets
@@ -25,9 +25,9 @@ def find(connection: Connection) -> str | None:
 
 def ensure(connection: Connection) -> str:
     """The store's identity, from now on."""
-    found = find(connection)
-    if found is not None:
-        return found
+    identity_row = find(connection)
+    if identity_row is not None:
+        return identity_row
     connection.execute(text(f"PRAGMA user_version = {1 + secrets.randbelow(_MOST)}"))
     return ensure(connection)
 

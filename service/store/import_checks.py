@@ -1,6 +1,6 @@
-"""What an export must be to come into the store: nothing that the service could not have kept itself.
+"""Checks of an export before import: only data that the service could have stored itself are accepted.
 
-Every check raises InvalidInput, or pydantic's ValidationError, KeyError or TypeError where a row has another shape.
+Every check raises InvalidInput, or pydantic's ValidationError, KeyError or TypeError for a row of another shape.
 """
 
 from collections.abc import Sequence
@@ -226,10 +226,10 @@ def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) ->
     _require(state.skin_id in {row.id for row in skins}, "skin_id", state.skin_id, "must be a skin in the file")
     _require_together(state, "corrects", "correct_reason")
     _require_together(state, "withdrawn_at", "withdraw_reason")
-    for entry in state.refused:
-        RecordingResult.model_validate(entry)
-    own = ("excluded_at", "exclude_reason", "excluded_from")
-    exclusions = [ExclusionRow(**{key: row.get(key) for key in own}) for row in exported.recordings]
+    for refused_recording in state.refused:
+        RecordingResult.model_validate(refused_recording)
+    columns = ("excluded_at", "exclude_reason", "excluded_from")
+    exclusions = [ExclusionRow(**{key: row.get(key) for key in columns}) for row in exported.recordings]
     for exclusion in exclusions:
         _require_together(exclusion, "excluded_at", "exclude_reason")
     entries = [{**row["scalars"], **arrays} for row, arrays in zip(exported.recordings, exported.arrays, strict=True)]
@@ -239,7 +239,7 @@ def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) ->
         **state.model_dump(),
         "about": codec.about(parsed),
         "recordings": len(parsed.recordings),
-        "excluded": sum(entry.excluded_at is not None for entry in exclusions),
+        "excluded": sum(exclusion.excluded_at is not None for exclusion in exclusions),
         "recorded_at": codec.earliest(parsed),
         "revision": 0,
     }
@@ -247,12 +247,14 @@ def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) ->
 
 
 def _require_of(change: ChangeRow, campaigns: Sequence[str]) -> None:
-    """What can be changed of a skin or of one of the campaigns, with values as the service keeps them."""
-    own = change.campaign_id
-    _require(own is None or own in campaigns, "changes", own, "must be of a campaign in the file")
+    """Check the type and the values of a change of a skin or of one of the campaigns."""
+    campaign_id = change.campaign_id
+    _require(
+        campaign_id is None or campaign_id in campaigns, "changes", campaign_id, "must be of a campaign in the file"
+    )
     named = change.recording is not None
     _require(change.action != "exclude" or named, "changes", change.id, "must name the recording")
-    values = (_OF_SKIN if own is None else _OF_CAMPAIGN) | {"undo": (Nothing, Nothing)}
+    values = (_OF_SKIN if campaign_id is None else _OF_CAMPAIGN) | {"undo": (Nothing, Nothing)}
     _require(change.action in values, "changes", change.id, "must be of what can be changed")
     before, after = values[change.action]
     before.model_validate(change.before)
@@ -263,7 +265,7 @@ def _require_of(change: ChangeRow, campaigns: Sequence[str]) -> None:
 
 
 def _require_joined(root: str, rows: Sequence[SkinRow]) -> None:
-    """Each skin once, with an id of ours; every one but the root joined to another, and so in the end to the root."""
+    """Each skin once, with a valid id; all but the root joined to another, and so in the end to the root."""
     joined_to = {row.id: row.joined_to for row in rows}
     _require(root in joined_to, "skin", root, "must be one of the file's skins")
     _require(len(joined_to) == len(rows), "skins", len(rows), "must have ids that differ")
@@ -280,7 +282,7 @@ def _require_joined(root: str, rows: Sequence[SkinRow]) -> None:
             _require(name in joined_to and name not in passed, "skins.joined_to", row.id, "must lead to the skin")
             passed[name] = None
             name = joined_to[str(name)]
-        leading |= {str(one) for one in passed}
+        leading |= {str(passed_id) for passed_id in passed}
 
 
 def _require_together(row: BaseModel, *names: str) -> None:

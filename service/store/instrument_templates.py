@@ -1,4 +1,4 @@
-"""Rig descriptions by the instrument whose files they read; each stays, and the latest is offered."""
+"""Rig descriptions by instrument; all are stored, and the latest is offered."""
 
 from sqlalchemy import Connection, insert, select
 

@@ -1,4 +1,4 @@
-"""d33 derived from campaigns, kept so that lists and histories need no recording."""
+"""d33 derived from campaigns, stored so that lists and histories need not read recordings."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,12 +13,12 @@ from service.store.tables import AnyRow, adopted_inversions, campaigns, inversio
 
 
 def find(connection: Connection, campaign: AnyRow, table_sha256: str) -> Any | None:
-    """The answer kept for a campaign as it is now, with this table, by this software; None where there is none."""
+    """The stored answer for a campaign in its present state, with this table and software; None if there is none."""
     return _document(connection, inversions, _now(inversions, campaign, table_sha256))
 
 
 def find_with_numbers(connection: Connection, campaign: AnyRow, table_sha256: str) -> tuple[Any, Any] | None:
-    """The same, with the numbers that the figures show; None where either is missing."""
+    """The same with the numbers of the figures; None if either is missing."""
     query = select(inversions.c.document, inversions.c.numbers).where(_now(inversions, campaign, table_sha256))
     row = connection.execute(query.where(inversions.c.numbers.is_not(None))).first()
     return None if row is None else (decompressed(row.document), decompressed(row.numbers))
@@ -42,8 +42,8 @@ def keep(
     numbers: Any,
     sensors: Mapping[str, tuple[float, float]],
 ) -> None:
-    """Keep an answer, the numbers of its figures, and d33 with its standard uncertainty [pC/N] by sensor, unless the
-    campaign changed since."""
+    """Store an answer, the numbers of its figures, and d33 with its standard uncertainty [pC/N] by sensor, unless
+    the campaign changed since."""
     derived = {"document": compressed(document), "numbers": compressed(numbers)}
     if not _replaced(connection, inversions, campaign, table_sha256, derived):
         return

@@ -1,4 +1,4 @@
-"""Whether requests need a key: kept in the store from the first key on, and lifted by `underskin key open` alone."""
+"""Whether requests need a key: stored from the first key on, and lifted only by `underskin key open`."""
 
 from sqlalchemy import Connection, inspect, select
 
@@ -9,7 +9,7 @@ from service.store.times import now
 _ONLY = 1  # the number of the only row
 
 
-def is_known(connection: Connection) -> bool:
+def has_table(connection: Connection) -> bool:
     """Whether the store's schema has the requirement; an older one gets it with the next start."""
     return inspect(connection).has_table(key_requirement.name)
 
@@ -21,7 +21,7 @@ def find(connection: Connection) -> AnyRow | None:
 
 def is_needed(connection: Connection) -> bool:
     """Whether keys are needed, as far as the store knows, of whatever version it is."""
-    row = find(connection) if is_known(connection) else None
+    row = find(connection) if has_table(connection) else None
     return row is not None and row.lifted_at is None
 
 

@@ -1,6 +1,5 @@
-"""The schema at start: made, or brought up to date after a verified backup; a newer one is refused. So is a backup that
-takes the place of the store.
-"""
+"""The schema at start: created, or updated after a verified backup; a newer schema is rejected. Also restores
+backups."""
 
 import fcntl
 from collections.abc import Iterator
@@ -19,10 +18,8 @@ _LOCK = 7236411  # any number, the same for all servers of a database
 
 
 def migrate(database: Database, folder: Path) -> None:
-    """Bring the schema to the newest version, of a store that is to be made too.
-
-    Raises StoreError where that cannot be done safely.
-    """
+    """Update the schema to the newest version, also of a store yet to be created. Raises StoreError if that cannot
+    be done safely."""
     database.make()
     if version(database) == VERSIONS[-1]:
         return
@@ -34,7 +31,7 @@ def migrate(database: Database, folder: Path) -> None:
             require_known(before)
             occasion = f"before-{VERSIONS[-1]}"
             backup.remove_parts(folder, occasion)
-            backup.make(database, backup.place(database, folder, occasion))
+            backup.make(database, backup.path_for(database, folder, occasion))
         _upgrade(database)
 
 
@@ -52,7 +49,7 @@ def version_of(connection: Connection) -> str | None:
 
 
 def require_known(number: str) -> None:
-    """Refuses the schema of a newer underskin."""
+    """Rejects the schema of a newer underskin."""
     if number not in VERSIONS:
         raise StoreError(
             f"the store has schema {number}, which this underskin does not know (newest: {VERSIONS[-1]}): "
@@ -86,15 +83,14 @@ def _one_at_a_time(database: Database, folder: Path) -> Iterator[None]:
 
 
 def restore(store: Database, file: Path, before: Path, progress: backup.Progress = backup.untold) -> None:
-    """Replace the store by the backup `file`, brought up to date; what was there is in `before`.
+    """Replace the store by the backup `file`, updated to the newest schema; the earlier data are in `before`.
+    Required keys stay required, whatever the backup says.
 
-    Where keys were needed they still are, whatever the backup says.
-
-    Raises StoreError, with the store as it was.
+    Raises StoreError, with the store unchanged.
     """
     require_known(backup.verify(store, file))
     store.make()
-    with store.without_writers():  # what is acknowledged after the backup would be lost
+    with store.without_writers():  # writes acknowledged after the backup would be lost
         needed = store.read(key_requirement.is_needed)
         if version(store) is not None:
             backup.make(store, before, progress)

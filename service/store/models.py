@@ -1,4 +1,4 @@
-"""Models of skins, adopted from diagnoses; each stays, and the last one is in force unless it was withdrawn."""
+"""Models of skins, adopted from diagnoses; all are stored, and the latest is in force unless it was withdrawn."""
 
 import secrets
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from service.store.tables import AnyRow, diagnoses, models
 from service.store.tables import skins as skin_rows
 from service.store.times import now
 
-_OWN = [column.label(f"model_{column.name}") for column in models.c]  # beside what is said of the diagnosis
+_MODEL_COLUMNS = [column.label(f"model_{column.name}") for column in models.c]  # next to the columns of the diagnosis
 
 
 def adopt(connection: Connection, root: str, diagnosis: AnyRow, adopted_from: str | None) -> AnyRow:
@@ -77,7 +77,11 @@ def all_in_force(connection: Connection) -> list[AnyRow]:
 
 def in_force_of(connection: Connection, roots: Sequence[str]) -> dict[str, AnyRow]:
     """As `in_force`, of each of these skins that has one."""
-    query = kept.rows().add_columns(*_OWN, skin_rows.c.root_id).join(models, models.c.diagnosis == diagnoses.c.number)
+    query = (
+        kept.rows()
+        .add_columns(*_MODEL_COLUMNS, skin_rows.c.root_id)
+        .join(models, models.c.diagnosis == diagnoses.c.number)
+    )
     query = query.join(skin_rows, skin_rows.c.id == models.c.skin_id).where(skin_rows.c.root_id.in_(roots))
     rows = connection.execute(query.order_by(models.c.adopted_at, models.c.number))
     latest = {row.root_id: row for row in rows}
@@ -91,7 +95,7 @@ def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
 
 def _rows(root: str) -> Select[Any]:
     """Rows of diagnoses as `diagnoses.rows` has them, with their models."""
-    query = kept.rows().add_columns(*_OWN).join(models, models.c.diagnosis == diagnoses.c.number)
+    query = kept.rows().add_columns(*_MODEL_COLUMNS).join(models, models.c.diagnosis == diagnoses.c.number)
     return query.where(_of_root(root)).order_by(models.c.adopted_at.desc(), models.c.number.desc())
 
 

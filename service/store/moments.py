@@ -1,7 +1,6 @@
-"""When something of a skin was done: after all that was done of it before, whatever the clock says.
+"""Times of actions on a skin: each later than all earlier ones, whatever the clock says.
 
-A clock that was ahead is set back, and clocks of servers of one database differ: a time alone would order what follows
-before what was there.
+A clock that was ahead is set back, and clocks of servers of one database differ: times alone would give a wrong order.
 """
 
 from collections.abc import Collection
@@ -13,8 +12,8 @@ from service.store.tables import campaigns, changes, diagnosed_campaigns, diagno
 
 
 def next_of(connection: Connection, skin_ids: Collection[str]) -> str:
-    """This moment; where a change, a diagnosis or a model of these skins, or of those joined to them, has a later time,
-    the next one after that."""
+    """The present time or, if a change, a diagnosis or a model of these skins or of those joined to them has a later
+    time, the next possible time after that."""
     roots = select(skins.c.root_id).where(skins.c.id.in_(skin_ids))
     members = select(skins.c.id).where(skins.c.root_id.in_(roots))
     of_skins = campaigns.c.skin_id.in_(members)

@@ -1,4 +1,4 @@
-"""Skins at a glance: how many campaigns, the latest, d33 over the last few, and what was diagnosed last."""
+"""Overview of skins: number of campaigns, the latest one, d33 over the last few, and the latest diagnosis."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -50,7 +50,7 @@ def glances(
     the one with the campaign of the number `before`."""
     last = func.max(campaigns.c.number)
     latest = func.coalesce(func.max(case((kept.CURRENT, kept.TIME))), func.max(kept.TIME))
-    listed = func.count(case((kept.LISTED, campaigns.c.number)))  # not what was discarded
+    listed = func.count(case((kept.LISTED, campaigns.c.number)))  # not discarded ones
     query = select(skins.c.root_id, listed, last).join(skins, skins.c.id == campaigns.c.skin_id)
     put_away = select(skins.c.id).where(skins.c.discarded_at.is_not(None)).correlate(None)
     query = query.where(skins.c.root_id.not_in(put_away))
@@ -80,15 +80,15 @@ def glances(
         if row.number in diagnosed:
             glance.diagnosis, glance.diagnosed = diagnosed[row.number], row
     adopted = adopted_models.in_force_of(connection, list(by_skin))
-    told = {row.root_id: row for row in recent if row.number in values}
-    sensors = measured_sensors(connection, [row.number for row in told.values()], table_sha256)
+    recent_by_root = {row.root_id: row for row in recent if row.number in values}
+    sensors = measured_sensors(connection, [row.number for row in recent_by_root.values()], table_sha256)
     for root, glance in by_skin.items():
         glance.model = adopted.get(root)
         if glance.last is not None:
             glance.diagnosed = None if glance.diagnosed == glance.last else glance.diagnosed
-            _add_d33(connection, glance, told.get(root, glance.last), table_sha256)
-        if root in told:
-            glance.measured = sensors.get(told[root].number)
+            _add_d33(connection, glance, recent_by_root.get(root, glance.last), table_sha256)
+        if root in recent_by_root:
+            glance.measured = sensors.get(recent_by_root[root].number)
     titles = select(skins.c.id, skins.c.title, skins.c.tags).where(skins.c.id.in_(by_skin))
     for skin_id, title, tags in connection.execute(titles):
         by_skin[skin_id].title, by_skin[skin_id].tags = title, tags
@@ -96,7 +96,7 @@ def glances(
 
 
 def _add_d33(connection: Connection, glance: Glance, campaign: AnyRow, table_sha256: str) -> None:
-    """That of the array in a campaign, by the paper's model and by the one in force."""
+    """Add d33 of the array in a campaign, by the paper's model and by the one in force."""
     by_paper = inversions.find(connection, campaign, table_sha256)
     glance.paper_array = None if by_paper is None else by_paper["array"]
     if glance.model is not None:
@@ -107,10 +107,10 @@ def _add_d33(connection: Connection, glance: Glance, campaign: AnyRow, table_sha
 def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:
     """The last few current campaigns of each skin, the oldest first."""
     order = (kept.TIME.desc(), campaigns.c.number.desc())
-    place = func.row_number().over(partition_by=skins.c.root_id, order_by=order)
+    rank = func.row_number().over(partition_by=skins.c.root_id, order_by=order)
     columns = [campaigns.c[name] for name in _OF_CAMPAIGNS]
     ranked = (
-        select(skins.c.root_id, kept.TIME.label("time"), place.label("place"), *columns)
+        select(skins.c.root_id, kept.TIME.label("time"), rank.label("place"), *columns)
         .join(skins, skins.c.id == campaigns.c.skin_id)
         .where(kept.CURRENT, skins.c.root_id.in_(roots))
         .subquery()
@@ -134,7 +134,7 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
 
 
 def measured_sensors(connection: Connection, numbers: Sequence[int], table_sha256: str) -> dict[int, tuple[int, int]]:
-    """Of how many sensors d33 is kept, and how many the skin has, by those campaigns of which any is kept."""
+    """How many sensors have a stored d33, and how many the skin has, by campaign."""
     counted = (
         select(sensor_d33.c.campaign, func.count().label("measured"))
         .join(campaigns, campaigns.c.number == sensor_d33.c.campaign)

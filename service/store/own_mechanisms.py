@@ -1,4 +1,4 @@
-"""The files of the lab's own mechanisms in the store, so that its backups hold them."""
+"""The files of the lab's own mechanisms in the store, so that its backups contain them."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from service.store.tables import own_mechanisms
 
 
 def replace(connection: Connection, files: Mapping[str, bytes]) -> None:
-    """Keep these, by name, and no others; a store of an older schema keeps none."""
+    """Store these files, by name, instead of the earlier ones; a store of an older schema stores none."""
     if not inspect(connection).has_table(own_mechanisms.name) or found(connection) == files:
         return
     connection.execute(delete(own_mechanisms))
@@ -18,5 +18,5 @@ def replace(connection: Connection, files: Mapping[str, bytes]) -> None:
 
 
 def found(connection: Connection) -> dict[str, bytes]:
-    """Those kept, by name."""
+    """The stored files by name."""
     return {row.file: row.content for row in connection.execute(select(own_mechanisms))}

@@ -1,4 +1,4 @@
-"""Dumps of a PostgreSQL store: made by pg_dump, and put in place of the store by pg_restore and psql."""
+"""Dumps of a PostgreSQL store: written by pg_dump, and restored by pg_restore and psql."""
 
 import os
 import re
@@ -18,7 +18,7 @@ from service.store.engine import Database
 from service.store.errors import StoreError
 from service.store.tables import metadata
 
-Copied = Callable[[int, int | None], object]  # told the bytes that are done, and how many there are where that is known
+Copied = Callable[[int, int | None], object]  # called with the bytes done, and the total if known
 _STEP_BYTES = 1 << 20
 _LOOK_S = 0.1
 _APART = "underskin_restoring"  # the schema that a dump is read into, while the store's own tables are read
@@ -43,46 +43,50 @@ def dump(database: Database, part: Path, copied: Copied) -> None:
 
 
 def versions(file: Path) -> list[str]:
-    """What a dump says of its schema's version, after all of it was read; raises StoreError where it is damaged."""
+    """The schema version of a dump, after reading all of it; raises StoreError if it is damaged."""
     _run("pg_restore", "--file=/dev/null", str(file))
     dumped = _run("pg_restore", "--data-only", "--table=alembic_version", "--file=-", str(file)).splitlines()
     return [dumped[number + 1] for number, line in enumerate(dumped) if line.startswith("COPY ")]
 
 
 def replace(database: Database, file: Path, copied: Copied) -> None:
-    """Put a dump in place of the store in one transaction, whose end alone its readers wait for; raises StoreError.
+    """Replace the store by a dump in one transaction; readers wait only for its end. Raises StoreError.
 
-    The dump is read into tables of a schema apart, which then take the names of the store's. Of these none is left,
-    also where the dump's version lacks one.
+    The dump is read into tables of a separate schema, which then take the names of the store's tables. No table of the
+    store remains, even if the dump's version lacks it.
     """
     for program in ("psql", "pg_restore"):
         _require(program)
     address, password = _address(database)
-    own = str(database.read(lambda connection: connection.execute(text("SELECT current_schema()")).scalar_one()))
+    schema = str(database.read(lambda connection: connection.execute(text("SELECT current_schema()")).scalar_one()))
     tables = _TABLE_IN_LIST.findall(_run("pg_restore", "--list", str(file)))
-    gone = ", ".join(f'"{own}".{name}' for name in sorted({*tables, *metadata.tables, "alembic_version"}))
-    moved = "".join(f'ALTER TABLE {_APART}.{name} SET SCHEMA "{own}";\n' for name in tables)
+    dropped = ", ".join(f'"{schema}".{name}' for name in sorted({*tables, *metadata.tables, "alembic_version"}))
+    moved = "".join(f'ALTER TABLE {_APART}.{name} SET SCHEMA "{schema}";\n' for name in tables)
     command = ["psql", "--dbname", address, "--quiet", "--no-psqlrc", "--set=ON_ERROR_STOP=1", "--output=/dev/null"]
     with (
         tempfile.TemporaryFile() as complaints,
         subprocess.Popen(command, env=os.environ | password, stdin=subprocess.PIPE, stderr=complaints) as psql,
     ):
         assert psql.stdin is not None
-        whole = False
+        complete = False
         with suppress(BrokenPipeError), psql.stdin as script:  # where it has ended, it says why
             script.write(f"BEGIN; CREATE SCHEMA {_APART};\n".encode())
-            whole = _write_script(file, tables, script, complaints, copied)
-            end = f"DROP TABLE IF EXISTS {gone};\n{moved}DROP SCHEMA {_APART};\nCOMMIT;\n" if whole else "ROLLBACK;\n"
+            complete = _write_script(file, tables, script, complaints, copied)
+            end = (
+                f"DROP TABLE IF EXISTS {dropped};\n{moved}DROP SCHEMA {_APART};\nCOMMIT;\n"
+                if complete
+                else "ROLLBACK;\n"
+            )
             script.write(end.encode())
         psql.wait()
-        if psql.returncode != 0 or not whole:
+        if psql.returncode != 0 or not complete:
             raise StoreError(f"the restore failed: {_end_of(complaints)}")
 
 
 def _write_script(
     file: Path, tables: Collection[str], script: IO[bytes], complaints: IO[bytes], copied: Copied
 ) -> bool:
-    """Write a dump as SQL that makes its tables in the schema apart; whether all of it was good."""
+    """Write a dump as SQL that creates its tables in the separate schema; returns whether all of it was good."""
     command = ["pg_restore", "--no-owner", "--file=-"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints) as made:
         assert made.stdin is not None
@@ -109,7 +113,7 @@ def _feed(file: Path, sink: IO[bytes], copied: Copied) -> None:
 
 
 def _in_schema_apart(lines: Iterable[bytes], tables: Collection[str]) -> Iterator[bytes]:
-    """The lines of a dump with another schema before the names of its tables and their sequences; rows as they are."""
+    """The lines of a dump with another schema before the names of its tables and sequences; rows are unchanged."""
     names = "|".join(map(re.escape, tables))
     named = re.compile(rf"\b\w+\.(?=(?:{names})(?:_\w+_seq)?\b)".encode())
     in_rows = False

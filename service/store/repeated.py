@@ -1,4 +1,4 @@
-"""Recordings that come a second time, by the digests that are kept beside them."""
+"""Recordings that were stored before, recognised by their digests."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -28,11 +28,11 @@ class Earlier:
 def most_alike(connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None) -> Earlier | None:
     """The current campaign with the most recordings of this one, whatever their ids.
 
-    Of several one of the skin `skin_id`, and of those the one that came first, which histories count. `corrects`: the
-    id of a campaign that is passed over, as this one takes its place.
+    Among equals one of the skin `skin_id`, then the earliest, which histories count. `corrects`: the id of a campaign
+    that is skipped, because this one replaces it.
     """
     digests = [digest(recording) for recording in campaign.recordings]
-    coming = sorted({known for known in digests if known is not None})
+    coming = sorted({checksum for checksum in digests if checksum is not None})
     alike: Counter[int] = Counter()
     skin_of: dict[int, str] = {}
     for start in range(0, len(coming), _AT_A_TIME):
@@ -52,8 +52,8 @@ def most_alike(connection: Connection, campaign: Campaign, skin_id: str | None, 
 
 
 def shared(connection: Connection, root: str) -> Sequence[AnyRow]:
-    """Recordings that several current campaigns of a skin have, and of those joined to it: id and number of the
-    campaign, sensor, digest. Without those that figures leave out, and the elastomer's."""
+    """Recordings that several current campaigns of a skin, or of those joined to it, have: id and number of the
+    campaign, sensor, digest. Without excluded ones and those of the elastomer."""
     of_skin = (CURRENT, campaigns.c.skin_id.in_(skins.members(root)))
     several = (
         select(recording_digests.c.digest)

@@ -22,7 +22,7 @@ class NewSession:
     expires_at: str
 
 
-def is_known(connection: Connection) -> bool:
+def has_table(connection: Connection) -> bool:
     """Whether the store's schema has sessions; an older one gets them with the next start."""
     return inspect(connection).has_table(sessions.name)
 

@@ -22,12 +22,12 @@ def mark(connection: Connection, root: str, table_sha256: str) -> str:
     diagnosis, an adoption and any other change that is recorded."""
     of_skin = campaigns.c.skin_id.in_(skins.members(root))
     numbers = numbers_of(root)
-    with_one = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
+    of_campaigns = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     queries = (
         select(func.count(), func.max(campaigns.c.number), func.sum(campaigns.c.revision)).where(of_skin),
         select(func.count()).select_from(campaigns).join(derived, inversions.fresh(table_sha256)).where(of_skin),
         select(diagnoses.c.state, func.count(), func.max(diagnoses.c.number))
-        .where(with_one)
+        .where(of_campaigns)
         .group_by(diagnoses.c.state)
         .order_by(diagnoses.c.state),
         select(func.count(), func.count(models.c.withdrawn_at)).where(models.c.skin_id.in_(skins.members(root))),

@@ -53,7 +53,7 @@ def require_root(connection: Connection, skin_id: str) -> str:
     return str(row.root_id)
 
 
-def are_one(connection: Connection, first: str, second: str) -> bool:
+def are_joined(connection: Connection, first: str, second: str) -> bool:
     """Whether two ids mean one skin: they are the same, or were joined."""
     rows = [(name, find(connection, name)) for name in (first, second)]
     return len({name if row is None else row.root_id for name, row in rows}) == 1

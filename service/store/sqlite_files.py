@@ -1,7 +1,7 @@
-"""The files of an SQLite store: held open, and compared with those that the disk has under their names.
+"""The files of an SQLite store: held open, and compared with those on the disk under their names.
 
-A file that was removed or replaced goes on taking writes from whoever has it open, and is gone with the process. SQLite
-does not look: so a commit must, and a new connection, which would open, or make, another file of that name.
+A removed or replaced file still accepts writes from processes that have it open, and is lost with them. SQLite does not
+check this, so each commit must, and each new connection, which would open or create another file of that name.
 """
 
 import sqlite3
@@ -18,7 +18,7 @@ _Identity = tuple[int, int] | None  # device and inode; None where there is no s
 
 
 class SqliteFiles:
-    """Those of one database, as this process found them when it opened them first. For any number of threads."""
+    """The files of one database as this process first opened them. Thread-safe."""
 
     def __init__(self, path: Path) -> None:
         """Opens nothing yet."""
@@ -30,7 +30,7 @@ class SqliteFiles:
         self._held: list[_Identity] = []
 
     def make(self) -> None:
-        """Make the database, empty, where it is missing; raises StoreError where its write-ahead log is there."""
+        """Create the empty database if it is missing; raises StoreError if its write-ahead log exists."""
         log = Path(f"{self._path}-wal")
         if self.is_made():
             return
@@ -47,7 +47,7 @@ class SqliteFiles:
         return self._path.exists()
 
     def connect(self) -> sqlite3.Connection:
-        """A connection to the files that were opened first; raises StoreMoved where the disk has others."""
+        """A connection to the files opened first; raises StoreMoved if the disk has others."""
         with self._lock:
             if self._first is None:
                 first = _open(self._path)
@@ -63,7 +63,7 @@ class SqliteFiles:
         return connection
 
     def require_in_place(self) -> None:
-        """Raises StoreMoved where the disk has other files, or none, under the names of those that are open."""
+        """Raises StoreMoved if the disk has other files, or none, under the names of the open ones."""
         if self._first is None:
             return
         for suffix, held, there in zip(_SUFFIXES, self._held, self._on_disk(), strict=True):
@@ -95,7 +95,7 @@ def _identity(file: Path) -> _Identity:
 
 
 def _open(path: Path) -> sqlite3.Connection:
-    """Never makes the file: an empty one in the place of one that was removed would pass for a store."""
+    """Never creates the file: an empty file in place of a removed one would pass for a store."""
     connection = sqlite3.connect(f"{path.as_uri()}?mode=rw", uri=True, timeout=_BUSY_S, check_same_thread=False)
     connection.isolation_level = None  # we say BEGIN ourselves: Python would say it too late
     for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):

@@ -34,13 +34,15 @@ skins = Table(
     "skins",
     metadata,
     Column("id", String, primary_key=True),
-    Column("root_id", String, ForeignKey("skins.id"), nullable=False, index=True),  # itself, or what it was joined to
+    Column(
+        "root_id", String, ForeignKey("skins.id"), nullable=False, index=True
+    ),  # itself, or the skin to which it was joined
     Column("created_at", String, nullable=False),
     Column("joined_to", String, ForeignKey("skins.id")),
     Column("joined_at", String),
     Column("join_reason", Text),
     Column("joined_from", Text),  # name of the API key, else as typed on a page
-    Column("title", Text),  # what the lab calls it, beside its id
+    Column("title", Text),  # the lab's name for it besides its id
     Column("remark", Text),
     Column("tags", Text),  # with commas between them
     Column("discarded_at", String),  # in no list from then on, until a campaign of it arrives
@@ -62,7 +64,7 @@ instrument_templates = Table(
     metadata,
     Column("number", _Number, primary_key=True),
     Column("instrument", String, nullable=False),  # digest, by service/ingest/instruments.py
-    Column("document", Text, nullable=False),  # rig/1 as JSON, without what is of a skin or of one recording
+    Column("document", Text, nullable=False),  # rig/1 as JSON, without values of a skin or of one recording
     Column("kept_at", String, nullable=False),
     Column("kept_from", Text),  # name of the API key
     Index("templates_of_instrument", "instrument", "number"),
@@ -76,15 +78,15 @@ campaigns = Table(
     Column("skin_id", String, ForeignKey("skins.id"), nullable=False),
     Column("name", Text, nullable=False),
     Column("about", JSON, nullable=False),  # the campaign document without its recordings
-    Column("notes", JSON, nullable=False),  # what the reader remarked, a list of texts
-    Column("refused", JSON, nullable=False),  # recordings that were sent and not kept, with their errors
+    Column("notes", JSON, nullable=False),  # the reader's notes, a list of texts
+    Column("refused", JSON, nullable=False),  # rejected recordings with their errors
     Column("source", Text),  # the name of the file that it came in
     Column("received_at", String, nullable=False),
     Column("received_from", Text),  # name of the API key
     Column("recorded_at", String),  # of the earliest recording that says so
     Column("recordings", Integer, nullable=False),
     Column("excluded", Integer, nullable=False),
-    Column("revision", Integer, nullable=False),  # counts what changed in it since it arrived
+    Column("revision", Integer, nullable=False),  # number of changes since it arrived
     Column("corrects", String),  # id of the campaign that this one replaces
     Column("correct_reason", Text),
     Column("corrected_by", String),  # id of the campaign that replaces this one
@@ -114,7 +116,7 @@ recordings = Table(
     UniqueConstraint("campaign", "id", name="recording_of_campaign"),
 )
 
-# Every change of what is kept, by service/store/changes.py; rows are added, never altered.
+# Every change of stored data, by service/store/changes.py; rows are added, never altered.
 changes = Table(
     "changes",
     metadata,
@@ -134,7 +136,7 @@ changes = Table(
     Index("changes_of_campaign", "campaign_id", "number"),
 )
 
-# Derived from what a recording holds: identical ones have the same (underskin.recordings.reading).
+# Derived from a recording's content: identical ones have the same (underskin.recordings.reading).
 recording_digests = Table(
     "recording_digests",
     metadata,
@@ -156,7 +158,7 @@ inversions = Table(
     Column("document", LargeBinary, nullable=False),  # the answer of /v1/campaigns/{id}/d33, compressed JSON
     # service.schemas.campaign_d33.ANSWER_VERSION
     Column("answer_version", Integer, nullable=False, server_default="0"),
-    # service.usecases.figure_data, compressed JSON; null where an earlier underskin kept it
+    # service.usecases.figure_data, compressed JSON; null if an earlier underskin stored it
     Column("numbers", LargeBinary),
 )
 
@@ -186,8 +188,8 @@ diagnoses = Table(
     Column("without", Text, nullable=False, server_default="[]"),  # JSON list of mechanisms that it leaves out
     Column("own_sha256", String, nullable=False, server_default=""),  # of the lab's own mechanisms; empty for none
     Column("kind", String, nullable=False, server_default="campaign"),  # campaign, skin or fleet
-    Column("name", Text),  # what its report is called; null for one of a single campaign
-    # of what is diagnosed together (service/store/diagnosed_together.py); empty for a single campaign
+    Column("name", Text),  # the name of its report; null for one of a single campaign
+    # of joint diagnoses (service/store/diagnosed_together.py); empty for a single campaign
     Column("together_sha256", String, nullable=False, server_default=""),
     Column("state", String, nullable=False),
     Column("progress", Float, nullable=False),  # 0 to 1
@@ -264,7 +266,7 @@ key_requirement = Table(
     Column("lifted_at", String),  # by `underskin key open`; null while keys are needed
 )
 
-# Logins of browsers. The cookie is not kept: a session is valid by its signature until it expires or is ended here.
+# Logins of browsers. The cookie is not stored: a session is valid by its signature until it expires or is ended here.
 sessions = Table(
     "sessions",
     metadata,

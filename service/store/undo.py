@@ -1,6 +1,5 @@
-"""Changes taken back, for as long as nothing builds on them: no diagnosis was asked for and no model adopted since, of
-the campaign or of its skin, and no later change of the same stands in between.
-"""
+"""Undo of changes as long as nothing builds on them: no later diagnosis or adopted model of the campaign or its
+skin, and no later change of the same thing."""
 
 from collections.abc import Sequence
 
@@ -17,11 +16,11 @@ from service.store.tables import AnyRow, campaigns, diagnoses, models, recording
 from service.store.tables import skins as skin_rows
 from service.store.times import now
 
-_FIGURES = ("withdraw", "exclude", "correct", "join")  # what changes figures; so does putting a campaign away
+_FIGURES = ("withdraw", "exclude", "correct", "join")  # changes that affect figures; discarding a campaign does too
 
 
 def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRow:
-    """Take a change back and keep that it was; the change. Raises Missing, Conflict."""
+    """Undo a change and record that; returns the change. Raises Missing, Conflict."""
     if holds(connection, models, id=change_id):
         raise Conflict("This cannot be undone: a model that was withdrawn is adopted again from its diagnosis.")
     change = kept.find(connection, change_id)
@@ -51,10 +50,10 @@ def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRo
 
 
 def standing(connection: Connection, change: AnyRow, of_same: Sequence[AnyRow]) -> str | None:
-    """Why a change stands: it was undone already, or something builds on it; None where it can be undone.
+    """Why a change cannot be undone: it was undone already, or something builds on it; None if it can.
 
-    `of_same`: all changes of its campaign; of a change of a skin itself, those of the skin that it counts as and of all
-    joined to that.
+    `of_same`: all changes of its campaign; for a change of a skin itself, those of the skin that it counts as and of
+    all joined to that.
     """
     if change.action == "undo":
         return "it took another change back"
@@ -79,7 +78,7 @@ def of_same(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
 
 
 def _stacks(change: AnyRow, other: AnyRow) -> bool:
-    """Whether a later change of the same rests on the earlier one."""
+    """Whether a later change of the same thing builds on the earlier one."""
     if other.action == "undo" or _of_figures(change) != _of_figures(other):
         return False
     return _of_figures(change) or other.skin_id == change.skin_id
@@ -90,13 +89,17 @@ def _of_figures(change: AnyRow) -> bool:
 
 
 def _joined_still(connection: Connection, change: AnyRow) -> bool:
-    """Whether the skin counts as itself, and the one that was joined to it as this skin."""
-    own, other = change.skin_id, skins.find(connection, change.before["skin_id"])
-    return skins.require_root(connection, own) == own and other is not None and other.joined_to == other.root_id == own
+    """Whether the skin is still a root, and the joined one still counts as it."""
+    skin_id, other = change.skin_id, skins.find(connection, change.before["skin_id"])
+    return (
+        skins.require_root(connection, skin_id) == skin_id
+        and other is not None
+        and other.joined_to == other.root_id == skin_id
+    )
 
 
 def _corrected_since(connection: Connection, change: AnyRow) -> str | None:
-    """The correction itself is a change of the campaign that took the place of this one."""
+    """Whether the campaign was corrected since; the correction itself is a change of the campaign that replaced it."""
     newer = select(campaigns.c.corrected_by).where(campaigns.c.id == change.campaign_id)
     corrected_by = connection.execute(newer).scalar()
     return None if corrected_by is None else f"its campaign was corrected since, by {corrected_by!r}"
@@ -117,15 +120,15 @@ def _built_since(connection: Connection, change: AnyRow) -> str | None:
 
 
 def _built_on(connection: Connection, change: AnyRow, root: str) -> str | None:
-    """What was built since on a skin and on all that count as it, or on the campaign that was changed; their times are
-    in the order in which they were made (moments.py)."""
+    """What was built since on a skin and all that count as it, or on the changed campaign; times are in order of
+    creation (moments.py)."""
     numbers = numbers_of(root)
     of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     if change.campaign_id is not None:
-        own = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id)
-        of_skin = diagnoses.c.campaign.in_(own) | has_one_of(numbers)
-    asked = select(diagnoses.c.id).where(of_skin, diagnoses.c.asked_at > change.at).limit(1)
-    if connection.execute(asked).first() is not None:
+        campaign_number = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id)
+        of_skin = diagnoses.c.campaign.in_(campaign_number) | has_one_of(numbers)
+    later_diagnosis = select(diagnoses.c.id).where(of_skin, diagnoses.c.asked_at > change.at).limit(1)
+    if connection.execute(later_diagnosis).first() is not None:
         return "it was diagnosed since"
     adopted = select(models.c.id).where(models.c.skin_id.in_(skins.members(root)), models.c.adopted_at > change.at)
     if connection.execute(adopted.limit(1)).first() is not None:
@@ -140,8 +143,8 @@ def _use_again(connection: Connection, change: AnyRow) -> None:
 
 
 def _include(connection: Connection, change: AnyRow) -> None:
-    own = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id).scalar_subquery()
-    this = (recordings.c.campaign == own) & (recordings.c.id == change.recording)
+    campaign_number = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id).scalar_subquery()
+    this = (recordings.c.campaign == campaign_number) & (recordings.c.id == change.recording)
     values = {"excluded_at": None, "excluded_from": None, "exclude_reason": None}
     connection.execute(update(recordings).where(this).values(**values))
     _campaign(connection, change, excluded=campaigns.c.excluded - 1, revision=campaigns.c.revision + 1)
@@ -159,13 +162,13 @@ def _uncorrect(connection: Connection, change: AnyRow, made_from: str | None) ->
     skins.bring_back(connection, skins.require_root(connection, older.skin_id))
 
 
-def _part(connection: Connection, change: AnyRow) -> None:
-    """Let the skin that was joined, and those that counted as it, count for themselves again."""
+def _separate(connection: Connection, change: AnyRow) -> None:
+    """Separate the joined skin, and those that counted as it."""
     other, members = change.before["skin_id"], change.before["members"]
     counted = skin_rows.c.id.in_(members) & (skin_rows.c.root_id == change.skin_id)
     connection.execute(update(skin_rows).where(counted).values(root_id=other))
-    alone = {"joined_to": None, "joined_at": None, "joined_from": None, "join_reason": None}
-    connection.execute(update(skin_rows).where(skin_rows.c.id == other).values(**alone))
+    not_joined = {"joined_to": None, "joined_at": None, "joined_from": None, "join_reason": None}
+    connection.execute(update(skin_rows).where(skin_rows.c.id == other).values(**not_joined))
 
 
 def _as_before(connection: Connection, change: AnyRow) -> None:
@@ -185,7 +188,7 @@ def _campaign(connection: Connection, change: AnyRow, **values: object) -> None:
 _TAKE_BACK = {
     "withdraw": _use_again,
     "exclude": _include,
-    "join": _part,
+    "join": _separate,
     "annotate": _as_before,
     "discard": _as_before,
 }

@@ -1,4 +1,4 @@
-"""A skin's adopted model: adopted, shown with its evidence, and from the store to rows of a request."""
+"""A skin's adopted model: adoption, display with its evidence, and its application to the rows of a request."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from underskin.prediction.adopted_model import AdoptedModel
 
 _LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
-_MOST_KNOWN = 100
-_known: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
+_MOST_CACHED = 100
+_cache: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
 _ANY_LINE = np.array([1.0])
 _OUTSIDE = "outside the tables, or the range of the law, by the adopted model"
 _Responses = tuple[Complexes, NDArray[np.bool_]]
@@ -43,7 +43,7 @@ class ModelInForce:
 
 
 def model_in_force(store: Database, skin_id: str) -> ModelInForce:
-    """The model in force; raises Refusal 404 where there is none, Conflict where it is outdated."""
+    """The model in force; raises Refusal 404 if there is none, Conflict if it is outdated."""
     with store.reading() as connection:
         skin = skins.find(connection, skin_id)
         row = None if skin is None else models.in_force(connection, skin.root_id)
@@ -59,19 +59,19 @@ def model_in_force(store: Database, skin_id: str) -> ModelInForce:
 
 
 def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
-    """The model of a diagnosis that is done; raises InvalidInput where it cannot serve."""
+    """The model of a finished diagnosis; raises InvalidInput if it cannot be used as a model."""
     from underskin.prediction.adopted_model import adopted
 
-    model = _known.get(row.id)
+    model = _cache.get(row.id)
     if model is None:
         report = diagnoses.report_of(connection, row.number)
         assert report is not None
         campaign, _ = diagnoses.campaign_of(connection, row)
         catalogue()  # another server may have added a mechanism that it has
         model = adopted(report, campaign)
-        if len(_known) >= _MOST_KNOWN:
-            _known.clear()  # by any thread at any time
-        _known[row.id] = model
+        if len(_cache) >= _MOST_CACHED:
+            _cache.clear()  # by any thread at any time
+        _cache[row.id] = model
     return model
 
 
@@ -83,14 +83,14 @@ def adopt(connection: Connection, skin_id: str, diagnosis_id: str, sender: str |
         raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
     if diagnosis.kind != "campaign":
         raise Conflict(f"Diagnosis {diagnosis.id!r} is of several campaigns: adopt the diagnosis of one of them.")
-    of_row(connection, diagnosis)  # which refuses what cannot serve
+    of_row(connection, diagnosis)  # which rejects unusable models
     return models.adopt(connection, root, diagnosis, sender)
 
 
 def version(row: AnyRow) -> ModelVersion:
     """A model without its evidence."""
-    own = [name for name in ModelVersion.model_fields if name not in ("diagnosis_id", "campaign_id")]
-    values = {name: getattr(row, f"model_{name}") for name in own}
+    names = [name for name in ModelVersion.model_fields if name not in ("diagnosis_id", "campaign_id")]
+    values = {name: getattr(row, f"model_{name}") for name in names}
     return ModelVersion(**values, diagnosis_id=row.id, campaign_id=row.campaign_id)
 
 
@@ -108,8 +108,8 @@ def entry(connection: Connection, row: AnyRow) -> ModelEntry:
     )
 
 
-def model_asked_for(store: Database, request: PressedSkinColumns) -> ModelInForce:
-    """The model that a request asks for."""
+def requested_model(store: Database, request: PressedSkinColumns) -> ModelInForce:
+    """The model named by a request."""
     if request.skin_id is None:
         raise required("skin_id", "is required with model adopted")
     if "contact" in request.model_fields_set:
@@ -122,7 +122,7 @@ class RowsUnderModel:
     """The rows of a request under an adopted model."""
 
     model_in_force: ModelInForce
-    columns: Mapping[str, Floats]  # as in the answer, those that an adopted model can tell
+    columns: Mapping[str, Floats]  # as in the answer, those that an adopted model provides
     level: Floats  # (rows,) FRF over d33 on the plateau [-]
     inside: NDArray[np.bool_]  # (rows,)
     _request: PressedSkinColumns
@@ -131,7 +131,7 @@ class RowsUnderModel:
     _by_paper: Callable[[Mask], Words | None]  # which limit of the paper's model each row exceeds that is not inside
 
     def limits(self, inside: Mask) -> Words | None:
-        """Of each row that is not inside which limit it exceeds; None where all are."""
+        """For each row outside the domain the limit that it exceeds; None if all are inside."""
         limits = self._by_paper(inside)
         return limits and [_OUTSIDE if words == NOT_FINITE else words for words in limits]
 
@@ -147,7 +147,7 @@ class RowsUnderModel:
 
 
 def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinColumns, count: int) -> RowsUnderModel:
-    """The rows of a request, so many, under an adopted model; raises InvalidInput."""
+    """The `count` rows of a request under an adopted model; raises InvalidInput."""
     given = {name: request.column(name) for name in FIELDS}
     transmitted = pressed(table, given, request.units_checked)  # which checks them
     model_in_force.model.require_skin(given)
@@ -157,8 +157,8 @@ def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinC
     rows = _distinct_columns(request, given)
     stacked = np.column_stack([np.broadcast_to(column, (count,)) for column in rows.values()])
     distinct, which = np.unique(stacked, axis=0, return_inverse=True)
-    each = dict(zip(rows, distinct.T, strict=True))
-    respond = partial(_response, model_in_force.model, request, table, each)
+    by_row = dict(zip(rows, distinct.T, strict=True))
+    respond = partial(_response, model_in_force.model, request, table, by_row)
     level, inside = respond(None)
     which = which.reshape(-1)
     on_plateau = level[:, 0].real[which]

@@ -1,4 +1,4 @@
-"""What a lab writes to a skin or a campaign, as it is kept: names, notes and tags."""
+"""Annotations of a skin or a campaign in stored form: names, notes and tags."""
 
 from collections.abc import Iterable
 
@@ -29,9 +29,9 @@ def tags(typed: Iterable[str] | None) -> str | None:
     return _bounded("tags", ", ".join(dict.fromkeys(word for word in words if word)), _LONGEST_TAGS)
 
 
-def words(kept: str | None) -> list[str]:
-    """The tags that are kept, one by one."""
-    return kept.split(", ") if kept else []
+def words(stored: str | None) -> list[str]:
+    """The stored tags as a list."""
+    return stored.split(", ") if stored else []
 
 
 def _bounded(field: str, typed: str, most: int) -> str | None:

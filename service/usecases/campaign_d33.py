@@ -65,22 +65,22 @@ def of_array(estimate: "Estimate | None") -> dict[str, float | None] | None:
 
 
 def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
-    """The entries of `moduli`, and those of `left_out` for recordings that tell none."""
-    moduli, left_out = [], []
-    for one in recordings:
-        if isinstance(one.result, InvalidInput):
-            left_out.append({"recording": one.recording, "reason": str(one.result)})
+    """The entries of `moduli`, and those of `left_out` for recordings without one."""
+    moduli, excluded = [], []
+    for recording in recordings:
+        if isinstance(recording.result, InvalidInput):
+            excluded.append({"recording": recording.recording, "reason": str(recording.result)})
             continue
         moduli.append(
             {
-                "recording": one.recording,
-                "kind": one.kind,
-                "youngs_modulus_mpa": float(to_lab("youngs_modulus_mpa", one.result.modulus)),
-                "youngs_modulus_uncertainty_mpa": float(to_lab("youngs_modulus_mpa", one.result.uncertainty)),
-                "statement": one.result.statement,
+                "recording": recording.recording,
+                "kind": recording.kind,
+                "youngs_modulus_mpa": float(to_lab("youngs_modulus_mpa", recording.result.modulus)),
+                "youngs_modulus_uncertainty_mpa": float(to_lab("youngs_modulus_mpa", recording.result.uncertainty)),
+                "statement": recording.result.statement,
             }
         )
-    return moduli, left_out
+    return moduli, excluded
 
 
 def _d33(estimate: "Estimate") -> list[dict[str, float | None]]:

@@ -18,8 +18,8 @@ from underskin.surrogate.sigma_table import SigmaTable
 def entry(row: AnyRow) -> dict[str, Any]:
     """The fields of CampaignEntry from a row of the store."""
     names = set(CampaignEntry.model_fields) - {"state", "file", "tags"}
-    told = {"state": campaigns.state(row), "file": row.source, "tags": annotations.words(row.tags)}
-    return {name: getattr(row, name) for name in names} | told
+    fields = {"state": campaigns.state(row), "file": row.source, "tags": annotations.words(row.tags)}
+    return {name: getattr(row, name) for name in names} | fields
 
 
 def detail(connection: Connection, campaign_id: str) -> CampaignDetail:

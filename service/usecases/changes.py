@@ -1,4 +1,4 @@
-"""What was changed of a skin or a campaign, in words: who, when, why, and whether it can be undone."""
+"""Changes of a skin or a campaign in words: who, when, why, and whether they can be undone."""
 
 from collections.abc import Sequence
 
@@ -7,10 +7,10 @@ from sqlalchemy import Connection
 from service.schemas.changes import Change
 from service.store import AnyRow, changes, models, undo
 
-_MOST = 20  # the latest, of which it is said whether they can be undone
+_MOST = 20  # the latest, for which it is stated whether they can be undone
 _NAMES = ("name", "title")
 _DONE = {"withdraw": "withdrawn", "discard": "discarded", "correct": "put in the place of another campaign"}
-_KEPT = set(Change.model_fields) - {"statement", "undone", "may_be_undone"}
+_STORED_FIELDS = set(Change.model_fields) - {"statement", "undone", "may_be_undone"}
 
 
 def of_campaign(connection: Connection, campaign_id: str) -> list[Change]:
@@ -37,7 +37,7 @@ def _shown(connection: Connection, rows: Sequence[AnyRow], most: int = _MOST) ->
     undone = {row.undoes for row in rows}
     return [
         Change(
-            **{name: getattr(row, name) for name in _KEPT},
+            **{name: getattr(row, name) for name in _STORED_FIELDS},
             statement=f"undone: {_words(by_id[row.undoes])}" if row.undoes in by_id else _words(row),
             undone=row.id in undone,
             may_be_undone=undo.standing(connection, row, rows) is None,
@@ -47,7 +47,7 @@ def _shown(connection: Connection, rows: Sequence[AnyRow], most: int = _MOST) ->
 
 
 def _withdrawn(row: AnyRow) -> Change:
-    """An adopted model withdrawn: it comes back by another adoption, and not by undoing that."""
+    """An adopted model withdrawn: it returns by another adoption, not by an undo."""
     return Change(
         id=row.model_id,
         action="withdraw",

@@ -1,6 +1,6 @@
-"""What can keep a server from its work: store, disk, tables, keys, backups, clock and queue, each looked at once.
+"""Health checks of a server: store, disk, tables, keys, backups, clock and queue.
 
-A check answers with what it found and, where something is wrong, what to do; it changes nothing.
+A check returns its finding and, if something is wrong, what to do; it changes nothing.
 """
 
 import os
@@ -37,7 +37,7 @@ _WAITS_S = 300.0  # a diagnosis in the queue
 
 
 def examine(settings: Settings) -> Iterator[Observation]:
-    """One finding or more of every check; a check that cannot be carried out says so."""
+    """At least one finding per check, also from a check that fails."""
     yield from _of_settings()
     yield from carried_out("data folder", _of_folder(settings.data))
     yield from carried_out("disk", _of_disk(settings))
@@ -61,7 +61,7 @@ def examine(settings: Settings) -> Iterator[Observation]:
                 for look in (_of_clock, _of_queue):
                     yield store.read(look)
         except (DBAPIError, StoreMoved, OSError) as error:
-            if answers.level is not Level.CRITICAL:  # else it is said already
+            if answers.level is not Level.CRITICAL:  # otherwise reported already
                 yield _unanswered(error)
         yield from carried_out("keys", _of_keys(settings, needed=needed, made=made))
 
@@ -132,10 +132,10 @@ def _of_store(store: Database, settings: Settings) -> Observation:
 def _of_none(settings: Settings) -> Observation:
     """Where there is no SQLite store, and perhaps was one."""
     folder = settings.data
-    left = [path for path in (folder / f"{SQLITE_FILE}{suffix}" for suffix in ("-wal", ".lock")) if path.exists()]
+    leftovers = [path for path in (folder / f"{SQLITE_FILE}{suffix}" for suffix in ("-wal", ".lock")) if path.exists()]
     last = None if settings.backup_to is None else newest(settings.backup_to)
-    if left or last is not None:
-        sign = left[0] if last is None else last.path
+    if leftovers or last is not None:
+        sign = leftovers[0] if last is None else last.path
         return Observation("store", Level.CRITICAL, f"there is none in {folder}, and there was: {sign} is left of it",
                        f"mount its disk, or put {SQLITE_FILE} back, or restore a backup, before the server is "
                        "started, which would begin an empty one")  # fmt: skip
@@ -153,13 +153,13 @@ def _count_campaigns(connection: Connection) -> int:
 
 
 def _damage(store: Database) -> str:
-    """What SQLite finds wrong with its file; PostgreSQL looks after its own."""
+    """SQLite's integrity errors; PostgreSQL checks itself."""
     if not store.is_sqlite:
         return ""
     uri = Path(str(store.url.database)).absolute().as_uri() + "?mode=ro"
     with closing(sqlite3.connect(uri, uri=True)) as connection:
-        found = str(connection.execute("PRAGMA quick_check").fetchone()[0])
-    return "" if found == "ok" else found
+        outcome = str(connection.execute("PRAGMA quick_check").fetchone()[0])
+    return "" if outcome == "ok" else outcome
 
 
 def _of_keys(settings: Settings, *, needed: bool | None, made: bool) -> Iterator[Observation]:
@@ -179,12 +179,12 @@ def _of_keys(settings: Settings, *, needed: bool | None, made: bool) -> Iterator
             yield Observation("keys", Level.OK, "none: the server answers on this machine only")
         return
     try:
-        known = keys.entries()
+        entries = keys.entries()
     except KeysUnreadable as error:
         yield Observation("keys", Level.CRITICAL, str(error), "put a copy back, or remove the file and make keys anew")
         return
-    level, advice = (Level.OK, "") if known else (Level.WARNING, "make one with `underskin key create NAME`")
-    yield Observation("keys", level, f"{len(known)} in {keys.path}", advice)
+    level, advice = (Level.OK, "") if entries else (Level.WARNING, "make one with `underskin key create NAME`")
+    yield Observation("keys", level, f"{len(entries)} in {keys.path}", advice)
 
 
 def _of_clock(connection: Connection) -> Observation:
@@ -204,15 +204,15 @@ def _of_queue(connection: Connection) -> Observation:
     silent = diagnoses.clock(connection) - diagnoses.HEARTBEAT_TIMEOUT_S
     is_running = queue.c.state == "running"
     running = _count(connection, is_running, queue.c.alive_at >= silent)
-    left = _count(connection, is_running, queue.c.alive_at < silent)
+    abandoned = _count(connection, is_running, queue.c.alive_at < silent)
     waiting = _count(connection, queue.c.state == "queued")
     oldest = connection.execute(select(func.min(queue.c.asked_at)).where(queue.c.state == "queued")).scalar()
     waits = 0.0 if oldest is None else (datetime.now(UTC) - datetime.fromisoformat(oldest)).total_seconds()
-    said = f"{running} running, {waiting} waiting"
-    if left or (waits > _WAITS_S and not running):
-        return Observation("diagnoses", Level.WARNING, f"{said}, {left} left by a server that ended",
+    message = f"{running} running, {waiting} waiting"
+    if abandoned or (waits > _WAITS_S and not running):
+        return Observation("diagnoses", Level.WARNING, f"{message}, {abandoned} left by a server that ended",
                       "see that a server with UNDERSKIN_DIAGNOSIS_WORKERS above 0 runs")  # fmt: skip
-    return Observation("diagnoses", Level.OK, said)
+    return Observation("diagnoses", Level.OK, message)
 
 
 def _count(connection: Connection, *conditions: ColumnElement[bool]) -> int:

@@ -8,7 +8,7 @@ from sqlalchemy.exc import DBAPIError
 from service.settings import Settings
 from service.store import Database, StoreError, StoreMoved, backup
 from service.usecases.observation import Level, Observation, open_to_others
-from service.usecases.scheduled_backups import OWNER, SKEW_S, foreign, kept, newest
+from service.usecases.scheduled_backups import OWNER, SKEW_S, foreign, newest, stored_backups
 
 
 def of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
@@ -29,7 +29,7 @@ def of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
                           f"delete {settings.backup_to / OWNER}")  # fmt: skip
         return
     yield from open_to_others("backups", [settings.backup_to])
-    ahead = [entry for entry in kept(settings.backup_to) if entry.age_s < -SKEW_S]
+    ahead = [copy for copy in stored_backups(settings.backup_to) if copy.age_s < -SKEW_S]
     if ahead:
         yield Observation("backups", Level.WARNING, f"{ahead[0].path.name} is dated ahead of this machine's clock",
                       "set the clock, and rename or delete what a wrong one dated")  # fmt: skip
@@ -49,12 +49,12 @@ def of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
         yield Observation("backups", Level.CRITICAL, str(error),
                       "see that it is of this store and its disk is sound; then `underskin backup FILE`")  # fmt: skip
         return
-    if (count := len(kept(settings.backup_to))) > settings.backup_keep + 1:
+    if (count := len(stored_backups(settings.backup_to))) > settings.backup_keep + 1:
         yield Observation("backups", Level.WARNING, f"{count} are kept, more than UNDERSKIN_BACKUP_KEEP = "
                           f"{settings.backup_keep}: none is deleted while the newest is far smaller than the largest",
                           "see whether the store lacks anything; if not, delete the larger ones")  # fmt: skip
-    beside = ", on the disk of the store itself" if _on_one_disk(settings.data, settings.backup_to) else ""
-    yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole{beside}")
+    addition = ", on the disk of the store itself" if _on_one_disk(settings.data, settings.backup_to) else ""
+    yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole{addition}")
 
 
 def _on_one_disk(*folders: Path) -> bool:

@@ -44,8 +44,8 @@ _NONE: dict[str, Any] = {
 def answer(
     store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None, *, soon: bool = True
 ) -> dict[str, Any]:
-    """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own; given `soon`,
-    or once what is computed could be kept."""
+    """The d33 of a campaign in its present state (fields of D33), over its flat zone or a given band; given `soon`,
+    or once the result could be stored."""
     cached = store.read(inversions.find, row, table.sha256) if band_hz is None else None
     return dict(cached) if cached is not None else _derived(store, table, row, band_hz, soon=soon)[0]
 
@@ -78,20 +78,20 @@ def adopted_answer(
     *,
     soon: bool = True,
 ) -> dict[str, Any]:
-    """As `answer`, under an adopted model: by the lines that the base model would have shown.
+    """As `answer`, under an adopted model: from the lines that the base model would have shown.
 
-    Raises InvalidInput where the campaign lacks what the model needs, or declares the skin otherwise.
+    Raises InvalidInput if the campaign lacks what the model needs, or declares the skin differently.
     """
     model, model_id = model_in_force.model, model_in_force.model_id
     cached = store.read(inversions.find_adopted, row, model_id, table.sha256) if band_hz is None else None
     if cached is not None:
         return dict(cached)
-    campaign, left_out = store.read(_used, row)
+    campaign, excluded = store.read(_used, row)
     translated, beyond = model.as_base_model(campaign, table)
-    left_out += [(name, "beyond the table under the adopted model") for name in beyond]
+    excluded += [(name, "beyond the table under the adopted model") for name in beyond]
     origin = {"model": "adopted", "model_id": model_id, "model_percent": 100 * model.unsure}
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **origin}
-    document, _, failed = _computed(document, translated, table, band_hz, left_out)
+    document, _, failed = _computed(document, translated, table, band_hz, excluded)
     if band_hz is None and not failed:
         _keep(store, row, soon, inversions.keep_adopted, model_id, table.sha256, document)
     return document
@@ -100,41 +100,41 @@ def adopted_answer(
 def derive(
     store: Database, table: SigmaTable, campaign_ids: Sequence[str], *, soon: bool = False
 ) -> dict[str, dict[str, Any]]:
-    """Compute and keep, by the paper's model and by the one in force; the paper's answers by the campaigns' ids. What
-    fails is logged, and tried again when it is asked for."""
+    """Compute and store d33 by the paper's model and by the one in force; returns the paper's answers by campaign
+    id. Failures are logged, and retried on request."""
     answers = {}
     for campaign_id in campaign_ids:
         try:
             row = store.read(campaigns.find, campaign_id)
             answers[campaign_id] = answer(store, table, row, None, soon=soon)
-            with suppress(Refusal, Conflict, InvalidInput):  # where no model is in force, or it cannot tell this one
+            with suppress(Refusal, Conflict, InvalidInput):  # without a model in force, or if it does not apply
                 adopted_answer(store, table, row, model_in_force(store, row.skin_id), None, soon=soon)
-        except Exception:  # the campaign itself is kept, and that is what was promised
+        except Exception:  # the campaign itself is stored, as promised
             logger.exception("no d33 from a campaign", extra={"fields": {"campaign": campaign_id}})
     return answers
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
-    """The findings of a campaign that is not kept yet, after what will give no d33 of its FRFs, and why."""
+    """The findings on a campaign before it is stored, after a note on FRFs that will give no d33, and why."""
     document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **_PAPER}
-    told = _computed(document, campaign, table, None, [])[0]
-    findings: list[str] = told["findings"]
-    return [*_without_d33(campaign, told, table), *findings]
+    fields = _computed(document, campaign, table, None, [])[0]
+    findings: list[str] = fields["findings"]
+    return [*_without_d33(campaign, fields, table), *findings]
 
 
-def _without_d33(campaign: Campaign, told: dict[str, Any], table: SigmaTable) -> list[str]:
-    """In a sentence, that a campaign with FRFs will give no d33, or which of it will not; and what L is."""
-    frfs = sum(isinstance(one, FrfRecording) for one in campaign.recordings)
-    left = [entry["reason"] for entry in told["left_out"] if entry["recording"] is None]
-    if not frfs or (told["status"] == "ok" and not left):
+def _without_d33(campaign: Campaign, fields: dict[str, Any], table: SigmaTable) -> list[str]:
+    """A sentence if a campaign's FRFs, or some of them, will give no d33; and the load parameter L."""
+    frfs = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings)
+    reasons = [exclusion["reason"] for exclusion in fields["left_out"] if exclusion["recording"] is None]
+    if not frfs or (fields["status"] == "ok" and not reasons):
         return []
-    if told["status"] == "ok":
-        more = f"; and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
-        said = f"these will give no d33: {'; '.join(left[:_MOST_NAMED])}{more}."
+    if fields["status"] == "ok":
+        more = f"; and {len(reasons) - _MOST_NAMED} more" if len(reasons) > _MOST_NAMED else ""
+        sentence = f"these will give no d33: {'; '.join(reasons[:_MOST_NAMED])}{more}."
     else:
-        said = f"no d33 will come of this: {told['reason']}."
-    if "L = " not in said:
-        return [said]
+        sentence = f"no d33 will come of this: {fields['reason']}."
+    if "L = " not in sentence:
+        return [sentence]
     most = float(table.domain["load_parameter"][1])
     depth = 100 * (9 / 16 * most) ** (2 / 3)  # % of the radius, by Hertz on an incompressible half space
     meaning = (
@@ -142,12 +142,12 @@ def _without_d33(campaign: Campaign, told: dict[str, Any], table: SigmaTable) ->
         f"L = {most:g}, about {depth:.0f} % of R deep in a thick layer; a larger sphere or a smaller preload stays "
         "within it."
     )
-    return [said, meaning]
+    return [sentence, meaning]
 
 
 def complete(store: Database, table: SigmaTable, root: str) -> dict[str, dict[str, Any]]:
-    """Compute what is missing of a skin's current campaigns, and keep it where it can be kept soon; the answers by the
-    campaigns' ids."""
+    """Compute what is missing for a skin's current campaigns, and store it if that is possible soon; returns the
+    answers by campaign id."""
     missing = store.read(inversions.missing_of_skin, root, table.sha256)
     return derive(store, table, [row.id for row in missing], soon=True)
 
@@ -161,10 +161,10 @@ def _derived(
     *,
     soon: bool,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
-    campaign, left_out = store.read(_used, row)
+    """Answer and numbers, computed, and stored if they are of the flat zone; `spreads`: if known already."""
+    campaign, excluded = store.read(_used, row)
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
-    document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
+    document, inversion, failed = _computed(document, campaign, table, band_hz, excluded)
     if inversion is not None:
         document["array_solved"] = _array_solved(campaign, table, band_hz, inversion)
     numbers = figure_data.numbers(campaign, inversion, spreads)
@@ -176,15 +176,16 @@ def _derived(
 def of_sensors(document: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """d33 with its standard uncertainty [pC/N] of those sensors of an answer that have both, by their ids."""
     values = {
-        entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"]) for entry in document["sensors"]
+        of_sensor["sensor"]: (of_sensor["d33_pc_per_n"], of_sensor["d33_uncertainty_pc_per_n"])
+        for of_sensor in document["sensors"]
     }
     return {sensor: both for sensor, both in values.items() if None not in both}
 
 
 def _used(connection: Connection, row: AnyRow) -> tuple[Campaign, list[tuple[str, str]]]:
-    """The campaign without what is excluded; and that, with the reasons."""
-    left_out = [(left.recording, left.reason) for left in campaigns.excluded_of(connection, row.number)]
-    return campaigns.load(connection, row, with_excluded=False), left_out
+    """The campaign without its excluded recordings; and these, with the reasons."""
+    excluded = [(exclusion.recording, exclusion.reason) for exclusion in campaigns.excluded_of(connection, row.number)]
+    return campaigns.load(connection, row, with_excluded=False), excluded
 
 
 def _computed(
@@ -192,25 +193,25 @@ def _computed(
     campaign: Campaign,
     table: SigmaTable,
     band_hz: BandHz | None,
-    left_out: Sequence[tuple[str, str]],
+    excluded: Sequence[tuple[str, str]],
 ) -> "tuple[dict[str, Any], Inversion | None, bool]":
-    """The document with the campaign's figures, the inversion that they are of, where there is one, and whether they
-    failed to be computed; `left_out`: recordings, reasons.
+    """The document with the campaign's figures, its inversion if there is one, and whether the computation failed;
+    `excluded`: recordings with reasons.
 
-    Raises InvalidInput where the band is refused.
+    Raises InvalidInput for an invalid band.
     """
-    entries = [{"recording": recording, "reason": reason} for recording, reason in left_out]
+    entries = [{"recording": recording, "reason": reason} for recording, reason in excluded]
     try:
         fields, inversion = _inverted(campaign, table, band_hz)
-        whole = {**document, **fields, "left_out": entries + fields["left_out"]}
-        D33.model_validate(orjson.loads(orjson.dumps(whole)))  # what is kept can be answered
+        full_document = {**document, **fields, "left_out": entries + fields["left_out"]}
+        D33.model_validate(orjson.loads(orjson.dumps(full_document)))  # stored answers must be valid
     except InvalidInput:  # of the band
         raise
     except Exception as error:
         logger.exception("no d33 from a campaign", extra={"fields": {"campaign": document["campaign_id"]}})
         reason = f"the figures cannot be computed ({type(error).__name__}: {error}); the server's log says more"
         return {**document, **_NONE, "reason": reason, "moduli": [], "left_out": entries}, None, True
-    return whole, inversion, False
+    return full_document, inversion, False
 
 
 def _inverted(
@@ -228,16 +229,16 @@ def _inverted(
         if band_hz is not None and error.field == "band_hz":
             raise
         findings = [finding.sentence for finding in plausibility.at_reading(campaign)]
-        told = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
-        return {**_NONE, **told}, None
-    left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]
-    return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + without_modulus}, inversion
+        fields = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
+        return {**_NONE, **fields}, None
+    excluded = [{"recording": None, "reason": exclusion.sentence} for exclusion in inversion.left_out]
+    return {**of_inversion(inversion), "moduli": moduli, "left_out": excluded + without_modulus}, inversion
 
 
 def _array_solved(
     campaign: Campaign, table: SigmaTable, band_hz: BandHz | None, inversion: "Inversion"
 ) -> dict[str, float | None] | None:
-    """The field of `D33`; null too where the contact table cannot be read, which the log says."""
+    """The field of `D33`; also null if the contact table cannot be read, which is logged."""
     from underskin.inversion.other_contact import array_d33_by_other
 
     try:
@@ -248,7 +249,7 @@ def _array_solved(
 
 
 def _keep(store: Database, row: AnyRow, soon: bool, change: Callable[..., None], *derived: Any) -> None:
-    """Where it cannot be kept, or not `soon`, the answer is given all the same."""
+    """Store the answer; if that fails, or is not possible `soon`, it is only returned."""
     try:
         store.require_hope(soon=soon)
         with store.writing(soon=soon) as connection:

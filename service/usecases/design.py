@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, SweepAnswer
-from service.usecases.tables import contact_asked_for
+from service.usecases.tables import requested_contact
 from underskin import Indenter, Skin
 from underskin.errors import out_of_range
 from underskin.physics.skin import INCOMPRESSIBLE
@@ -16,26 +16,26 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import checked, to_lab
 
 
-def design_of(table: SigmaTable, asked: DesignRequest) -> Design:
+def design_of(table: SigmaTable, request: DesignRequest) -> Design:
     """The design that is asked for; raises InvalidInput."""
-    skin, indenter, preload = _pressed(asked)
-    require_apart(asked.pitch_mm, asked.sensor_radius_mm)
-    contact = contact_asked_for(table, asked.contact)
-    return design(contact, skin, indenter, preload, asked.pitch_mm * 1e-3, asked.dip_percent / 100)
+    skin, indenter, preload = _pressed(request)
+    require_apart(request.pitch_mm, request.sensor_radius_mm)
+    contact = requested_contact(table, request.contact)
+    return design(contact, skin, indenter, preload, request.pitch_mm * 1e-3, request.dip_percent / 100)
 
 
-def _pressed(asked: DesignRequest) -> tuple[Skin, Indenter, float]:
-    given = {name: getattr(asked, name) for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")}
-    skin = Skin.from_lab(**given, units_checked=asked.units_checked)
-    indenter = Indenter.from_lab(indenter_radius_mm=asked.indenter_radius_mm, units_checked=asked.units_checked)
-    return skin, indenter, float(checked("preload_n", asked.preload_n, units_checked=asked.units_checked))
+def _pressed(request: DesignRequest) -> tuple[Skin, Indenter, float]:
+    values = {name: getattr(request, name) for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")}
+    skin = Skin.from_lab(**values, units_checked=request.units_checked)
+    indenter = Indenter.from_lab(indenter_radius_mm=request.indenter_radius_mm, units_checked=request.units_checked)
+    return skin, indenter, float(checked("preload_n", request.preload_n, units_checked=request.units_checked))
 
 
-def other_sigma(table: SigmaTable, asked: DesignRequest, answer: DesignAnswer) -> float | None:
+def other_sigma(table: SigmaTable, request: DesignRequest, answer: DesignAnswer) -> float | None:
     """σ by the other contact model, where it differs by more than 1 %; None elsewhere."""
     if answer.sigma is None:
         return None
-    sigma = float(transmission(contact_asked_for(table, OTHER[asked.contact]), *_pressed(asked)).sigma)
+    sigma = float(transmission(requested_contact(table, OTHER[request.contact]), *_pressed(request)).sigma)
     return sigma if abs(sigma / answer.sigma - 1) > STATED else None
 
 
@@ -46,15 +46,15 @@ def require_apart(pitch_mm: float, sensor_radius_mm: float) -> None:
         raise out_of_range("pitch_mm", pitch_mm, allowed)
 
 
-def design_answer(table: SigmaTable, asked: DesignRequest, designed: Design) -> DesignAnswer:
+def design_answer(table: SigmaTable, request: DesignRequest, designed: Design) -> DesignAnswer:
     """A design in lab units."""
     contact, resolution = designed.contact, designed.resolution
-    given = {"preload_n": np.array(asked.preload_n), "poisson_ratio": np.array(INCOMPRESSIBLE)}
-    contact_model = contact_asked_for(table, asked.contact)
-    limits = limits_of_pressed(contact_model, contact, given, contact.inside, 1)
+    values = {"preload_n": np.array(request.preload_n), "poisson_ratio": np.array(INCOMPRESSIBLE)}
+    contact_model = requested_contact(table, request.contact)
+    limits = limits_of_pressed(contact_model, contact, values, contact.inside, 1)
     frf = None
-    if asked.d33_pc_per_n is not None:
-        d33 = checked("d33_pc_per_n", asked.d33_pc_per_n, units_checked=asked.units_checked)
+    if request.d33_pc_per_n is not None:
+        d33 = checked("d33_pc_per_n", request.d33_pc_per_n, units_checked=request.units_checked)
         frf = _number(to_lab("frf_pc_per_n", contact.frf(d33)))
     return DesignAnswer(
         contact=contact_model.name,

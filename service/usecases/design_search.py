@@ -1,9 +1,9 @@
-"""Which skins resolve what is asked: thickness, sensor radius and pitch, searched over the domain of the table.
+"""Search for skins with a required resolution: thickness, sensor radius and pitch over the domain of the table.
 
-What is asked for is the two-point separation of `POST /v1/design`: from which distance on two equal contacts show as
-two wherever the row of sensors lies. The contacts are with the layer itself (`solved`). A thin layer spreads the stress
-less, and a fine pitch samples it more densely; a sensor cannot be wider than the pitch, and two contacts cannot be
-nearer than where they touch.
+The requirement is the two-point separation of `POST /v1/design`: the distance from which two equal contacts show as two
+for every position of the row of sensors. The contacts are with the layer itself (`solved`). A thin layer spreads the
+stress less and a fine pitch samples it more densely; a sensor cannot be wider than the pitch, and two contacts cannot
+be nearer than touching.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.tables import contact_asked_for
+from service.usecases.tables import requested_contact
 from service.usecases.two_point import largest_pitch
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
@@ -24,7 +24,7 @@ from underskin.surrogate.off_centre_sigma import sigma_beside
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
-THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # what is searched, within the table
+THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # the search range, within the table
 _THICKNESSES, _RADII = 8, 6
 _CONTACT: ContactName = "solved"
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors
@@ -57,8 +57,8 @@ class Offer:
 
 @dataclass(frozen=True)
 class Searched:
-    """The region, which pairs of it meet all limits, what is offered (best first), and in sentences which limit keeps
-    everything out; none of these where something is offered."""
+    """The region, the mask of feasible pairs, the offers (best first) and, if there are none, sentences on the limit
+    that excludes all designs."""
 
     region: Region
     feasible: Mask
@@ -72,19 +72,19 @@ def search(table: SigmaTable, demand: DesignDemand) -> Searched:
     region = _region(table, demand.model_copy(update=anything))
     resolves = np.isfinite(region.largest_pitch_mm)
     limits = _limits(region, demand)
-    feasible = resolves & np.all([limit.kept for limit in limits], axis=0)
+    feasible = resolves & np.all([limit.satisfied for limit in limits], axis=0)
     offers = _offers(table, demand, region, feasible)
     return Searched(region, feasible, offers, [] if offers else _binding(table, demand, region, resolves, limits))
 
 
 @lru_cache(maxsize=32)
 def _region(table: SigmaTable, demand: DesignDemand) -> Region:
-    """All pairs, whatever can be made."""
+    """All pairs, whether or not they can be made."""
     indenter = Indenter.from_lab(indenter_radius_mm=demand.indenter_radius_mm)
     force = float(checked("preload_n", demand.preload_n))
     d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
     any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
-    contact_model = contact_asked_for(table, _CONTACT)
+    contact_model = requested_contact(table, _CONTACT)
     thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * _thinnest_mm(contact_model, any_skin, indenter, force)))
     thickness = _steps(thinnest, max(demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
     radii = _steps(RADIUS_MM[0], max(0.28 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
@@ -95,11 +95,11 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     numbers = reached.small_strain_a_over_h, reached.rt_over_h, reached.load_parameter
     apart = (2 * contact <= demand.resolution_mm) & (4 * radii[:, None] <= demand.resolution_mm)
     pitch = np.full(h.shape, np.nan)
-    for place in zip(*np.nonzero(reached.inside & apart), strict=True):
-        offset, response = sigma_beside(contact_model, *(float(part[place]) for part in numbers))
+    for index in zip(*np.nonzero(reached.inside & apart), strict=True):
+        offset, response = sigma_beside(contact_model, *(float(part[index]) for part in numbers))
         if np.isfinite(response).all():
-            finest, touching = 2 * float(radii[place[0]]), float(contact[place[1]])
-            pitch[place] = _largest_pitch_mm(offset * float(h[place]), response, finest, touching, demand)
+            finest, touching = 2 * float(radii[index[0]]), float(contact[index[1]])
+            pitch[index] = _largest_pitch_mm(offset * float(h[index]), response, finest, touching, demand)
     return Region(contact, thickness, radii, pitch, np.asarray(to_lab("frf_pc_per_n", reached.frf(d33))))
 
 
@@ -114,8 +114,8 @@ def _thinnest_mm(contact_model: ContactModel, skin: Skin, indenter: Indenter, fo
 def _largest_pitch_mm(
     offset: Floats, response: Floats, finest_mm: float, contact_mm: float, demand: DesignDemand
 ) -> float:
-    """From `finest_mm` on, in steps of 0.01 mm: what few placements and distances say, reduced until all those of
-    `POST /v1/design` say the same; NaN where nothing nearby does. `offset`: in m."""
+    """From `finest_mm` on, in steps of 0.01 mm: the pitch from few placements and distances, reduced until all of
+    `POST /v1/design` agree; NaN if none nearby does. `offset`: in m."""
     distance, finest, touching = (
         float(to_si("x_mm", value)) for value in (demand.resolution_mm, finest_mm, 2 * contact_mm)
     )
@@ -133,7 +133,7 @@ def _largest_pitch_mm(
 
 
 def _steps(low: float, high: float, most: float, count: int) -> Floats:
-    """Even in the logarithm, as numbers that one would write."""
+    """Geometric steps, as round numbers."""
     return np.array([float(f"{value:.3g}") for value in np.geomspace(low, min(high, most), count)])
 
 
@@ -147,9 +147,10 @@ def _rounded_up(value: float) -> float:
 
 @dataclass(frozen=True)
 class _Limit:
-    """Which pairs keep it, in words what would do without it, and the number of each pair of which that is the most."""
+    """The mask of pairs that satisfy a limit, the words for the value that would suffice, and the largest such value
+    for each pair."""
 
-    kept: Mask
+    satisfied: Mask
     words: str
     number: Floats
 
@@ -179,7 +180,7 @@ def _limits(region: Region, demand: DesignDemand) -> list[_Limit]:
 def _binding(
     table: SigmaTable, demand: DesignDemand, region: Region, resolves: Mask, limits: Sequence[_Limit]
 ) -> list[str]:
-    """Which limit keeps everything out, each with the number that would do."""
+    """Which limit excludes all designs, each with the value that would suffice."""
     finest = float(region.thickness_mm[0]), RADIUS_MM[0], 2 * RADIUS_MM[0]
     if not np.isfinite(region.frf_pc_per_n).any():
         return [f"The table of σ: {_forward(table, demand, *finest)[1].limit}"]
@@ -194,12 +195,12 @@ def _binding(
         reached = "tells no two contacts apart" if apart is None else f"tells them apart from {apart:.3g} mm on"
         skin = f"h {finest[0]:g} mm, rT {finest[1]:g} mm, pitch {finest[2]:g} mm"
         return [f"The spread of the stress: even the finest skin of the search ({skin}) {reached}"]
-    told = []
+    messages = []
     for limit in limits:
-        others = resolves & np.all([other.kept for other in limits if other is not limit], axis=0)
-        if others.any() and not (others & limit.kept).any():
-            told.append(limit.words.format(float(limit.number[others].max())))
-    return told or ["The limits together: no one of them alone keeps every design out"]
+        other_limits = resolves & np.all([another.satisfied for another in limits if another is not limit], axis=0)
+        if other_limits.any() and not (other_limits & limit.satisfied).any():
+            messages.append(limit.words.format(float(limit.number[other_limits].max())))
+    return messages or ["The limits together: no one of them alone keeps every design out"]
 
 
 def _offers(table: SigmaTable, demand: DesignDemand, region: Region, feasible: Mask) -> list[Offer]:
@@ -217,17 +218,17 @@ def _offers(table: SigmaTable, demand: DesignDemand, region: Region, feasible: M
     offers: list[Offer] = []
     for merit, value in merits.items():
         made = _offer(table, demand, region, int(np.argmax(value)), merit)
-        same = [place for place, one in enumerate(offers) if one.request == made.request]
+        same = [index for index, offer in enumerate(offers) if offer.request == made.request]
         if not same:
             offers.append(made)
-        for place in same:
-            offers[place] = replace(offers[place], merit=f"{offers[place].merit}, {merit}")
+        for index in same:
+            offers[index] = replace(offers[index], merit=f"{offers[index].merit}, {merit}")
     return offers
 
 
-def _offer(table: SigmaTable, demand: DesignDemand, region: Region, place: int, merit: str) -> Offer:
+def _offer(table: SigmaTable, demand: DesignDemand, region: Region, index: int, merit: str) -> Offer:
     """One pair at its largest pitch, as `POST /v1/design` has it."""
-    row, column = np.unravel_index(place, region.largest_pitch_mm.shape)
+    row, column = np.unravel_index(index, region.largest_pitch_mm.shape)
     thickness, radius = float(region.thickness_mm[column]), float(region.sensor_radius_mm[row])
     return Offer(merit, *_forward(table, demand, thickness, radius, float(region.largest_pitch_mm[row, column])))
 
@@ -236,6 +237,6 @@ def _forward(
     table: SigmaTable, demand: DesignDemand, thickness: float, radius: float, pitch: float
 ) -> tuple[DesignRequest, DesignAnswer]:
     """What `POST /v1/design` says of one design [mm]."""
-    asked = demand.model_dump(exclude={"resolution_mm", "thinnest_mm", "least_pitch_mm", "least_frf_pc_per_n"})
-    request = DesignRequest(thickness_mm=thickness, sensor_radius_mm=radius, pitch_mm=pitch, **asked)
+    fields = demand.model_dump(exclude={"resolution_mm", "thinnest_mm", "least_pitch_mm", "least_frf_pc_per_n"})
+    request = DesignRequest(thickness_mm=thickness, sensor_radius_mm=radius, pitch_mm=pitch, **fields)
     return request, design_answer(table, request, design_of(table, request))

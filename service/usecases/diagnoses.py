@@ -1,4 +1,4 @@
-"""Diagnoses: asked for, of one campaign or of several together, and described."""
+"""Diagnoses of one campaign or of several together: requested and described."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,7 +9,7 @@ from service.jobs.runner import basis
 from service.schemas.diagnoses import MOST_TOGETHER, AskForFleet, AskForSkin, DiagnosisEntry
 from service.store import AnyRow, Conflict, campaigns, diagnosed_together, diagnoses, skins
 from service.store.diagnosed_together import Member, Together
-from service.usecases.mechanisms import whole_catalogue
+from service.usecases.mechanisms import full_catalogue
 from underskin.errors import ErrorCode, InvalidInput, not_one_of
 from underskin.recordings.validation import name as checked_name
 from underskin.surrogate.sigma_table import SigmaTable
@@ -20,25 +20,25 @@ _FEWEST = 2  # campaigns of one skin
 def ask(
     connection: Connection, campaign_id: str, table: SigmaTable, sender: str | None, without: Sequence[str] = ()
 ) -> AnyRow:
-    """Queue the diagnosis of a campaign, with this table, version and catalogue; the one that it has already, where it
-    has one. Raises InvalidInput where `without` names a mechanism that is not in the catalogue."""
-    _require_known(without)
+    """Queue the diagnosis of a campaign with this table, version and catalogue, or return the existing one. Raises
+    InvalidInput if `without` names an unknown mechanism."""
+    _require_listed(without)
     return diagnoses.ask(connection, campaign_id, basis(table.sha256), sender, without)
 
 
 def ask_of_skin(
-    connection: Connection, skin_id: str, table: SigmaTable, sender: str | None, asked: AskForSkin
+    connection: Connection, skin_id: str, table: SigmaTable, sender: str | None, request: AskForSkin
 ) -> AnyRow:
-    """As `ask`, of the campaigns of a skin together.
+    """As `ask`, for campaigns of a skin together.
 
-    Raises Missing where there is no such skin, InvalidInput that names the campaign that is not its own, and Conflict
-    where one is not in use, there are fewer than two, or none has FRFs.
+    Raises Missing for an unknown skin, InvalidInput naming a campaign of another skin, and Conflict if one is not in
+    use, if there are fewer than two, or if none has FRFs.
     """
     root = skins.require_root(connection, skin_id)
-    _require_known(asked.without)
+    _require_listed(request.without)
     members = diagnosed_together.usable(connection, root)
-    if asked.campaigns is not None:
-        members = _chosen(connection, root, asked.campaigns, members)
+    if request.campaigns is not None:
+        members = _chosen(connection, root, request.campaigns, members)
     elif len(members) < _FEWEST:
         count = "no campaign" if not members else "one campaign"
         raise Conflict(f"Skin {root!r} has {count} in use with recordings; {_FEWEST} or more are diagnosed together.")
@@ -47,19 +47,18 @@ def ask_of_skin(
             f"Of these campaigns of skin {root!r} none has FRFs in use, by which campaigns are compared: diagnose "
             "curves each campaign by itself, or send their files together, as a correction of one."
         )
-    name = root if asked.name is None else checked_name("name", asked.name, False)
-    together = Together("skin", name, members, [root] if asked.campaigns is None else [])
-    return _together(connection, together, table, sender, asked.without)
+    name = root if request.name is None else checked_name("name", request.name, False)
+    together = Together("skin", name, members, [root] if request.campaigns is None else [])
+    return _together(connection, together, table, sender, request.without)
 
 
-def ask_of_fleet(connection: Connection, table: SigmaTable, sender: str | None, asked: AskForFleet) -> AnyRow:
-    """As `ask`, of all campaigns of several skins together.
+def ask_of_fleet(connection: Connection, table: SigmaTable, sender: str | None, request: AskForFleet) -> AnyRow:
+    """As `ask`, for all campaigns of several skins together.
 
-    Raises InvalidInput that names the skin that is not there or was given before, and Conflict where one has no
-    campaign in use.
+    Raises InvalidInput naming a skin that is unknown or repeated, and Conflict for one without a campaign in use.
     """
     roots: list[str] = []
-    for index, skin_id in enumerate(asked.skins):
+    for index, skin_id in enumerate(request.skins):
         row = skins.find(connection, skin_id)
         if row is None:
             raise InvalidInput("skins", skin_id, "must be the id of a skin", index, code=ErrorCode.NOT_ONE_OF)
@@ -67,21 +66,21 @@ def ask_of_fleet(connection: Connection, table: SigmaTable, sender: str | None, 
             allowed = f"must be another skin than skins[{roots.index(row.root_id)}], which is the same one"
             raise InvalidInput("skins", skin_id, allowed, index, code=ErrorCode.NOT_UNIQUE)
         roots.append(str(row.root_id))
-    name = checked_name("name", asked.name, False)
-    _require_known(asked.without)
+    name = checked_name("name", request.name, False)
+    _require_listed(request.without)
     members: list[Member] = []
     for root in sorted(roots):  # so that all requests lock campaigns in the same order
-        own = diagnosed_together.usable(connection, root)
-        if not own:
+        members_of_skin = diagnosed_together.usable(connection, root)
+        if not members_of_skin:
             raise Conflict(f"Skin {root!r} has no campaign in use with recordings: leave it out of the fleet.")
-        members += own
-    return _together(connection, Together("fleet", name, members, sorted(roots)), table, sender, asked.without)
+        members += members_of_skin
+    return _together(connection, Together("fleet", name, members, sorted(roots)), table, sender, request.without)
 
 
 def ask_again(
     connection: Connection, diagnosis_id: str, table: SigmaTable, sender: str | None, without: Sequence[str]
 ) -> AnyRow:
-    """Ask for the same of the campaigns as they are now; a diagnosis of all campaigns is then of new ones too."""
+    """Request the same for the campaigns' present state; a diagnosis of all campaigns then includes new ones."""
     row = diagnoses.find(connection, diagnosis_id)
     if row.kind == "campaign":
         return ask(connection, row.campaign_id, table, sender, without)
@@ -91,8 +90,8 @@ def ask_again(
         return ask_of_fleet(connection, table, sender, AskForFleet(skins=all_of, name=row.name, without=without))
     members = diagnoses.members(connection, row)
     chosen = None if all_of else [member.campaign_id for member in members]
-    asked = AskForSkin(campaigns=chosen, name=row.name, without=without)
-    return ask_of_skin(connection, members[0].skin_id, table, sender, asked)
+    request = AskForSkin(campaigns=chosen, name=row.name, without=without)
+    return ask_of_skin(connection, members[0].skin_id, table, sender, request)
 
 
 def _together(
@@ -103,35 +102,35 @@ def _together(
     return diagnoses.ask_together(connection, together, basis(table.sha256), sender, without)
 
 
-def _chosen(connection: Connection, root: str, asked: Sequence[str], usable: Sequence[Member]) -> list[Member]:
-    """Those asked for of the campaigns that may be used, by arrival."""
+def _chosen(connection: Connection, root: str, campaign_ids: Sequence[str], usable: Sequence[Member]) -> list[Member]:
+    """The requested ones of the usable campaigns, by arrival."""
     by_id = {member.campaign_id: member for member in usable}
-    for index, campaign_id in enumerate(asked):
-        if campaign_id in asked[:index]:
+    for index, campaign_id in enumerate(campaign_ids):
+        if campaign_id in campaign_ids[:index]:
             raise InvalidInput("campaigns", campaign_id, "must be given once", index, code=ErrorCode.NOT_UNIQUE)
         if campaign_id not in by_id:
             raise _not_usable(connection, root, campaign_id, index)
-    return [member for member in usable if member.campaign_id in asked]
+    return [member for member in usable if member.campaign_id in campaign_ids]
 
 
 def _not_usable(connection: Connection, root: str, campaign_id: str, index: int) -> Exception:
     """Why a campaign cannot be diagnosed with others of a skin."""
-    own = {row.id: row for row in campaigns.of_skin(connection, root)}
-    if campaign_id not in own:
+    rows_of_skin = {row.id: row for row in campaigns.of_skin(connection, root)}
+    if campaign_id not in rows_of_skin:
         allowed = f"must be a campaign of skin {root!r} or of one joined to it"
         return InvalidInput("campaigns", campaign_id, allowed, index, code=ErrorCode.NOT_ONE_OF)
-    why = campaigns.unused(own[campaign_id])
+    why = campaigns.unused(rows_of_skin[campaign_id])
     return Conflict(
         f"campaigns[{index}] = {campaign_id!r} is not diagnosed: "
         + ("all of its recordings are excluded." if why is None else f"it was {why}.")
     )
 
 
-def _require_known(without: Sequence[str]) -> None:
-    known = whole_catalogue()
+def _require_listed(without: Sequence[str]) -> None:
+    by_name = full_catalogue()
     for name in without:
-        if name not in known:
-            raise not_one_of("without", name, known)
+        if name not in by_name:
+            raise not_one_of("without", name, by_name)
 
 
 def entries(connection: Connection, rows: Sequence[AnyRow]) -> list[dict[str, Any]]:
@@ -144,7 +143,7 @@ def entries(connection: Connection, rows: Sequence[AnyRow]) -> list[dict[str, An
         | {
             "outdated": diagnoses.outdated(row),
             "without": diagnoses.without(row),
-            "campaign_ids": [one.campaign_id for one in members.get(row.number, ())] or [row.campaign_id],
+            "campaign_ids": [member.campaign_id for member in members.get(row.number, ())] or [row.campaign_id],
         }
         for row in rows
     ]

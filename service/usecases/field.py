@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from service.schemas.field import FieldAnswer, FieldQuery
-from service.usecases.tables import contact_asked_for
+from service.usecases.tables import requested_contact
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.prediction.answers import lab_columns
 from underskin.prediction.stress_field import field_from_lab
@@ -15,12 +15,12 @@ from underskin.units import to_lab
 _OPTIONS = {"contact", "r_points", "depth_points", "units_checked"}
 
 
-def field_answer(table: SigmaTable, asked: FieldQuery) -> FieldAnswer:
+def field_answer(table: SigmaTable, query: FieldQuery) -> FieldAnswer:
     """The stress that is asked for; raises InvalidInput."""
-    given = asked.model_dump(exclude=_OPTIONS)
-    contact = contact_asked_for(table, asked.contact)
-    field = field_from_lab(contact, given, asked.r_points, asked.depth_points, units_checked=asked.units_checked)
-    inside, tabulated = bool(field.contact.inside[0]), asked.poisson_ratio == INCOMPRESSIBLE
+    values = query.model_dump(exclude=_OPTIONS)
+    contact = requested_contact(table, query.contact)
+    field = field_from_lab(contact, values, query.r_points, query.depth_points, units_checked=query.units_checked)
+    inside, tabulated = bool(field.contact.inside[0]), query.poisson_ratio == INCOMPRESSIBLE
     return FieldAnswer(
         model="layer" if tabulated else "linear_layer",
         contact=contact.name,

@@ -1,6 +1,5 @@
-"""What the figures of a campaign show, in numbers of a size that hardly grows with it: kept beside its d33, so that
-they are drawn without reading its recordings.
-"""
+"""The numbers of a campaign's figures, of almost constant size: stored with its d33, so that figures need not read
+its recordings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -22,21 +21,22 @@ _RANGES = ("magnitude_pc_per_n", "phase_deg", "coherence")
 
 
 def numbers(
-    campaign: Campaign, inversion: "Inversion | None", known: list[dict[str, Any]] | None = None
+    campaign: Campaign, inversion: "Inversion | None", known_spreads: list[dict[str, Any]] | None = None
 ) -> dict[str, Any]:
-    """`recordings`: columns of FRF against preload; `spreads`: FRFs of recordings alike, over all lines, whatever the
-    band, and so perhaps `known`; None where they are few."""
+    """`recordings`: columns of FRF against preload; `spreads`: FRFs of equal recordings over all lines, independent
+    of the band and therefore possibly `known_spreads`; None if they are few."""
     few = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings) <= MOST_SINGLE
-    lines = [] if known or few else measured(campaign)
+    lines = [] if known_spreads or few else measured(campaign)
     alike = [_plain(spread) for spread in spreads_of(lines)] if len(lines) > MOST_SINGLE else None
     return {
         "recordings": {} if inversion is None else _preload_columns(campaign, inversion),
-        "spreads": known or alike,
+        "spreads": known_spreads or alike,
     }
 
 
 def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
-    """The FRF recordings that have an FRF, or those of them that are called `show` or of the sensor of that name."""
+    """The FRF recordings that have an FRF, optionally only the one called `show` or those of the sensor of that
+    name."""
     from underskin.recordings.frf.estimation import lines_of
 
     pairs = []
@@ -71,12 +71,12 @@ def spreads(cached: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
     return [
         FrfSpread(
             **{
-                **entry,
-                "frequency_hz": np.array(entry["frequency_hz"], dtype=float),
-                **{name: tuple(np.array(values, dtype=float) for values in entry[name]) for name in _RANGES},
+                **cached_answer,
+                "frequency_hz": np.array(cached_answer["frequency_hz"], dtype=float),
+                **{name: tuple(np.array(values, dtype=float) for values in cached_answer[name]) for name in _RANGES},
             }
         )
-        for entry in cached
+        for cached_answer in cached
     ]
 
 

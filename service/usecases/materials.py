@@ -32,12 +32,12 @@ class Material:
 
 
 def _elastomer(name: str, modulus_mpa: float, poisson_ratio: str, how: str, source: str) -> Material:
-    own = "-".join("".join(sign if sign.isalnum() else " " for sign in name.lower()).split())
-    return Material(own, name, "youngs_modulus_mpa", modulus_mpa, poisson_ratio, how, source)
+    words = "-".join("".join(sign if sign.isalnum() else " " for sign in name.lower()).split())
+    return Material(words, name, "youngs_modulus_mpa", modulus_mpa, poisson_ratio, how, source)
 
 
-def _film(own: str, name: str, d33: float, how: str, source: str) -> Material:
-    return Material(own, name, "d33_pc_per_n", d33, "", how, source)
+def _film(material_id: str, name: str, d33: float, how: str, source: str) -> Material:
+    return Material(material_id, name, "d33_pc_per_n", d33, "", how, source)
 
 
 ELASTOMERS = (
@@ -72,8 +72,8 @@ MATERIALS = {material.id: material for material in (*ELASTOMERS, *FILMS)}
 
 def with_values(values: Mapping[str, float]) -> dict[str, str]:
     """Names of the materials whose value a design has, by field; empty where it has none's."""
-    named: dict[str, list[str]] = {one.field: [] for one in MATERIALS.values()}
-    for one in MATERIALS.values():
-        if values.get(one.field) == one.value:
-            named[one.field].append(one.name)
+    named: dict[str, list[str]] = {listed.field: [] for listed in MATERIALS.values()}
+    for listed in MATERIALS.values():
+        if values.get(listed.field) == listed.value:
+            named[listed.field].append(listed.name)
     return {field: " or ".join(names) for field, names in named.items()}

@@ -1,4 +1,5 @@
-"""The catalogue as it is read: each mechanism with its parameters, what acts like it, where it was found, its file."""
+"""The catalogue for display: each mechanism with its parameters, similar mechanisms, the diagnoses that found it,
+and its file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 ALIKE = 0.7  # cosine from which on another mechanism is named
 _MOST_TWINS = 4
-_OTHER_AXES = {  # those that no unnamed law follows
+_OTHER_AXES = {  # axes that no unlisted law follows
     "position_mm": "the place of the sphere",
     "phase": "the phase",
     "sample_height_mm": "the sample's height",
@@ -31,10 +32,10 @@ _OTHER_AXES = {  # those that no unnamed law follows
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """A mechanism: `twins` act alike on the reference recordings, the most alike first, or else `nearest` comes
-    closest; `found`: the diagnoses that hold it present with a probability that needs no rivals beside it, whatever
-    else they leave open, `possible`: how many more state it with less; `lacking`: why there is no picture of it;
-    `file` is the document of one of the lab's own."""
+    """A mechanism. `twins`: mechanisms with a similar effect on the reference recordings, the most similar first; if
+    there are none, `nearest` is the closest. `found`: diagnoses that state it with a probability that needs no
+    alternative, `possible`: the number of diagnoses with less. `lacking`: why there is no picture of it; `file`: the
+    document of a mechanism of the lab's own."""
 
     entry: MechanismEntry
     needs: str
@@ -50,53 +51,56 @@ class CatalogueEntry:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """All entries, and how many diagnoses there are in which one could have been found."""
+    """All entries, and the number of diagnoses that could have found one."""
 
     entries: Sequence[CatalogueEntry]
     diagnoses: int
 
 
 def catalogue(store: Database, table: SigmaTable) -> Catalogue:
-    """As it is now."""
-    known, listed = mechanisms.catalogue(), {entry.name: entry for entry in mechanisms.entries()}
+    """The present catalogue."""
+    laws, listed = mechanisms.catalogue(), {item.name: item for item in mechanisms.entries()}
     alike, seen = _twins(table, digest()), findings(store)
     return Catalogue(
         [
             _entry(mechanism, listed[name], alike.get(name, ()), seen.by_mechanism.get(name, ()))
-            for name, mechanism in known.items()
+            for name, mechanism in laws.items()
         ],
         seen.diagnoses,
     )
 
 
 def read_ahead(store: Database, table: SigmaTable) -> None:
-    """Read what takes long at first, before somebody asks for it."""
+    """Load what is slow at first use."""
     mechanisms.catalogue()
     _twins(table, digest())
     findings(store)
 
 
 def effect(name: str, table: SigmaTable) -> LawEffect:
-    """What one does to the reference rig; raises Unsupported where that has not what it follows."""
+    """The effect of a mechanism on the reference rig; raises Unsupported if that lacks the quantity on which it
+    depends."""
     return _effect(name, table, digest())
 
 
 @lru_cache(maxsize=256)
-def _effect(name: str, table: SigmaTable, _own: str) -> LawEffect:
+def _effect(name: str, table: SigmaTable, _digest: str) -> LawEffect:
     return law_effect(name, table)
 
 
 @lru_cache(maxsize=4)
-def _twins(table: SigmaTable, _own: str) -> Mapping[str, tuple[Twin, ...]]:
+def _twins(table: SigmaTable, _digest: str) -> Mapping[str, tuple[Twin, ...]]:
     return law_twins(table)
 
 
 def _entry(
-    mechanism: Mechanism, entry: MechanismEntry, alike: Sequence[Twin], found: Sequence[FoundIn]
+    mechanism: Mechanism, entry: MechanismEntry, alike: Sequence[Twin], occurrences: Sequence[FoundIn]
 ) -> CatalogueEntry:
-    own = isinstance(mechanism, DeclaredMechanism)
+    is_of_lab = isinstance(mechanism, DeclaredMechanism)
     by_name = {
-        one.name: one for kind in mechanism.kinds for one in mechanism.parameters(reference_campaign(kind), kind)
+        parameter.name: parameter
+        for kind in mechanism.kinds
+        for parameter in mechanism.parameters(reference_campaign(kind), kind)
     }
     return CatalogueEntry(
         entry,
@@ -105,10 +109,10 @@ def _entry(
         list(by_name.values()),
         [replace(twin, axes=tuple(map(_axis, twin.axes))) for twin in alike if twin.alike >= ALIKE][:_MOST_TWINS],
         alike[0] if alike else None,
-        [one for one in found if one.probability >= EXPLAINED],
-        sum(one.probability < EXPLAINED for one in found),
-        lacking(mechanism) if own else None,
-        _file(entry) if own else None,
+        [occurrence for occurrence in occurrences if occurrence.probability >= EXPLAINED],
+        sum(occurrence.probability < EXPLAINED for occurrence in occurrences),
+        lacking(mechanism) if is_of_lab else None,
+        _file(entry) if is_of_lab else None,
     )
 
 
@@ -118,7 +122,7 @@ def _axis(name: str) -> str:
 
 
 def _file(entry: MechanismEntry) -> str | None:
-    """The document that a lab's own mechanism was read from; None where it is gone since."""
+    """The document from which a lab's own mechanism was read; None if it is gone."""
     assert entry.package is not None
     path: Path = mechanism_files.folder_of_lab() / entry.package.rsplit(" ", 1)[0]
     try:

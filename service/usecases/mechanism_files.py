@@ -15,12 +15,12 @@ from underskin.errors import FileError
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.folder import FOLDER
 
-_SET_ASIDE = "discarded"  # a folder beside the files, from which none is read
+_SET_ASIDE = "discarded"  # a folder next to the files that is not read
 
 
 @dataclass(frozen=True)
 class PutBack:
-    """Files of a backup, by name, that the folder did not have, and those in place of others, which were set aside."""
+    """Names of a backup's files that the folder lacked, and of those that replaced others, which were set aside."""
 
     written: tuple[str, ...]
     replaced: tuple[str, ...]
@@ -34,7 +34,7 @@ def folder_of_lab() -> Path:
 
 
 def write(file: Path, content: bytes) -> None:
-    """Whole or not at all; raises FileExistsError where there is one."""
+    """Write a file atomically; raises FileExistsError if it exists."""
     durable.make_folder(file.parent)
     with tempfile.NamedTemporaryFile(dir=file.parent, prefix=".new-") as new:
         new.write(content)
@@ -45,7 +45,7 @@ def write(file: Path, content: bytes) -> None:
 
 
 def set_aside(file: Path) -> None:
-    """Move a file to where it is kept but not read."""
+    """Move a file to a folder that is not read."""
     aside = file.parent / _SET_ASIDE
     aside.mkdir(exist_ok=True)
     file.rename(aside / f"{file.stem} {now().replace(':', '')}.yaml")
@@ -59,18 +59,18 @@ def of_mechanism(name: str) -> list[Path]:
 
 
 def remember(connection: Connection) -> None:
-    """Keep the files as they are in the store, whose backups then hold them."""
+    """Store the present files in the store, so that backups contain them."""
     folder = folder_of_lab()
     if folder.is_dir():  # else those of the last backup stay
         own_mechanisms.replace(connection, {file.name: content for file, content in _present().items()})
 
 
 def put_back(connection: Connection) -> PutBack:
-    """The files that the store keeps into the folder: one that differs, or bears the same mechanism, is set aside."""
-    kept, folder = own_mechanisms.found(connection), folder_of_lab()
+    """Restore the stored files to the folder; a file that differs, or declares the same mechanism, is set aside."""
+    stored, folder = own_mechanisms.found(connection), folder_of_lab()
     written: list[str] = []
     replaced: list[str] = []
-    for name, content in kept.items():
+    for name, content in stored.items():
         if Path(name).name != name or not name.endswith(".yaml"):  # in no backup that this service made
             continue
         present = _present()

@@ -1,7 +1,7 @@
-"""Where mechanisms were found in this lab: the diagnoses, of campaigns as they are now, whose reports state them.
+"""Diagnoses of this lab that found a mechanism: those of campaigns in their present state.
 
-Reports do not change once they are made, so that what each states is read once and kept by its id: after a restore a
-number may be that of another.
+Finished reports do not change, so the mechanisms of each are read once and cached by its id: after a restore a number
+may be that of another.
 """
 
 import threading
@@ -36,32 +36,32 @@ class FoundIn:
 
 @dataclass(frozen=True)
 class Findings:
-    """By the mechanism's name where it was found, the latest first; and how many diagnoses were looked at."""
+    """The occurrences of each mechanism by name, the latest first; and the number of diagnoses examined."""
 
     by_mechanism: Mapping[str, Sequence[FoundIn]]
     diagnoses: int
 
 
 def findings(store: Database) -> Findings:
-    """Of the latest diagnosis of each campaign in use, and of campaigns together, that left nothing out; one whose
-    campaigns are all in a later one is not counted again."""
+    """From the latest diagnosis of each campaign in use, and of campaigns together, that used all mechanisms; one
+    whose campaigns are all in a later one is skipped."""
     latest = store.read(_latest)
     stated = _stated(store, {row.number: row.id for row in latest})
-    found: dict[str, list[FoundIn]] = {}
+    by_law: dict[str, list[FoundIn]] = {}
     for row in latest:
-        of_one = row.kind == "campaign"
+        of_campaign = row.kind == "campaign"
         for name, probability in stated[row.id]:
-            entry = FoundIn(
+            occurrence = FoundIn(
                 row.id,
-                row.campaign_id if of_one else None,
+                row.campaign_id if of_campaign else None,
                 row.skin_id,
-                row.campaign_name if of_one else row.name,
+                row.campaign_name if of_campaign else row.name,
                 row.ended_at,
                 row.verdict,
                 probability,
             )
-            found.setdefault(name, []).append(entry)
-    return Findings(found, len(latest))
+            by_law.setdefault(name, []).append(occurrence)
+    return Findings(by_law, len(latest))
 
 
 def _latest(connection: Connection) -> list[AnyRow]:
@@ -70,16 +70,16 @@ def _latest(connection: Connection) -> list[AnyRow]:
     ordered = connection.execute(query.order_by(rows_of_diagnoses.c.number.desc()))
     rows = [row for row in ordered if diagnoses.outdated(row) is None]
     members = diagnosed_together.members_of(connection, [row.number for row in rows if row.kind != "campaign"])
-    alone, together = set(), list[tuple[str, frozenset[int]]]()
+    campaigns_seen, together = set(), list[tuple[str, frozenset[int]]]()
     latest: list[AnyRow] = []
     for row in rows:
-        own = frozenset(one.number for one in members.get(row.number, ()))
+        campaign_numbers = frozenset(member.number for member in members.get(row.number, ()))
         if row.kind == "campaign":
-            covered = row.campaign in alone
-            alone.add(row.campaign)
+            covered = row.campaign in campaigns_seen
+            campaigns_seen.add(row.campaign)
         else:
-            covered = any(kind == row.kind and own <= later for kind, later in together)
-            together.append((row.kind, own))
+            covered = any(kind == row.kind and campaign_numbers <= later for kind, later in together)
+            together.append((row.kind, campaign_numbers))
         if not covered:
             latest.append(row)
     return latest
@@ -89,9 +89,11 @@ def _stated(store: Database, ids: Mapping[int, str]) -> Mapping[str, tuple[tuple
     """Mechanisms with their probabilities by the diagnosis' id; `ids` by number. Those not yet read are read a few at
     a time."""
     with _lock:
-        known = _read.setdefault(store, {})
-        missing = [number for number, name in ids.items() if name not in known]
+        cached = _read.setdefault(store, {})
+        missing = [number for number, name in ids.items() if name not in cached]
         for start in range(0, len(missing), _AT_ONCE):
             for number, report in store.read(diagnoses.reports_of, missing[start : start + _AT_ONCE]).items():
-                known[ids[number]] = tuple((one["name"], one["probability"]) for one in report["mechanisms"])
-        return dict(known)
+                cached[ids[number]] = tuple(
+                    (mechanism["name"], mechanism["probability"]) for mechanism in report["mechanisms"]
+                )
+        return dict(cached)

@@ -1,4 +1,4 @@
-"""The catalogue of mechanisms, and the lab's own in it: files (`mechanism/1`) in the folder of UNDERSKIN_MECHANISMS."""
+"""The catalogue of mechanisms including the lab's own: files (`mechanism/1`) in the folder of UNDERSKIN_MECHANISMS."""
 
 import threading
 from collections.abc import Mapping
@@ -23,27 +23,25 @@ _loaded = {"digest": digest()}
 
 
 def catalogue() -> Mapping[str, Mechanism]:
-    """The mechanisms by name, with the lab's own as they are now: another server may have changed them.
-
-    Files of the lab's folder that cannot be used are left out (`unusable`).
-    """
+    """The mechanisms by name, with the lab's own as they are now: another server may have changed them. Invalid
+    files of the lab's folder are skipped (`unusable`)."""
     with _lock:
-        found = digest()
-        if found != _loaded["digest"]:
+        files_digest = digest()
+        if files_digest != _loaded["digest"]:
             CATALOGUE.reload()
-            _loaded["digest"] = found
+            _loaded["digest"] = files_digest
     return CATALOGUE.load().mechanisms
 
 
-def whole_catalogue() -> Mapping[str, Mechanism]:
-    """The same; raises Refusal 409 where a file of the lab's folder cannot be used: a diagnosis without it would be
-    another one."""
-    known = catalogue()
+def full_catalogue() -> Mapping[str, Mechanism]:
+    """The same; raises Refusal 409 if a file of the lab's folder is invalid: a diagnosis without it would be a
+    different one."""
+    laws = catalogue()
     try:
         CATALOGUE.require_complete()
     except FileError as error:
         raise Refusal(409, f"A mechanism of the lab's own cannot be used: {error}. Mend or remove it.") from None
-    return known
+    return laws
 
 
 def entries() -> list[MechanismEntry]:
@@ -52,7 +50,7 @@ def entries() -> list[MechanismEntry]:
 
 
 def unusable() -> list[UnusableFile]:
-    """The files of the lab's folder that the catalogue lacks, and why."""
+    """The invalid files of the lab's folder, and why."""
     catalogue()
     return [
         UnusableFile(file=Path(error.file).name, reason=": ".join(filter(None, (error.place, error.reason))))
@@ -61,21 +59,21 @@ def unusable() -> list[UnusableFile]:
 
 
 def keep(content: bytes) -> MechanismEntry:
-    """Keep a document as one more of the lab's own; nothing is written before its entry is known.
+    """Store a document as a mechanism of the lab's own; its entry is made before anything is written.
 
-    Raises FileError where it cannot be used, and Refusal 409 where its name is taken.
+    Raises FileError for an invalid document, and Refusal 409 for a name in use.
     """
     folder = mechanism_files.folder_of_lab()
     mechanism = checked(content, "", in_sandbox=True)
     file = folder / f"{mechanism.name}.yaml"
-    entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
+    new_entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
     if mechanism.name in catalogue():
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.")
     try:
         mechanism_files.write(file, content)
     except FileExistsError:
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.") from None
-    return entry
+    return new_entry
 
 
 def keep_found(connection: Connection, diagnosis_id: str, name: str, description: str | None) -> MechanismEntry:
@@ -94,9 +92,9 @@ def keep_found(connection: Connection, diagnosis_id: str, name: str, description
 
 
 def discard(connection: Connection, name: str) -> MechanismEntry:
-    """Take one of the lab's own out of the catalogue; its file is kept in a folder of discarded ones.
+    """Remove a mechanism of the lab's own from the catalogue; its file is moved to a folder of discarded ones.
 
-    Raises Refusal: 404 for an unknown name, 409 where it is not the lab's own or a model in force needs it.
+    Raises Refusal: 404 for an unknown name, 409 if it is not the lab's own or a model in force needs it.
     """
     mechanism = catalogue().get(name)
     if mechanism is None:
@@ -105,7 +103,7 @@ def discard(connection: Connection, name: str) -> MechanismEntry:
         raise Refusal(409, f"{name!r} is not one of the lab's own mechanisms: it cannot be discarded.")
     for row in models.all_in_force(connection):
         report = diagnoses.report_of(connection, row.number)
-        if report is not None and name in {entry["name"] for entry in report["mechanisms"]}:
+        if report is not None and name in {reported["name"] for reported in report["mechanisms"]}:
             raise Refusal(409, f"The model in force of skin {row.model_skin_id!r} needs {name!r}: withdraw it first.")
     discarded = _entry(mechanism, CATALOGUE.packages.get(name))
     for file in mechanism_files.of_mechanism(name):
@@ -126,7 +124,7 @@ def _entry(mechanism: Mechanism, package: str | None) -> MechanismEntry:
         package=package,
         own=stated is not None,
         parameters=[
-            MechanismParameter(name=entry.name, unit=entry.unit, low=entry.low, high=entry.high)
-            for entry in stated or ()
+            MechanismParameter(name=parameter.name, unit=parameter.unit, low=parameter.low, high=parameter.high)
+            for parameter in stated or ()
         ],
     )

@@ -1,4 +1,4 @@
-"""What a check of a server found: in words, how bad it is, and what to do."""
+"""The finding of a server check: in words, its severity, and what to do."""
 
 import stat
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ FILES_OPEN = "see that the disk answers, and that this user is the one that runs
 
 
 class Level(IntEnum):
-    """As monitoring systems count: the exit status of the worst finding."""
+    """Severity as in monitoring systems: the exit status of the worst finding."""
 
     OK = 0
     WARNING = 1
@@ -29,10 +29,10 @@ class Observation:
     advice: str = ""
 
 
-def carried_out(check: str, found: Iterator[Observation]) -> Iterator[Observation]:
-    """What a check finds; and that, where a disk or a file lets it go no further."""
+def carried_out(check: str, observations: Iterator[Observation]) -> Iterator[Observation]:
+    """The findings of a check, and one more if a disk or file error ends it early."""
     try:
-        yield from found
+        yield from observations
     except OSError as error:
         yield Observation(check, Level.CRITICAL, f"cannot be looked at: {first_line(error)}", FILES_OPEN)
 
@@ -40,8 +40,8 @@ def carried_out(check: str, found: Iterator[Observation]) -> Iterator[Observatio
 def open_to_others(check: str, folders: Sequence[Path]) -> Iterator[Observation]:
     """Files in these folders that others than their owner may read or write."""
     files = [path for folder in folders for path in sorted(folder.glob("*")) if path.is_file()]
-    others = [str(path) for path in files if stat.S_IMODE(path.stat().st_mode) & 0o077]
-    if others:
-        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
-        said = f"others than their owner may open {', '.join(others[:3])}{more}"
-        yield Observation(check, Level.WARNING, said, "chmod 600 these files")
+    open_paths = [str(path) for path in files if stat.S_IMODE(path.stat().st_mode) & 0o077]
+    if open_paths:
+        more = f" and {len(open_paths) - 3} more" if len(open_paths) > 3 else ""
+        message = f"others than their owner may open {', '.join(open_paths[:3])}{more}"
+        yield Observation(check, Level.WARNING, message, "chmod 600 these files")

@@ -9,8 +9,8 @@ import numpy as np
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
-from service.usecases.adopted_models import model_asked_for, press, require_paper
-from service.usecases.tables import contact_asked_for
+from service.usecases.adopted_models import press, requested_model, require_paper
+from service.usecases.tables import requested_contact
 from underskin.errors import ErrorCode, InvalidInput, conflicting, out_of_range, required
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
@@ -29,12 +29,12 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     if request.model == "adopted":
         return _adopted_frf(table, store, request)
     require_paper(request)
-    contact = contact_asked_for(table, request.contact)
+    contact = requested_contact(table, request.contact)
     columns = _sent(request, *FIELDS, "d33_pc_per_n")
     count = rows(columns)
     with _all_refused(columns, request.units_checked):
         answer = answers.frf(contact, columns, request.units_checked)
-    frequency = _asked_lines(request)
+    frequency = _requested_lines(request)
     results = dict(answer.columns)
     shared: dict[str, Any] = {"contact": contact.name}
     if frequency is not None:
@@ -47,12 +47,12 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
 
 @contextmanager
 def _all_refused(columns: Mapping[str, Floats], units_checked: bool) -> Iterator[None]:
-    """Raises SeveralInvalid with all that is wrong where one of the columns was refused."""
+    """Raises SeveralInvalid with all errors if one of the columns was rejected."""
     try:
         yield
     except InvalidInput as first:
-        others = [error for error in answers.refused(columns, units_checked) if error.field != first.field]
-        raise SeveralInvalid([first, *others]) from None
+        other_errors = [error for error in answers.refused(columns, units_checked) if error.field != first.field]
+        raise SeveralInvalid([first, *other_errors]) from None
 
 
 def _sent(request: PressedSkinColumns, *names: str) -> dict[str, Floats]:
@@ -63,12 +63,12 @@ def _sent(request: PressedSkinColumns, *names: str) -> dict[str, Floats]:
 def _adopted_frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     columns = _sent(request, *FIELDS, "d33_pc_per_n", *ADOPTED_COLUMNS)
     count = rows(columns)
-    pressed = press(model_asked_for(store, request), table, request, count)
+    pressed = press(requested_model(store, request), table, request, count)
     pressed.require_lines("frequency_hz")
     d33 = checked("d33_pc_per_n", columns["d33_pc_per_n"], units_checked=request.units_checked)
     results = {**pressed.columns, "frf_pc_per_n": to_lab("frf_pc_per_n", d33 * pressed.level)}
     inside = pressed.inside & np.isfinite(results["frf_pc_per_n"])
-    frequency = _asked_lines(request)
+    frequency = _requested_lines(request)
     shared: dict[str, Any] = {"model_id": pressed.model_in_force.model_id}
     if frequency is not None:
         response = np.where(pressed.inside[:, None], pressed.response(frequency), np.nan + 0j)
@@ -80,7 +80,7 @@ def _adopted_frf(table: SigmaTable, store: Database, request: FrfColumns) -> Col
     return Columns(count, request.model, table.sha256, inside, results, shared, frequency, limits=limits)
 
 
-def _asked_lines(request: FrfColumns) -> Floats | None:
+def _requested_lines(request: FrfColumns) -> Floats | None:
     return None if request.frequency_hz is None else non_negative("frequency_hz", request.column("frequency_hz"))
 
 
@@ -98,8 +98,8 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     if request.model == "adopted":
         return _adopted_d33(table, store, request)
     require_paper(request)
-    contact = contact_asked_for(table, request.contact)
-    measured = _plateau(request) if request.frf_pc_per_n is None else _given(request)
+    contact = requested_contact(table, request.contact)
+    measured = _plateau(request) if request.frf_pc_per_n is None else _values(request)
     columns = _sent(request, *FIELDS) | measured
     count = _rows(request, columns)
     with _all_refused(columns, request.units_checked):
@@ -119,17 +119,17 @@ def _rows(request: D33Columns, columns: Mapping[str, Floats]) -> int:
 
 
 def _adopted_d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
-    given = _sent(request, *FIELDS, *ADOPTED_COLUMNS)
-    model_in_force = model_asked_for(store, request)
+    sent_values = _sent(request, *FIELDS, *ADOPTED_COLUMNS)
+    model_in_force = requested_model(store, request)
     if request.frf_pc_per_n is None:
         _require_lines(request)
-        each_row = np.zeros(len(request.frf_re_pc_per_n or ()))
-        pressed = press(model_in_force, table, request, rows(given | {"frf_re_pc_per_n": each_row}))
+        ones_of_rows = np.zeros(len(request.frf_re_pc_per_n or ()))
+        pressed = press(model_in_force, table, request, rows(sent_values | {"frf_re_pc_per_n": ones_of_rows}))
         pressed.require_lines("frf_im_pc_per_n")
         measured = _plateau(request, lambda line: pressed.level[:, None] / pressed.response(line))
     else:
-        measured = answers.measured(_given(request))
-        pressed = press(model_in_force, table, request, _rows(request, given | measured))
+        measured = answers.measured(_values(request))
+        pressed = press(model_in_force, table, request, _rows(request, sent_values | measured))
         pressed.require_lines("frequency_hz")
     value = measured["frf_pc_per_n"] / pressed.level
     unsure = np.hypot(measured["frf_uncertainty_pc_per_n"] / pressed.level, value * pressed.columns["rel_error"])
@@ -141,7 +141,7 @@ def _adopted_d33(table: SigmaTable, store: Database, request: D33Columns) -> Col
     return Columns(len(pressed.level), request.model, table.sha256, inside, columns, shared, limits=limits)
 
 
-def _given(request: D33Columns) -> dict[str, Floats]:
+def _values(request: D33Columns) -> dict[str, Floats]:
     """Plateau values as they were sent."""
     for name in sorted(request.lists):
         if getattr(request, name) is not None:
@@ -158,7 +158,7 @@ def _require_lines(request: D33Columns) -> None:
 def _plateau(request: D33Columns, factor: Callable[[Floats], Complexes] | None = None) -> dict[str, Floats]:
     """Mean over the band of each row's lines, and its standard error unless an uncertainty was sent.
 
-    `factor`, of the frequencies, makes of each line what a plateau would show (rows, lines).
+    `factor` of the frequencies converts each line to its plateau value (rows, lines).
     """
     _require_lines(request)
     frequency = non_negative("frequency_hz", request.column("frequency_hz"))

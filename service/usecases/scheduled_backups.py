@@ -1,10 +1,10 @@
-"""Backups on a schedule: written, read back, and the oldest ones deleted, while the server answers.
+"""Backups on a schedule, while the server answers: written, read back, and the oldest deleted.
 
-When the next one is due is read from the folder itself, so that a restart neither skips one nor makes one too many. Of
-several servers that share a database and a folder one makes it: it holds a lock on the folder meanwhile. A folder is
-for one store: a file in it says for which, and servers of others make none there. None is deleted while the newest is
-far smaller than the largest, as where a server was started on an empty data folder. Where a folder that held backups is
-empty or gone, its disk is away: none is made in its place, also after a restart, since the data folder notes it.
+The time of the next backup is read from the folder itself, so a restart neither skips nor repeats one. Of several
+servers that share a database and a folder one makes it, holding a lock on the folder. A folder belongs to one store,
+named by a file in it; servers of other stores make none there. Nothing is deleted while the newest backup is far
+smaller than the largest, as when a server was started on an empty data folder. If a folder that held backups is empty
+or gone, its disk is missing: none is made in its place, also after a restart, because the data folder notes it.
 """
 
 import fcntl
@@ -32,7 +32,7 @@ logger = logging.getLogger("underskin")
 _PREFIX, _STAMP = "underskin-", "%Y%m%dT%H%M%SZ"
 _NAME = re.compile(rf"{_PREFIX}(\d{{8}}T\d{{6}}Z)\.(?:sqlite3|pgdump)")
 SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
-_SMALLER = 0.5  # of the largest one's bytes: it is not the same store, or most of it is gone
+_SMALLER = 0.5  # of the largest one's bytes: below, it is another store, or most of it is gone
 _LOCK = ".underskin-backup-lock"
 OWNER = ".underskin-backups-of"  # holds the identity of the store whose folder it is
 _NOTE = "scheduled-backups-in"  # of the data folder: holds the address of the folder that they were last made in
@@ -52,7 +52,7 @@ _failed = Counter("underskin_backup_failures", "Scheduled backups that failed.")
 
 
 @dataclass(frozen=True)
-class Kept:
+class StoredBackup:
     """A scheduled backup in the folder."""
 
     path: Path
@@ -60,28 +60,28 @@ class Kept:
 
     @property
     def age_s(self) -> float:
-        """Seconds since it was made, by this machine's clock; less than 0 where one of the two clocks was wrong."""
+        """Seconds since it was made, by this machine's clock; negative if one of the clocks was wrong."""
         return (datetime.now(UTC) - self.made_at).total_seconds()
 
 
-def kept(folder: Path) -> list[Kept]:
-    """The scheduled backups in a folder, the newest first; what bears another name is left alone."""
+def stored_backups(folder: Path) -> list[StoredBackup]:
+    """The scheduled backups in a folder, the newest first; files with other names are ignored."""
     entries = []
     for path in folder.glob(f"{_PREFIX}*"):
         match = _NAME.fullmatch(path.name)
         with suppress(ValueError):  # no such day
             if match is not None:
-                entries.append(Kept(path, datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC)))
-    return sorted(entries, key=lambda entry: entry.made_at, reverse=True)
+                entries.append(StoredBackup(path, datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC)))
+    return sorted(entries, key=lambda copy: copy.made_at, reverse=True)
 
 
-def newest(folder: Path) -> Kept | None:
-    """The newest one that is not of the future: what a wrong clock dated ahead makes none superfluous."""
-    return next((entry for entry in kept(folder) if entry.age_s > -SKEW_S), None)
+def newest(folder: Path) -> StoredBackup | None:
+    """The newest one not in the future: a backup dated ahead by a wrong clock makes none superfluous."""
+    return next((copy for copy in stored_backups(folder) if copy.age_s > -SKEW_S), None)
 
 
 def foreign(store: Database, folder: Path) -> str:
-    """In words, that a folder holds the backups of another store, or that it cannot be told whose; else empty."""
+    """In words, that a folder holds the backups of another store, or of an unknown one; else empty."""
     try:
         owner = (folder / OWNER).read_text().strip()
     except (FileNotFoundError, NotADirectoryError):
@@ -90,10 +90,10 @@ def foreign(store: Database, folder: Path) -> str:
         return f"whose backups {folder} holds cannot be read ({OWNER}: {error.strerror})"
     if not owner:
         return ""
-    own = store.read(identity.find)
-    if owner == own:
+    identity_of_store = store.read(identity.find)
+    if owner == identity_of_store:
         return ""
-    return f"{folder} holds the backups of another store ({owner}; this one is {own or 'new'})"
+    return f"{folder} holds the backups of another store ({owner}; this one is {identity_of_store or 'new'})"
 
 
 class ScheduledBackups:
@@ -108,17 +108,17 @@ class ScheduledBackups:
         self._owned = False  # whether the folder has been seen to be this store's
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="backups", daemon=True)
-        self._seen: Kept | None = None
+        self._seen: StoredBackup | None = None
         self._seen_bytes = 0
 
     @property
-    def last(self) -> Kept | None:
-        """The newest of this store, as of the last look: this waits for no disk."""
+    def last(self) -> StoredBackup | None:
+        """The newest of this store as of the last check, without waiting for a disk."""
         return self._seen
 
     @property
     def overdue(self) -> bool:
-        """Whether the newest is older than twice the time between two, or there is none of this store."""
+        """Whether the newest is older than two intervals, or there is none of this store."""
         return self._age_s() > 2 * self._every_s
 
     def start(self) -> None:
@@ -147,7 +147,7 @@ class ScheduledBackups:
                 wait = min(_RETRY_S, self._every_s / 10)
 
     def _see(self) -> None:
-        """Keep what `/metrics` says of the newest, which waits for no disk and no database."""
+        """Cache the values of `/metrics` on the newest, so that they wait for no disk or database."""
         last = self._newest()
         self._seen_bytes = 0 if last is None else last.path.stat().st_size
         self._seen = last
@@ -164,17 +164,17 @@ class ScheduledBackups:
             last = newest(self._folder)
             if not ours:
                 return
-            self._own()
+            self._claim_folder()
             if last is not None and last.age_s < self._every_s:
                 return
-            for left in self._folder.glob(f"{_PREFIX}*.part*"):  # of a server that ended half way
-                left.unlink()
+            for leftover in self._folder.glob(f"{_PREFIX}*.part*"):  # of a server that ended half way
+                leftover.unlink()
             started = time.monotonic()
             suffix = ".sqlite3" if self._store.is_sqlite else ".pgdump"
             file = self._folder / f"{_PREFIX}{datetime.now(UTC):{_STAMP}}{suffix}"
             try:
                 self._store.write(mechanism_files.remember)
-            except StorageFailed as error:  # a disk that takes nothing here keeps nobody from a backup elsewhere
+            except StorageFailed as error:  # an unwritable disk here must not prevent a backup elsewhere
                 logger.warning("mechanisms of the lab's own are in the backup as they were at the last one: %s", error)
             backup.make(self._store, file)
             self._rotate(file.stat().st_size)
@@ -183,7 +183,7 @@ class ScheduledBackups:
         fields = {"file": str(file), "bytes": file.stat().st_size, "seconds": round(time.monotonic() - started, 1)}
         logger.info("backup made and read back", extra={"fields": fields})
 
-    def _own(self) -> None:
+    def _claim_folder(self) -> None:
         """Note whose folder this is; raises StoreError where it is another store's."""
         if words := foreign(self._store, self._folder):
             raise StoreError(f"{words}; give each store a folder of its own (UNDERSKIN_BACKUP_TO)")
@@ -192,7 +192,7 @@ class ScheduledBackups:
             durable.write_text(owner, self._store.read(identity.find) or self._store.write(identity.ensure))
         self._owned = True
         if not self._is_noted():
-            with suppress(OSError):  # a disk that takes nothing here keeps nobody from a backup elsewhere
+            with suppress(OSError):  # an unwritable disk here must not prevent a backup elsewhere
                 durable.write_text(self._note, self._address)
 
     def _is_noted(self) -> bool:
@@ -201,14 +201,14 @@ class ScheduledBackups:
             return self._note.read_text() == self._address
         return False
 
-    def _newest(self) -> Kept | None:
+    def _newest(self) -> StoredBackup | None:
         """The newest one of this store."""
         return None if foreign(self._store, self._folder) else newest(self._folder)
 
     def _rotate(self, size: int) -> None:
-        """Delete the oldest, but none while the one just made, of so many bytes, is far smaller than the largest."""
-        entries = [entry for entry in kept(self._folder) if entry.age_s > -SKEW_S]
-        largest = max(entry.path.stat().st_size for entry in entries)
+        """Delete the oldest, unless the one just made, of so many bytes, is far smaller than the largest."""
+        entries = [copy for copy in stored_backups(self._folder) if copy.age_s > -SKEW_S]
+        largest = max(copy.path.stat().st_size for copy in entries)
         if size < _SMALLER * largest:
             logger.warning(
                 "the backup just made has %d bytes, an earlier one %d: no old ones are deleted until this is looked at",

@@ -1,4 +1,4 @@
-"""Skins: described, joined where two ids mean one; d33 of their sensors over time, with trends and what they omit."""
+"""Skins: described, joined if two ids mean one; d33 of their sensors over time, with trends and exclusions."""
 
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
@@ -51,7 +51,7 @@ def detail(connection: Connection, skin_id: str) -> SkinDetail:
     row = skins.find(connection, skins.require_root(connection, skin_id))
     assert row is not None
     rig = skins.rig_of(connection, row.id)
-    others = skins.joined_to(connection, row.id)
+    joined_skins = skins.joined_to(connection, row.id)
     return SkinDetail(
         id=row.id,
         created_at=row.created_at,
@@ -59,27 +59,29 @@ def detail(connection: Connection, skin_id: str) -> SkinDetail:
         remark=row.remark,
         tags=annotations.words(row.tags),
         discarded_at=row.discarded_at,
-        joined=[joined(other) for other in others],
-        differences=differences(connection, [row.id, *(other.id for other in others)]),
+        joined=[joined(joined_skin) for joined_skin in joined_skins],
+        differences=differences(connection, [row.id, *(joined_skin.id for joined_skin in joined_skins)]),
         rig=None if rig is None else orjson.loads(rig),
     )
 
 
 def differences(connection: Connection, ids: Sequence[str]) -> list[str]:
-    """What the campaigns sent for several skins declare differently of them, in words."""
+    """Differences between the declarations of several skins by their campaigns, in words."""
     rows = {skin_id: campaigns.describing(connection, skin_id, alone=True) for skin_id in ids}
     declared = {skin_id: row.about["skin"] for skin_id, row in rows.items() if row is not None}
-    told = []
+    messages = []
     for name in _DECLARED:
         values = {skin_id: skin[name] for skin_id, skin in declared.items() if skin.get(name) is not None}
         if len(set(values.values())) > 1:
-            told.append(f"{name} is " + " and ".join(f"{value:g} of {skin_id}" for skin_id, value in values.items()))
-    return told
+            messages.append(
+                f"{name} is " + " and ".join(f"{value:g} of {skin_id}" for skin_id, value in values.items())
+            )
+    return messages
 
 
 def sensors(connection: Connection, root: str) -> list[Mapping[str, Any]]:
-    """All sensors of a skin, each once, where the latest campaign in use that has it says that it lies; first those
-    of the campaign that describes the skin, which is believed before the others."""
+    """All sensors of a skin, each once, at the position given by the latest campaign in use that has it; first those
+    of the campaign that describes the skin, which takes precedence."""
     describing = campaigns.describing(connection, root)
     if describing is None:
         return []
@@ -99,10 +101,8 @@ def history_by_model(
     model: Literal["paper", "adopted"],
     computed: Mapping[str, Mapping[str, Any]],
 ) -> models.History:
-    """The history of a skin and of those joined to it; `computed`: what `d33_cache.complete` had to compute for it.
-
-    Raises Refusal where there is no adopted model.
-    """
+    """The history of a skin and of those joined to it; `computed`: answers that `d33_cache.complete` had to compute.
+    Raises Refusal without an adopted model."""
     if model == "adopted":
         return _adopted_history(store, table, root)
     return store.read(_paper_history, root, table.sha256, computed)
@@ -111,7 +111,7 @@ def history_by_model(
 def _paper_history(
     connection: Connection, root: str, table_sha256: str, computed: Mapping[str, Mapping[str, Any]]
 ) -> models.History:
-    """From what is kept, and from what was computed and could not be kept."""
+    """From stored answers, and from computed ones that could not be stored."""
     rows = inversions.history(connection, root, table_sha256)
     points = [(row.sensor, _point(row, row.d33_pc_per_n, row.d33_uncertainty_pc_per_n, None)) for row in rows]
     for row in inversions.missing_of_skin(connection, root, table_sha256) if computed else []:
@@ -131,10 +131,10 @@ def _adopted_history(store: Database, table: SigmaTable, root: str) -> models.Hi
         except InvalidInput as error:
             unfit[row.id] = f"cannot be told by the adopted model: {error}"
             continue
-        for entry in answer["sensors"]:
-            value, uncertainty = entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"]
+        for sensor_answer in answer["sensors"]:
+            value, uncertainty = sensor_answer["d33_pc_per_n"], sensor_answer["d33_uncertainty_pc_per_n"]
             if value is not None:
-                points.append((entry["sensor"], _point(row, value, uncertainty, model_in_force.model_id)))
+                points.append((sensor_answer["sensor"], _point(row, value, uncertainty, model_in_force.model_id)))
     return store.read(_history, root, points, unfit)
 
 
@@ -143,18 +143,18 @@ def _history(
 ) -> models.History:
     repeated = repeats.left_out(connection, root, {(point.campaign_id, sensor) for sensor, point in points})
     by_sensor: dict[str, list[models.Point]] = {sensor: [] for sensor, _ in points}
-    for sensor, point in sorted(points, key=lambda entry: entry[1].time):
+    for sensor, point in sorted(points, key=lambda item: item[1].time):
         if (point.campaign_id, sensor) not in repeated:
             by_sensor[sensor].append(point)
     names = sorted(by_sensor)
     array, departures = _of_array({name: by_sensor[name] for name in names})
     used = {point.campaign_id for points in by_sensor.values() for point in points}
-    campaigns_out, recordings_out = _left_out(connection, root, used, unfit, repeats.of_campaigns(repeated))
-    others = skins.joined_to(connection, root)
+    campaigns_out, recordings_out = _excluded(connection, root, used, unfit, repeats.of_campaigns(repeated))
+    joined_skins = skins.joined_to(connection, root)
     return models.History(
         skin_id=root,
-        joined=[joined(row) for row in others],
-        differences=differences(connection, [root, *(other.id for other in others)]),
+        joined=[joined(row) for row in joined_skins],
+        differences=differences(connection, [root, *(joined_skin.id for joined_skin in joined_skins)]),
         array=array,
         sensors=[
             models.SensorHistory(
@@ -196,7 +196,7 @@ def _point(row: AnyRow, d33: float, uncertainty: float, model_id: str | None) ->
 def _of_array(
     by_sensor: Mapping[str, Sequence[models.Point]],
 ) -> tuple[models.ArrayTrend | None, dict[str, models.SensorDeparture]]:
-    """What the array did, by the campaigns that tell when they were recorded, and each sensor beside it."""
+    """The trend of the array, by the campaigns with a time of recording, and each sensor relative to it."""
     timed = [point for points in by_sensor.values() for point in points if point.time_is == "recorded"]
     campaigns_in = list({point.campaign_id: point.time for point in sorted(timed, key=_seconds)}.items())
     column = {campaign_id: number for number, (campaign_id, _) in enumerate(campaigns_in)}
@@ -207,8 +207,8 @@ def _of_array(
                 value[row, column[point.campaign_id]] = point.d33_pc_per_n
                 uncertainty[row, column[point.campaign_id]] = point.d33_uncertainty_pc_per_n
     moments = [datetime.fromisoformat(time) for _, time in campaigns_in]
-    found = array_history(list(by_sensor), moments, value, uncertainty)
-    if found is None:
+    history = array_history(list(by_sensor), moments, value, uncertainty)
+    if history is None:
         return None, {}
     trend_of_array = models.ArrayTrend(
         points=[
@@ -218,18 +218,22 @@ def _of_array(
                 d33_pc_per_n=d33,
                 d33_uncertainty_pc_per_n=of_d33,
             )
-            for number, d33, of_d33 in zip(found.dates, found.d33.tolist(), found.uncertainty.tolist(), strict=True)
+            for number, d33, of_d33 in zip(
+                history.dates, history.d33.tolist(), history.uncertainty.tolist(), strict=True
+            )
         ],
-        sensors=list(found.pooled),
-        days=found.days,
-        **_percent(found.value, found.low, found.high),
-        significant=found.significant,
-        dead_since={sensor: campaigns_in[number][1] for sensor, number in found.dead_since.items()},
-        statement=found.statement,
+        sensors=list(history.pooled),
+        days=history.days,
+        **_percent(history.value, history.low, history.high),
+        significant=history.significant,
+        dead_since={sensor: campaigns_in[number][1] for sensor, number in history.dead_since.items()},
+        statement=history.statement,
     )
     return trend_of_array, {
-        one.sensor: models.SensorDeparture(**_percent(one.value, one.low, one.high), significant=one.significant)
-        for one in found.departures
+        departure.sensor: models.SensorDeparture(
+            **_percent(departure.value, departure.low, departure.high), significant=departure.significant
+        )
+        for departure in history.departures
     }
 
 
@@ -278,28 +282,30 @@ def _answer(line: Trend, adjusted: float) -> models.TrendAnswer:
     )
 
 
-def _left_out(
+def _excluded(
     connection: Connection,
     root: str,
     used: Collection[str],
     unfit: Mapping[str, str],
     repeated: Mapping[str, repeats.Repeat],
 ) -> tuple[list[models.LeftOutCampaign], list[models.LeftOutRecording]]:
-    whole, single = [], []
+    campaigns_out, recordings_out = [], []
     for row in campaigns.of_skin(connection, root):
         if row.discarded_at is not None:
             continue
         if row.id in repeated and row.id not in used:
             repeat = repeated[row.id]
-            whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=repeat.words, repeats=repeat.campaign_id))
+            campaigns_out.append(
+                models.LeftOutCampaign(campaign_id=row.id, reason=repeat.words, repeats=repeat.campaign_id)
+            )
             continue
-        not_told = None if row.id in used else "no d33 of it is kept; its /d33 says why"
-        reason = unfit.get(row.id) or campaigns.unused(row) or not_told
+        no_d33 = None if row.id in used else "no d33 of it is kept; its /d33 says why"
+        reason = unfit.get(row.id) or campaigns.unused(row) or no_d33
         if reason is not None:
-            whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=reason))
+            campaigns_out.append(models.LeftOutCampaign(campaign_id=row.id, reason=reason))
         elif row.excluded:
-            single += [
-                models.LeftOutRecording(campaign_id=row.id, recording=left.recording, reason=left.reason)
-                for left in campaigns.excluded_of(connection, row.number)
+            recordings_out += [
+                models.LeftOutRecording(campaign_id=row.id, recording=exclusion.recording, reason=exclusion.reason)
+                for exclusion in campaigns.excluded_of(connection, row.number)
             ]
-    return whole, single
+    return campaigns_out, recordings_out

@@ -1,4 +1,4 @@
-"""The tables in use: domain and origin of each; those beside σ's are read when a request first needs them."""
+"""The tables in use: domain and origin of each; those other than σ's are read when a request first needs them."""
 
 from collections.abc import Callable
 from functools import cache
@@ -32,7 +32,7 @@ def _contact_table(folder: Path) -> ContactTable:
     return _read(load_contact, folder / CONTACT_TABLE)
 
 
-def contact_asked_for(table: SigmaTable, name: ContactName) -> ContactModel:
+def requested_contact(table: SigmaTable, name: ContactName) -> ContactModel:
     """The contact of this name; raises Refusal 503 with the reason when its table cannot be read."""
     try:
         return contact_model(table, name)

@@ -1,11 +1,12 @@
-"""How coarse an array may be so that it still tells two equal loads apart at a distance.
+"""The largest pitch of an array that still separates two equal loads at a distance.
 
-The criterion is that of `underskin.prediction.skin_design`: the responses of two contacts add, and they show as two
-where a sensor between two others reads less than both, by `dip` times the reading above a sensor, wherever the row of
-sensors lies and from that distance on. It is evaluated on fewer placements and distances, to search many designs.
+The criterion is that of `underskin.prediction.skin_design`: the responses of two contacts add, and they show as two if
+a sensor between two others reads less than both, by `dip` times the reading above a sensor, for every position of the
+row of sensors and from that distance on. It is evaluated on fewer placements and distances, in order to search many
+designs.
 
-The pitch cannot exceed half the distance: where the middle between the contacts lies midway between two sensors, each
-of these is then nearer to its contact than the sensor beyond it and reads more, so that nothing dips.
+The pitch cannot exceed half the distance: if the middle between the contacts lies midway between two sensors, each of
+these is nearer to its contact than the sensor beyond it and reads more, so that there is no dip.
 """
 
 import numpy as np
@@ -29,20 +30,20 @@ def largest_pitch(offset: Floats, response: Floats, distance: float, finest: flo
     dip
         Over the response above a sensor [-].
     """
-    if finest > distance / 2 or not _told_apart(offset, response, finest, distance, dip):
+    if finest > distance / 2 or not _are_resolved(offset, response, finest, distance, dip):
         return float("nan")
     low, high = finest, distance / 2
     for _ in range(_STEPS):
         middle = (low + high) / 2
-        if _told_apart(offset, response, middle, distance, dip):
+        if _are_resolved(offset, response, middle, distance, dip):
             low = middle
         else:
             high = middle
     return low
 
 
-def _told_apart(offset: Floats, response: Floats, pitch: float, distance: float, dip: float) -> bool:
-    """Whether two contacts show as two at this and at every larger distance, for every placement of the row."""
+def _are_resolved(offset: Floats, response: Floats, pitch: float, distance: float, dip: float) -> bool:
+    """Whether two contacts show as two at this and every larger distance, for every placement of the row."""
     width = 2 * float(offset[int(np.argmax(response < response[0] / 2))])
     farthest = distance + 2 * pitch + 2 * width  # beyond it each contact is seen on its own, again and again
     distances = np.linspace(distance, farthest, _DISTANCES)

@@ -10,7 +10,7 @@ import pytest
 from proof.ledger.answer import OPEN, RIGHT, WRONG, graded
 from proof.ledger.campaigns import DrawnFrf
 from proof.ledger.differences import Compared, differences, text
-from proof.ledger.run import KEPT, run
+from proof.ledger.run import LEDGER, run
 from proof.stored import Work
 
 LINE: dict[str, Any] = {
@@ -89,13 +89,15 @@ def test_run_again_changes_nothing_moved_answer(tmp_path: Path) -> None:
     The kept answer of a campaign comes back; where another had been kept, the difference is printed.
     """
     name = "51763-000"
-    kept = next(line for line in map(json.loads, (KEPT / "frf.jsonl").read_text().splitlines()) if line["name"] == name)
+    kept = next(
+        line for line in map(json.loads, (LEDGER / "frf.jsonl").read_text().splitlines()) if line["name"] == name
+    )
     (tmp_path / "frf.jsonl").write_text(json.dumps(kept) + "\n")
     work = Work(tmp_path / "work")
-    (same,) = run({"frf": [DrawnFrf(name, 0)]}, work, keep=False, kept=tmp_path)
+    (same,) = run({"frf": [DrawnFrf(name, 0)]}, work, keep=False, folder=tmp_path)
     assert same.changed() == []
     kept["answer"]["probability"] -= 0.2
     (tmp_path / "frf.jsonl").write_text(json.dumps(kept) + "\n")
-    (moved,) = run({"frf": [DrawnFrf(name, 0)]}, work, keep=True, kept=tmp_path)
+    (moved,) = run({"frf": [DrawnFrf(name, 0)]}, work, keep=True, folder=tmp_path)
     assert "frf: 1 of 1 answers changed, by what is hidden: ageing 1" in text([moved])
     assert json.loads((tmp_path / "frf.jsonl").read_text()) == {**kept, "answer": same.pairs[0][1]["answer"]}

@@ -130,7 +130,7 @@ def test_every_effect_drawn_supposed() -> None:
     for number in range(60 if SOAK else 40):
         description = drawn(3, number)
         effects = parse_experiment(description).effects
-        found = [entry.place_of(effects) for entry in suppositions(tuple(sorted(effects)), of_frf(description))]
+        found = [entry.positions_of(effects) for entry in suppositions(tuple(sorted(effects)), of_frf(description))]
         places = [place for place in found if place is not None]
         assert len(places) == 1
     assert not set(CATALOGUED) & set(UNKNOWN)
@@ -142,7 +142,7 @@ def test_supposition_gives_back_effects_place() -> None:
     for name in ("misalignment", "thickness_error", "preload_dependent_d33"):
         for supposed in suppositions((name,), of_frf(description)):
             place = np.linspace(0.3, 0.6, len(supposed.coordinates))
-            again = supposed.place_of(supposed.effects(place))
+            again = supposed.positions_of(supposed.effects(place))
             assert again == pytest.approx(place)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from proof.slip_kinds import SLIPS, Case, cables
-from proof.slip_rivals import left_of_conjugated, over_one_sign
-from proof.slips import of_one
+from proof.slip_rivals import conjugated_residual, over_one_sign
+from proof.slips import judged_campaign
 from proof.text_slips import slips
 from rig.draw import drawn, record
 from rig.recorded import RecordedLines, campaign
@@ -26,7 +26,7 @@ def recorded(effect: str, **values: Any) -> RecordedLines:
 @pytest.mark.slow
 def test_slips_few_campaigns_committed_named() -> None:
     """Slips in a few campaigns are committed and named."""
-    judged = [of_one(900810, number) for number in first(1, (23, 7, 8))]
+    judged = [judged_campaign(900810, number) for number in first(1, (23, 7, 8))]
     assert not any(entry["false"] for entry in judged)
     committed = [(slip, one) for entry in judged for slip, one in entry["slips"].items()]
     assert {slip for slip, _ in committed} <= set(SLIPS)
@@ -40,7 +40,7 @@ def test_conjugated_delay_sign() -> None:
     """A conjugated delay is one of the other sign."""
     made = recorded("timing_delay", delay_us=80.0)
     assert (4 * made.exact.imag**2 / made.line_variance).sum() > 100
-    assert left_of_conjugated(made) < 1.0
+    assert conjugated_residual(made) < 1.0
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_conjugated_delay_sign() -> None:
 @pytest.mark.slow
 def test_conjugated_high_pass_relaxation_nothing(effect: str, values: dict[str, Any]) -> None:
     """A conjugated high pass or relaxation is nothing else."""
-    assert left_of_conjugated(recorded(effect, **values)) > 20.0
+    assert conjugated_residual(recorded(effect, **values)) > 20.0
 
 
 def test_third_conjugated_shows_two_signs_course() -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from rig.contact_course import Body, course
+from rig.contact_course import Body, contact_history
 from rig.errors import RigError
 from rig.layer import Floats
 from rig.relaxation import Relaxation
@@ -28,7 +28,7 @@ def there_and_back(body: Body, compliance: float, samples: int = 2000) -> tuple[
     end = min(body.last_touch(compliance), 0.0) - 0.2 * peak
     time = np.linspace(0, 10, samples)
     travel = np.interp(time, [0, 4, 5, 10], [-0.2 * peak, peak, peak, end])
-    return time, travel, *course(body, time, travel, compliance)
+    return time, travel, *contact_history(body, time, travel, compliance)
 
 
 def jkr(a: Floats, work: float) -> tuple[Floats, Floats]:
@@ -171,7 +171,7 @@ def test_two_prony_pairs_follow_lee_radok_ting() -> None:
     """
     time = np.linspace(0, 9, 4001)
     travel = np.interp(time, [0, 4, 5, 9], [0, DEPTH, DEPTH, 0])
-    _, force = course(Body(LAW, E, Relaxation(FRACTIONS, TIMES)), time, travel, 0.0)
+    _, force = contact_history(Body(LAW, E, Relaxation(FRACTIONS, TIMES)), time, travel, 0.0)
     unit, rate = 4 / 3 * PLANE * np.sqrt(R), DEPTH / 4
 
     def until(end: float, at: float) -> float:

@@ -151,7 +151,7 @@ def test_without_effect_nothing_see() -> None:
 
 def test_every_effect_of_these_kinds_is_tested() -> None:
     for kind, tested in (("indentation", INDENTATION), ("compression", COMPRESSION)):
-        assert set(tested) == {name for name, effect in effects.KNOWN.items() if kind in effect.kinds}
+        assert set(tested) == {name for name, effect in effects.ALL_EFFECTS.items() if kind in effect.kinds}
 
 
 def test_what_cannot_be_pressed_is_named() -> None:

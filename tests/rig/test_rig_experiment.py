@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from rig.commands import rig as command
 from rig.description import parse
-from rig.effects import KNOWN
+from rig.effects import ALL_EFFECTS
 from rig.errors import RigError
 from rig.experiment import CurveDesign, DeclaredSkin, Drive, LineGrid, Noise, RecordingDesign
 from rig.reading import document
@@ -119,7 +119,7 @@ def test_command_says_wrong_line(tmp_path: Path) -> None:
 
 def test_everything_is_documented() -> None:
     text = DOCUMENTATION.read_text(encoding="utf-8")
-    for name, effect in KNOWN.items():
+    for name, effect in ALL_EFFECTS.items():
         (row,) = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]
         assert effect.law in row
         assert all(f"`{word}`" in row for word in (*effect.parameters, *effect.laws))

@@ -220,7 +220,7 @@ def test_every_effect_changes_the_response(name: str) -> None:
 
 def test_every_effect_recording_kind_frf_tested() -> None:
     """Every effect of a recording of kind frf is tested."""
-    assert set(PARAMETERS) == {name for name, effect in effects.KNOWN.items() if effects.FRF in effect.kinds}
+    assert set(PARAMETERS) == {name for name, effect in effects.ALL_EFFECTS.items() if effects.FRF in effect.kinds}
     assert set(LIMITS) == set(PARAMETERS) - {"mains_pickup", "layered_contact"}
 
 

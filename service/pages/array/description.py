@@ -1,4 +1,4 @@
-"""An array under loads: the fields of the forms that ask for one, and the request of `POST /v1/stress` in them."""
+"""An array under loads: the fields of its forms, and the request of `POST /v1/stress` made from them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from fastapi import Request
 from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.forms import UNLIKELY, in_form_words, label_of, number
 from service.pages.shared.skin_values import FIELDS, UNITS, shown
-from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, told_together, wrong_fields
+from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, errors_together, quantities, wrong_fields
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
@@ -23,8 +23,8 @@ from underskin.several_errors import all_of, noting
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
-# The L up to which it is known what finite strain adds, and how much in percent there (docs/http-api.md).
-_KNOWN_TO, _ADDED_PERCENT = 0.1, 3
+# The L up to which the addition by finite strain is known, and that addition in percent (docs/http-api.md).
+_KNOWN_UP_TO_L, _ADDED_PERCENT = 0.1, 3
 GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
 _DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
 GLUE = "glue_stiffness"
@@ -39,23 +39,23 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Described:
-    """What a form says of the array: as it was sent, or else as the skin's campaigns or the prototype have it."""
+    """The array in a form: values as sent, or else those of the skin's campaigns or of the prototype."""
 
     skin_id: str | None
     values: Mapping[str, str]
     glue: str
     units_checked: bool
     sensors: Sequence[Mapping[str, Any]] | None  # the skin's; None: a grid of the form's
-    taken: Sequence[str]  # in sentences, which values nobody declared
+    taken: Sequence[str]  # sentences on undeclared values
 
     @property
     def fields(self) -> Sequence[tuple[str, str, str]]:
-        """Those that the form asks for."""
+        """The fields of the form."""
         return FIELDS if self.sensors is not None else (*FIELDS, *GRID)
 
     def document(self) -> dict[str, Any]:
         """The request without its loads; raises SeveralInvalid."""
-        with told_together() as wrong:
+        with errors_together() as wrong:
             document: dict[str, Any] = {}
             with noting(wrong):
                 document |= quantities(self.values, [name for name, *_ in FIELDS], units_checked=self.units_checked)
@@ -69,7 +69,7 @@ class Described:
 
 
 def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
-    """The array of a form's fields; a grid of the form's where no campaign of the skin names sensors."""
+    """The array of a form's fields; a regular grid if no campaign of the skin names sensors."""
     sensors = None if skin_id is None else _sensors(store, skin_id)
     values, taken = shown(store, table, given, skin_id)
     if skin_id is not None and sensors is None:
@@ -79,20 +79,19 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
 
 
 def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tuple[str, str]]:
-    """What looks wrong, each with what it is about in the words of these forms; `lines`: of the loads in their
-    text."""
-    found = [] if answer is None else answer.findings
-    return [(label_of(one.field, _LABELS, lines), one.statement) for one in found]
+    """Implausible values, each with the label of its field in these forms; `lines`: the line numbers of the loads."""
+    stated = [] if answer is None else answer.findings
+    return [(label_of(finding.field, _LABELS, lines), finding.statement) for finding in stated]
 
 
 def finite_strain(answer: ArrayStress | None) -> str | None:
-    """That finite strain, which is in neither charge nor error, adds more than is known; None where no load is so
-    large."""
-    for one in [] if answer is None else answer.findings:
-        load = one.arguments.get("load_parameter", 0.0)
-        if one.reason is Reason.LOAD_NOT_LINEAR and load > _KNOWN_TO:
+    """A warning that finite strain, which neither charge nor error includes, adds more than is known; None for
+    smaller loads."""
+    for finding in [] if answer is None else answer.findings:
+        load = finding.arguments.get("load_parameter", 0.0)
+        if finding.reason is Reason.LOAD_NOT_LINEAR and load > _KNOWN_UP_TO_L:
             return (
-                f"The ± does not include finite strain. At L = {_KNOWN_TO:g} that adds {_ADDED_PERCENT} % to the "
+                f"The ± does not include finite strain. At L = {_KNOWN_UP_TO_L:g} that adds {_ADDED_PERCENT} % to the "
                 f"stress on a sensor beneath the sphere; here L reaches {load:.2g}, beyond where it is known what it "
                 "adds."
             )
@@ -102,7 +101,7 @@ def finite_strain(answer: ArrayStress | None) -> str | None:
 def tried(
     request: Request, make: Callable[[], dict[str, Any]], lines: Sequence[int] = ()
 ) -> tuple[dict[str, Any], ArrayStress | None, WrongFields]:
-    """The request that `make` makes, with its answer or what is wrong; `lines` as for `findings`."""
+    """The request made by `make`, with its answer or its errors; `lines` as for `findings`."""
     document: dict[str, Any] = {}
     try:
         document = make()
@@ -113,15 +112,15 @@ def tried(
 
 
 def _form_field(error: InvalidInput) -> str:
-    """The field of the form that holds what is wrong."""
+    """The form's field of an error."""
     loads = error.field.startswith(("contacts", LOAD))
     return "loads" if loads else "map" if error.field.startswith("pressure_map") else error.field
 
 
 def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
-    """What `POST /v1/stress` answers; raises UnderskinError."""
+    """The answer of `POST /v1/stress`; raises UnderskinError."""
     table = influence_table(request.app.state.settings.tables)
-    with np.errstate(all="ignore"):  # what overflows is out of reach
+    with np.errstate(all="ignore"):  # an overflow is out of reach
         return answer(table, read_request(document))
 
 
@@ -133,7 +132,7 @@ def charge_columns(answer: ArrayStress) -> dict[str, list[Any]]:
 def charge_figure(
     answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], radius_mm: float, numbers: str
 ) -> Drawn:
-    """Each sensor coloured by its charge, with the loads where they have positions; `radius_mm`: the sensors'."""
+    """The sensors coloured by charge, with the loads if they have positions; `radius_mm`: sensor radius."""
     from underskin.figures.array_discs import disc_size
     from underskin.figures.loads import loaded_array
 
@@ -168,7 +167,7 @@ def _count(name: str, typed: str) -> float:
 
 
 def _sensors(store: Database, skin_id: str) -> Sequence[Mapping[str, Any]] | None:
-    """Those of the campaign that describes the skin; None where there are none."""
+    """The sensors of the campaign that describes the skin; None if there are none."""
     with store.reading() as connection:
         row = campaigns.describing(connection, skins.require_root(connection, skin_id))
     return None if row is None else row.about["skin"]["sensors"] or None

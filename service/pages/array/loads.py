@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.heavy_answers import each_in_turn
+from service.heavy_answers import computed_in_turn
 from service.pages.array.description import (
     LOAD,
     Described,
@@ -24,7 +24,7 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import numbers
 from service.pages.shared.html import page
-from service.pages.shared.wrong_fields import told_together
+from service.pages.shared.wrong_fields import errors_together
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, BaseStress, base_stress
 from underskin.array_stress.request import LabContact, read_request
@@ -49,9 +49,9 @@ Loads = Annotated[str, Query(max_length=_LONGEST)]
 
 @router.get("")
 def view(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
-    """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
+    """The skin and the loads of the address, or else the paper's prototype under two spheres."""
     array = described(store, table, request.query_params, skin)
-    lines = [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
+    lines = [number for number, line in enumerate(loads.splitlines(), 1) if line.strip()]
     document, answer, wrong = tried(request, lambda: _document(array, loads), lines)
     return page(
         request,
@@ -78,23 +78,23 @@ def charge_csv(
 
 
 @router.get("/base.csv")
-@each_in_turn
+@computed_in_turn
 def base_csv(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
-    """The normal stress on the base, a row for each point of its grid."""
+    """The normal stress on the base, a row for each grid point."""
     document = _document(described(store, table, request.query_params, skin), loads)
-    felt = _felt(document, answered(request, document))
-    stress = _base_stress(request, {**document, "contacts": felt or document["contacts"]})
+    transmitted = _transmitted_contacts(document, answered(request, document))
+    stress = _base_stress(request, {**document, "contacts": transmitted or document["contacts"]})
     x, y = np.meshgrid(stress.x_mm, stress.y_mm)
     columns = {"x_mm": x, "y_mm": y, "sigma_zz_mpa": stress.sigma_zz_mpa}
     return csv_answer("base", {name: column.ravel().tolist() for name, column in columns.items()})
 
 
 def _figures(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
-    """Charge and stress under the loads that a sensor feels: others would make a map of nothing wide."""
-    felt = _felt(document, answer)
-    places = [(load["x_mm"], load["y_mm"]) for load in felt]
+    """Charge and stress under the loads within reach of a sensor: others would make a wide, empty map."""
+    transmitted = _transmitted_contacts(document, answer)
+    places = [(load["x_mm"], load["y_mm"]) for load in transmitted]
     charge = charge_figure(answer, places, document["sensor_radius_mm"], f"/loads/charge.csv{_query(request)}")
-    return [charge, *(_on_base(request, {**document, "contacts": felt}) if felt else [])]
+    return [charge, *(_on_base(request, {**document, "contacts": transmitted}) if transmitted else [])]
 
 
 def _query(request: Request) -> str:
@@ -102,13 +102,13 @@ def _query(request: Request) -> str:
 
 
 def _on_base(request: Request, document: Mapping[str, Any]) -> list[Drawn]:
-    """The stress on the base; none where there is more than a page should wait for, or show."""
+    """The stress on the base; none if it would take too long for a page or be too large."""
     from underskin.figures.loads import stress_on_base
 
     contacts, sensors = document["contacts"], document["sensors"]
     if len(contacts) > _MOST_DRAWN or len(sensors) > _MOST_OUTLINES:
         return []
-    places = [[(one["x_mm"], one["y_mm"]) for one in some] for some in (contacts, sensors)]
+    places = [[(position["x_mm"], position["y_mm"]) for position in some] for some in (contacts, sensors)]
     figure = stress_on_base(_base_stress(request, document), places[0], places[1], document["sensor_radius_mm"])
     about = (
         "Normal stress where the sensors are, seen from above; compression is positive, as in the table. Loads add. "
@@ -123,73 +123,86 @@ def _base_stress(request: Request, document: Mapping[str, Any]) -> BaseStress:
     if count > _MOST_DRAWN:
         raise out_of_range("contacts", f"{count} loads", f"must be at most {_MOST_DRAWN} for the stress on the base")
     places = (*document["contacts"], *document["sensors"])
-    x, y = (_grid([one[name] for one in places], document) for name in ("x_mm", "y_mm"))
+    x, y = (_grid([position[name] for position in places], document) for name in ("x_mm", "y_mm"))
     return base_stress(influence_table(request.app.state.settings.tables), read_request(document), x, y)
 
 
 def _grid(places: Sequence[float], document: Mapping[str, Any]) -> Floats:
-    """Places along an axis, from a margin before the first to one behind the last."""
+    """Coordinates along an axis, from a margin before the first to one behind the last."""
     margin = document["sensor_radius_mm"] + document["thickness_mm"]
     return np.linspace(min(places) - margin, max(places) + margin, _POINTS)
 
 
 def _beyond_reach(document: Mapping[str, Any], answer: ArrayStress, lines: Sequence[int]) -> list[tuple[str, str]]:
-    """Of each load that no sensor feels where it is, and how far off the nearest one lies."""
+    """Messages for the loads that no sensor transmits: where each lies and how far the nearest sensor is."""
     further = f"sensors feel no further than {answer.reach_mm:.3g} mm. It is not drawn."
     return [
         (f"load in line {line}", f"it lies {away:.4g} mm from the nearest sensor and adds nothing: {further}")
-        for line, away, is_felt in zip(lines, _away_mm(document), _are_felt(document, answer), strict=True)
-        if not is_felt
+        for line, away, is_transmitted in zip(
+            lines, _away_mm(document), _are_transmitted(document, answer), strict=True
+        )
+        if not is_transmitted
     ]
 
 
 def _away_mm(document: Mapping[str, Any]) -> list[float]:
-    """How far from each load the nearest sensor lies."""
-    sensors = np.array([(one["x_mm"], one["y_mm"]) for one in document["sensors"]])
-    return [float(np.hypot(*(sensors - (one["x_mm"], one["y_mm"])).T).min()) for one in document["contacts"]]
+    """Distance from each load to the nearest sensor [mm]."""
+    sensors = np.array([(sensor["x_mm"], sensor["y_mm"]) for sensor in document["sensors"]])
+    return [
+        float(np.hypot(*(sensors - (contact["x_mm"], contact["y_mm"])).T).min()) for contact in document["contacts"]
+    ]
 
 
-def _are_felt(document: Mapping[str, Any], answer: ArrayStress) -> list[bool]:
-    """Of each load whether a part of its contact lies within the reach of a sensor."""
+def _are_transmitted(document: Mapping[str, Any], answer: ArrayStress) -> list[bool]:
+    """Whether a part of each load's contact lies within the reach of a sensor."""
     edges = np.array(_away_mm(document)) - answer.contact_radius_mm
     return [bool(edge <= answer.reach_mm) for edge in edges]
 
 
-def _felt(document: Mapping[str, Any], answer: ArrayStress) -> list[Mapping[str, Any]]:
-    """The loads that a sensor feels."""
-    return [one for one, is_felt in zip(document["contacts"], _are_felt(document, answer), strict=True) if is_felt]
+def _transmitted_contacts(document: Mapping[str, Any], answer: ArrayStress) -> list[Mapping[str, Any]]:
+    """The loads that a sensor transmits."""
+    return [
+        contact
+        for contact, is_transmitted in zip(document["contacts"], _are_transmitted(document, answer), strict=True)
+        if is_transmitted
+    ]
 
 
 def _spheres(document: Mapping[str, Any], lines: Sequence[int]) -> list[tuple[int, str]]:
-    """Of each load its line and the page of the stress under its sphere alone."""
+    """For each load its line and the page of the stress under its sphere alone."""
     skin = {name: document[name] for name in _OF_SKIN if name in document}
     return [
-        (line, urlencode({**skin, "indenter_radius_mm": one["indenter_radius_mm"], "preload_n": one["normal_force_n"]}))
-        for line, one in zip(lines[:_MOST_DRAWN], document["contacts"], strict=False)
+        (
+            line,
+            urlencode(
+                {**skin, "indenter_radius_mm": contact["indenter_radius_mm"], "preload_n": contact["normal_force_n"]}
+            ),
+        )
+        for line, contact in zip(lines[:_MOST_DRAWN], document["contacts"], strict=False)
     ]
 
 
 def _document(array: Described, loads: str) -> dict[str, Any]:
     """The request of `POST /v1/stress`; raises SeveralInvalid."""
-    lines = [(place, line) for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
+    lines = [(line_number, line) for line_number, line in enumerate(loads.splitlines(), 1) if line.strip()]
     contacts = []
-    with told_together() as wrong:
+    with errors_together() as wrong:
         document: dict[str, Any] = {}
         with noting(wrong):
             document = array.document()
-        for number, (place, line) in enumerate(lines):
+        for number, (line_number, line) in enumerate(lines):
             with noting(wrong):
-                load = _load(place, line)
+                load = _load(line_number, line)
                 refused = check_fields(LabContact, load, units_checked=array.units_checked)[1]
-                wrong += [one.at(f"contacts[{number}].{one.field}") for one in refused]
+                wrong += [invalid.at(f"contacts[{number}].{invalid.field}") for invalid in refused]
                 contacts.append(load)
         return {**document, "contacts": contacts}
 
 
-def _load(place: int, line: str) -> dict[str, Any]:
-    """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
-    parts = numbers(f"{LOAD} {place}", line, _PARTS)
+def _load(line_number: int, line: str) -> dict[str, Any]:
+    """A line of numbers: x, y, radius and force, optionally the tangential force along x and y."""
+    parts = numbers(f"{LOAD} {line_number}", line, _PARTS)
     if len(parts) not in (4, 6):
-        raise wrong_type(f"{LOAD} {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
+        raise wrong_type(f"{LOAD} {line_number}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
     load: dict[str, Any] = dict(zip(_ORDER, parts, strict=False))
     return {**load, "tangential_force_n": parts[4:]} if parts[4:] else load

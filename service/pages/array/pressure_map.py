@@ -1,6 +1,6 @@
-"""A measured map of pressure on an array, and the charge on each of its sensors.
+"""A measured pressure map on an array, and the charge on each of its sensors.
 
-Nothing of it is kept: the map stays in the page's form, and what the page saves is in the page.
+Nothing is stored: the map stays in the page's form.
 """
 
 import base64
@@ -19,9 +19,9 @@ from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.array import description
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.forms import TOKEN, require_own
+from service.pages.shared.forms import TOKEN, require_form_token
 from service.pages.shared.html import page
-from service.pages.shared.wrong_fields import told_together
+from service.pages.shared.wrong_fields import errors_together
 from service.store import Database
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
@@ -35,27 +35,27 @@ router = APIRouter(prefix="/loads/map")
 _EXAMPLE = "map.csv"
 _LARGEST_BYTES = 1_000_000
 _LARGEST_BODY_BYTES = 2 * _LARGEST_BYTES + 100_000  # a file, the text of the last map, and the other fields
-_LONGEST_FIELD = 1000  # bytes of a field beside the map
+_LONGEST_FIELD = 1000  # bytes of a field other than the map
 _MAP, _FILE, _SKIN = "map", "file", "skin"
 
 
 @router.get("")
 def view(request: Request, store: Store, skin: str | None = None) -> Response:
-    """With an example map, which presses one finger on the skin, or on the paper's prototype."""
+    """An example map, a finger pressing on the skin or on the paper's prototype."""
     example = (Path(__file__).parents[1] / "static" / _EXAMPLE).read_bytes()
     return _shown(request, store, {} if skin is None else {_SKIN: skin}, example, "the map")
 
 
 @router.post("")
 async def send(request: Request, store: Store) -> Response:
-    """With the map that was sent as a file, or else as text."""
+    """The map sent as a file, or else as text."""
     folder: UploadFolder = request.app.state.uploads
     async with received(request, folder, _LARGEST_BODY_BYTES) as sent:
-        fields = [one for one in sent if one.field not in (_MAP, _FILE)]
+        fields = [part for part in sent if part.field not in (_MAP, _FILE)]
         given = await folder.threads.run(partial(texts, fields, _LONGEST_FIELD))
-        require_own(request, given.get(TOKEN, ""))
-        file = next((one for one in sent if one.field == _FILE and one.label), None)
-        typed = next((one for one in sent if one.field == _MAP), None)
+        require_form_token(request, given.get(TOKEN, ""))
+        file = next((part for part in sent if part.field == _FILE and part.label), None)
+        typed = next((part for part in sent if part.field == _MAP), None)
         chosen = file or typed
         content = b"" if chosen is None else await folder.threads.run(partial(chosen.start, _LARGEST_BYTES + 1))
     name = "the map" if file is None or not file.label else file.label
@@ -68,7 +68,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
 
     def document_of_map() -> dict[str, Any]:
         document: dict[str, Any] = {}
-        with told_together() as wrong:
+        with errors_together() as wrong:
             with noting(wrong):
                 document = described.document()
             if len(content) > _LARGEST_BYTES:
@@ -113,12 +113,12 @@ def _csv(columns: Mapping[str, Any]) -> str:
 
 
 def _inside(media_type: str, content: bytes) -> str:
-    """An address that holds what it leads to."""
+    """An address (data URL) that contains the file itself."""
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
 
 def _text(content: bytes) -> str:
-    """The map as the form has it: what is no text, a spreadsheet's own file for one, is not put there."""
+    """The map for the form's text field; empty if it is not text, such as a spreadsheet file."""
     try:
         return text.decode(content, "")
     except UnderskinError:

@@ -1,6 +1,4 @@
-"""What is changed on the page of a campaign: its name, remark and tags, recordings excluded, the campaign withdrawn or
-put away.
-"""
+"""Changes on the page of a campaign: name, remark and tags, excluded recordings, withdrawal and discarding."""
 
 from collections.abc import Callable
 from urllib.parse import quote
@@ -31,7 +29,7 @@ def annotate(request: Request, campaign_id: CampaignId, sent: Form, store: Store
 
 @router.post("/exclude")
 def exclude(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
-    """Leave a recording out of all figures."""
+    """Exclude a recording from all figures."""
 
     def do() -> None:
         exclude_recording(store, table, campaign_id, sent.get("recording", ""), reason(sent), signed(request, sent))
@@ -41,7 +39,7 @@ def exclude(request: Request, campaign_id: CampaignId, sent: Form, store: Store,
 
 @router.post("/withdraw")
 def withdraw(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
-    """Leave the campaign out of all figures."""
+    """Withdraw the campaign from all figures."""
 
     def do() -> None:
         store.write(campaigns.withdraw, campaign_id, reason(sent), signed(request, sent))
@@ -51,7 +49,7 @@ def withdraw(request: Request, campaign_id: CampaignId, sent: Form, store: Store
 
 @router.post("/discard")
 def discard(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
-    """Put a trial into no list any more."""
+    """Remove a trial campaign from all lists."""
 
     def do() -> None:
         store.write(annotations.discard_campaign, campaign_id, reason(sent), signed(request, sent))

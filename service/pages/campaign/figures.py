@@ -14,17 +14,17 @@ _AGAINST_PRELOAD = (
     "indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n", "model_frf_pc_per_n",
 )  # fmt: skip
 _MOST_CURVES = 24
-_MOST_KEPT = 64
-Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, what is shown
-_kept: dict[Which, list[Drawn]] = {}
+_MOST_CACHED = 64
+Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, shown part
+_cache: dict[Which, list[Drawn]] = {}
 _keeping = Lock()
 
 
 def figures(
     store: Database, row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str, *, curves: bool
 ) -> list[Drawn]:
-    """All that can be drawn of a campaign as it is now; `answer`: its d33, as `/d33` has it, with its `numbers`. `show`
-    as `measured` has it; `curves`: whether it has recordings of other kinds. What was drawn lately is kept."""
+    """All figures of a campaign in its present state. `answer`: its d33 as in `/d33`, with its `numbers`; `show` as
+    in `measured`; `curves`: whether it has recordings other than FRFs. Recent figures are cached."""
     basis = (row.id, row.revision, answer["table_sha256"], _chosen(answer))
     loaded = cache(lambda: store.read(campaigns.load, row, with_excluded=False))
 
@@ -38,16 +38,16 @@ def figures(
     }
     all_figures = []
     for name, make in makers.items():
-        before = _kept.get((*basis, name))
+        before = _cache.get((*basis, name))
         all_figures += before if before is not None else _keep((*basis, name), make())
     return all_figures
 
 
 def _keep(which: Which, drawn_now: list[Drawn]) -> list[Drawn]:
     with _keeping:
-        while len(_kept) >= _MOST_KEPT:
-            del _kept[next(iter(_kept))]
-        _kept[which] = drawn_now
+        while len(_cache) >= _MOST_CACHED:
+            del _cache[next(iter(_cache))]
+        _cache[which] = drawn_now
     return drawn_now
 
 
@@ -57,13 +57,14 @@ def band_query(band_hz: tuple[float, float]) -> str:
 
 
 def _chosen(answer: Mapping[str, Any]) -> str:
-    """The band in an address, where the reader chose it."""
+    """The band of the address if the reader chose it."""
     band = answer["band"]
     return band_query((band["low_hz"], band["high_hz"])) if band is not None and band["chosen_by_user"] else ""
 
 
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
-    """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
+    """d33 against preload, per sensor and as a map; if `show` is a sensor, only its points against preload, and it
+    is marked."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
     from underskin.figures.array_discs import disc_size
     from underskin.figures.array_map import Quantity, array_map, significance_note
@@ -78,7 +79,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
     sensor = show if show in names else None
     rows = _of_sensor(numbers["recordings"], sensor)
     titles = [f"{name}, sensor {sensor}" for name, sensor in zip(rows["recording"], rows["sensor"], strict=True)]
-    place, chosen = f"/campaigns/{row.id}", _chosen(answer)
+    page, chosen = f"/campaigns/{row.id}", _chosen(answer)
     chosen = f"?{chosen}" if chosen else ""
     quantity = Quantity("d33", "pC/N", intervals=tuple(zip(low, high, strict=True)))
     return [
@@ -87,25 +88,25 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
             frf_versus_preload(titles, *(rows[name] for name in _AGAINST_PRELOAD)),
             f"FRF in the flat zone against preload{'' if sensor is None else f' of {sensor}'}, for each sphere (radius "
             "R) with 95 % intervals; dashed lines are the paper's model with the array's d33, in the sphere's colour.",
-            f"{place}/preload.csv{chosen}",
+            f"{page}/preload.csv{chosen}",
         ),
         drawn(
             "response",
             response_per_sensor(names, d33, low, high, limits, reasons, sensor),
             f"d33 of each sensor with its 95 % interval. {CLICK}",
-            f"{place}/d33.csv{chosen}",
+            f"{page}/d33.csv{chosen}",
         ),
         drawn(
             "map",
             array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, sensor, radius),
             f"Each sensor where it lies, coloured by its d33. {disc_size(x_mm, y_mm, radius)} "
             f"{significance_note(d33, uncertainty)} {CLICK}",
-            f"{place}/d33.csv{chosen}",
+            f"{page}/d33.csv{chosen}",
         ),
     ]
 
 
 def _of_sensor(columns: Mapping[str, Sequence[Any]], sensor: str | None) -> dict[str, list[Any]]:
     """The rows of one sensor, or all."""
-    kept = [row for row, name in enumerate(columns["sensor"]) if sensor in (None, name)]
-    return {name: [values[row] for row in kept] for name, values in columns.items()}
+    row_indices = [row for row, name in enumerate(columns["sensor"]) if sensor in (None, name)]
+    return {name: [values[row] for row in row_indices] for name, values in columns.items()}

@@ -30,7 +30,7 @@ _EndText = Annotated[str, Query(max_length=40)]
 
 
 def _band(band_low_hz: _EndText = "", band_high_hz: _EndText = "") -> d33_cache.BandHz | None:
-    """The band that the reader chose; None: the flat zone. Raises InvalidInput."""
+    """The band chosen by the reader; None: the flat zone. Raises InvalidInput."""
     if not band_low_hz and not band_high_hz:
         return None
     return number("band_low_hz", band_low_hz), number("band_high_hz", band_high_hz)
@@ -48,9 +48,9 @@ def campaign(
     show: str = "",
     first: Annotated[int, Query(ge=0, le=10**9)] = 0,
 ) -> Response:
-    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `first` the recording that the
-    list begins with, from 0. The band of the address is averaged; where it is refused, the flat zone, and the form says
-    why."""
+    """The page of a campaign. `show`: the sensor or recording whose lines are drawn; `first`: index of the first
+    listed recording. Values are averaged over the band of the address; if that is invalid, over the flat zone, with
+    the reason in the form."""
     return shown(request, campaign_id, store, table, show, first=first)
 
 
@@ -63,7 +63,7 @@ def shown(
     refused: RefusedForm | None = None,
     first: int = 0,
 ) -> Response:
-    """The page; `refused`: a form of it that was sent and cannot be used."""
+    """The page; `refused`: a form of it that was sent and is invalid."""
     typed = [request.query_params.get(name, "")[:40] for name in ("band_low_hz", "band_high_hz")]
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
@@ -79,8 +79,8 @@ def shown(
         band = None
         answer, numbers = d33_cache.with_numbers(store, table, row, band)
         refused = refused or RefusedForm("band", in_form_words(error, _LABELS), {}, 200)
-    sensors = sorted({entry.sensor for entry in recordings if entry.sensor is not None})
-    show = show if show in {"", *sensors, *(entry.id for entry in recordings)} else ""
+    sensors = sorted({recording.sensor for recording in recordings if recording.sensor is not None})
+    show = show if show in {"", *sensors, *(recording.id for recording in recordings)} else ""
     path = f"/v1/campaigns/{quote(row.id, safe='')}/d33" + (f"?{band_query(band)}" if band else "")
     return page(
         request,
@@ -95,14 +95,16 @@ def shown(
         answer=answer,
         described=row.about["skin"],
         recordings=recordings,
-        conditions=condition_columns(entry.scalars.get("conditions") for entry in recordings),
+        conditions=condition_columns(recording.scalars.get("conditions") for recording in recordings),
         first=first if first < len(recordings) else 0,
         most_listed=_MOST_LISTED,
         most_offered=_MOST_OFFERED,
         listed="first" in request.query_params,
         sensors=sensors,
         diagnoses=list(verdict_of.values()),
-        figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in recordings)),
+        figures=figures(
+            store, row, answer, numbers, show, curves=any(recording.kind != "frf" for recording in recordings)
+        ),
         show=show,
         band=band,
         same=same_request.get(request, path, f"client.campaigns.d33({row.id!r}" + (f", {band})" if band else ")")),
@@ -111,7 +113,7 @@ def shown(
 
 @router.get("/frf.csv")
 def frf_csv(campaign_id: CampaignId, store: Store, show: str = "") -> Response:
-    """Every line of the recordings, or of those of `show`, as they came or were estimated."""
+    """Every line of the recordings, or of those of `show`, as stored or estimated."""
     name = _file(store.read(campaigns.find, campaign_id), "frf")
     return csv_answer(name, frf_columns(_loaded(store, campaign_id), show))
 

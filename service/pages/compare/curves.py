@@ -1,4 +1,4 @@
-"""Two campaigns of curves side by side: their curves, and Young's modulus as each campaign has it."""
+"""Two campaigns of curves side by side: the curves, and Young's modulus of each campaign."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _MODULUS = "youngs_modulus_mpa"
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean of moduli [MPa], or the difference of two, with its 95 % interval from how far the curves scatter; a
+    """A mean of moduli [MPa], or the difference of two, with its 95 % interval from the scatter of the curves; a
     single curve has none."""
 
     curves: int
@@ -29,29 +29,29 @@ class Mean:
 
 
 def rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Young's modulus of each curve of a kind, of the first campaign and then of the second."""
+    """Young's modulus of each curve of a kind, first campaign first."""
     return [
-        {"which": name, "campaign": row.id, **entry}
+        {"which": name, "campaign": row.id, **modulus}
         for name, row, answer in zip(_NAMES, both, answers, strict=True)
-        for entry in answer["moduli"]
-        if entry["kind"] == kind
+        for modulus in answer["moduli"]
+        if modulus["kind"] == kind
     ]
 
 
 def means(of_curves: Sequence[Mapping[str, Any]]) -> list[Mean]:
-    """The mean of the first campaign and of the second, and the second less the first (Welch's interval: the campaigns
-    may scatter differently); none where one has no modulus."""
+    """The mean of each campaign, and the difference second − first (Welch's interval: the variances may differ);
+    empty if one campaign has no modulus."""
     from scipy import stats
 
     first, second = (np.array([row[_MODULUS] for row in of_curves if row["which"] == name]) for name in _NAMES)
     if not (first.size and second.size):
         return []
     gap = float(second.mean() - first.mean())
-    found = [_mean(first), _mean(second)]
+    both_means = [_mean(first), _mean(second)]
     if min(first.size, second.size) < 2 or not (np.ptp(first) or np.ptp(second)):
-        return [*found, Mean(min(first.size, second.size), gap, None, None)]
+        return [*both_means, Mean(min(first.size, second.size), gap, None, None)]
     interval = stats.ttest_ind(second, first, equal_var=False).confidence_interval()
-    return [*found, Mean(min(first.size, second.size), gap, float(interval.low), float(interval.high))]
+    return [*both_means, Mean(min(first.size, second.size), gap, float(interval.low), float(interval.high))]
 
 
 def _mean(moduli: Floats) -> Mean:
@@ -71,16 +71,21 @@ def figures(store: Database, kind: str, both: Sequence[AnyRow], of_curves: Seque
     curves, counts = [], []
     for name, row in zip(_NAMES, both, strict=True):
         recordings = store.read(campaigns.load, row, with_excluded=False).recordings
-        own = [one for one in recordings if not isinstance(one, FrfRecording) and one.kind == kind]
-        counts.append(f"{min(len(own), _MOST_CURVES)} of {len(own)} of the {name}")
-        curves += [ForceCurve(one.id, one.displacement_mm, one.force_n, of=name) for one in own[:_MOST_CURVES]]
+        curves_of_kind = [
+            recording for recording in recordings if not isinstance(recording, FrfRecording) and recording.kind == kind
+        ]
+        counts.append(f"{min(len(curves_of_kind), _MOST_CURVES)} of {len(curves_of_kind)} of the {name}")
+        curves += [
+            ForceCurve(recording.id, recording.displacement_mm, recording.force_n, of=name)
+            for recording in curves_of_kind[:_MOST_CURVES]
+        ]
     about = f"Curves as they were recorded: {' and '.join(counts)}."
     which, names, modulus, uncertainty = columns_of(
         of_curves, "which", "recording", _MODULUS, "youngs_modulus_uncertainty_mpa"
     )
-    place = f"/compare/moduli.csv?first={both[0].id}&second={both[1].id}&kind={kind}"
-    told = "Young's modulus of each curve, with its 95 % interval by the noise of that curve alone."
+    page = f"/compare/moduli.csv?first={both[0].id}&second={both[1].id}&kind={kind}"
+    description = "Young's modulus of each curve, with its 95 % interval by the noise of that curve alone."
     return [
         drawn("curves", force_curves(curves), about),
-        *([drawn("moduli", curve_moduli(which, names, modulus, uncertainty), told, place)] if of_curves else []),
+        *([drawn("moduli", curve_moduli(which, names, modulus, uncertainty), description, page)] if of_curves else []),
     ]

@@ -1,5 +1,5 @@
-"""Two campaigns side by side, of one skin or of two: their maps in the same colours, and the map of the difference; of
-curves, these and Young's modulus."""
+"""Two campaigns side by side, of one skin or of two: maps with a common colour scale and the map of the difference;
+for curves, the curves and Young's modulus."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ router = APIRouter(prefix="/compare")
 
 _MOST_LISTED = 200
 _MOST_NAMED = 6  # sensors
-_SAME_PLACE_MM = 0.01
+_SAME_POSITION_MM = 0.01
 _COLUMNS = (
     "sensor", "first_pc_per_n", "first_uncertainty_pc_per_n", "second_pc_per_n", "second_uncertainty_pc_per_n",
     "difference_pc_per_n", "difference_uncertainty_pc_per_n",
@@ -46,23 +46,25 @@ def compare(
     skin: Chosen = "",
     kind: ChosenKind = None,
 ) -> Response:
-    """Of the campaigns `first` and `second`; where one is not named, of those with recordings of a `kind` in use: of
-    `skin` the one that was recorded first or last, of all the last two of one skin. Without a kind, the first of
-    `KINDS` that the first campaign has, or any."""
+    """Compares the campaigns `first` and `second`. A missing one is chosen from those with recordings of a `kind` in
+    use: of `skin` the one recorded first or last, otherwise the last two of one skin. The default kind is the first
+    of `KINDS` that the first campaign, or any, has."""
     kind = kind or _kind(store, table, skin, first)
     with store.reading() as connection:
-        offered = [one for one in KINDS if campaigns.current_by_time(connection, skin or None, 1, kind=one)]
+        offered = [
+            kind_name for kind_name in KINDS if campaigns.current_by_time(connection, skin or None, 1, kind=kind_name)
+        ]
         latest = campaigns.current_by_time(connection, skin or None, _MOST_LISTED + 1, kind=kind)
         listed = list(latest[:_MOST_LISTED])
         if listed:
             first, second = _pair(connection, skin, kind, listed, first, second)
-        both = [campaigns.find(connection, one) for one in (first, second) if one]
-    listed += [row for row in both if row.id not in {one.id for one in listed}]
+        both = [campaigns.find(connection, campaign_id) for campaign_id in (first, second) if campaign_id]
+    listed += [row for row in both if row.id not in {campaign.id for campaign in listed}]
     answers = [d33_cache.answer(store, table, row, None) for row in both]
     is_two = first != second
     rows = _rows(answers) if is_two and kind == "frf" else []
     of_curves = curves.rows(kind, both, answers) if is_two and kind != "frf" else []
-    beside = drawn_maps(both, answers, rows)
+    maps = drawn_maps(both, answers, rows)
     elsewhere = moved(both, rows)
     return page(
         request,
@@ -82,7 +84,7 @@ def compare(
         moved=elsewhere[:_MOST_NAMED],
         more_moved=len(elsewhere[_MOST_NAMED:]),
         means=curves.means(of_curves) if of_curves else [],
-        figures=curves.figures(store, kind, both, of_curves) if is_two and kind != "frf" and both else beside,
+        figures=curves.figures(store, kind, both, of_curves) if is_two and kind != "frf" and both else maps,
         same=same_request.get(request, f"/v1/campaigns/{first}/d33", f"client.campaigns.d33({first!r})"),
     )
 
@@ -90,10 +92,10 @@ def compare(
 def _pair(
     connection: Connection, skin: str, kind: Kind, listed: Sequence[AnyRow], first: str, second: str
 ) -> tuple[str, str]:
-    """The campaigns that are compared where one is not named; `listed`: those to choose from, the latest first."""
+    """The campaigns to compare if one is not named; `listed`: the candidates, the latest first."""
     if not (skin or first or second):
-        for own in dict.fromkeys(row.skin_id for row in listed):
-            last = campaigns.current_by_time(connection, own, 2, kind=kind)
+        for skin_id in dict.fromkeys(row.skin_id for row in listed):
+            last = campaigns.current_by_time(connection, skin_id, 2, kind=kind)
             if len(last) == 2:
                 return last[1].id, last[0].id
     (oldest,) = campaigns.current_by_time(connection, skin or None, 1, kind=kind, oldest_first=True)
@@ -104,36 +106,42 @@ def _pair(
 
 
 def without_common(answers: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """The ids of the sensors of both campaigns, where both have some and none is in both; else empty."""
-    ids = [[entry["sensor"] for entry in answer["sensors"]] for answer in answers]
+    """The ids of the sensors of both campaigns, if both have some and none in common; else empty."""
+    ids = [[sensor["sensor"] for sensor in answer["sensors"]] for answer in answers]
     return ids if len(ids) == 2 and all(ids) and set(ids[0]).isdisjoint(ids[1]) else []
 
 
 def moved(both: Sequence[AnyRow], rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, float]]:
-    """Of each sensor with a difference that lies elsewhere in the two campaigns its id and how far off [mm]."""
+    """Of each compared sensor whose position differs between the campaigns its id and the distance [mm]."""
     if len(both) < 2:
         return []
-    first, second = ({one["id"]: (one["x_mm"], one["y_mm"]) for one in row.about["skin"]["sensors"]} for row in both)
+    first, second = (
+        {sensor["id"]: (sensor["x_mm"], sensor["y_mm"]) for sensor in row.about["skin"]["sensors"]} for row in both
+    )
     shared = [row["sensor"] for row in rows if row["difference_pc_per_n"] is not None]
     gaps = [(name, math.dist(first[name], second[name])) for name in shared]
-    return [(name, gap) for name, gap in gaps if gap > _SAME_PLACE_MM]
+    return [(name, gap) for name, gap in gaps if gap > _SAME_POSITION_MM]
 
 
 def _kind(store: Database, table: SigmaTable, skin: str, first: str) -> Kind:
     """The first of `KINDS` that the campaign `first` has, or else any campaign."""
     if first:
         answer = _answer(store, table, first)
-        has = {entry["kind"] for entry in answer["moduli"]} if not answer["sensors"] else {KINDS[0]}
+        has = {modulus["kind"] for modulus in answer["moduli"]} if not answer["sensors"] else {KINDS[0]}
     else:
         with store.reading() as connection:
-            has = {one for one in KINDS if campaigns.current_by_time(connection, skin or None, 1, kind=one)}
-    return next((one for one in KINDS if one in has), KINDS[0])
+            has = {
+                kind_name
+                for kind_name in KINDS
+                if campaigns.current_by_time(connection, skin or None, 1, kind=kind_name)
+            }
+    return next((kind_name for kind_name in KINDS if kind_name in has), KINDS[0])
 
 
 @router.get("/moduli.csv")
 def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: Kind) -> Response:
     """Young's modulus of each curve of both campaigns."""
-    both = [store.read(campaigns.find, one) for one in (first, second)]
+    both = [store.read(campaigns.find, campaign_id) for campaign_id in (first, second)]
     rows = curves.rows(kind, both, [d33_cache.answer(store, table, row, None) for row in both])
     return csv_of_rows(_file(both, "moduli"), curves.COLUMNS, rows)
 
@@ -141,7 +149,7 @@ def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: 
 @router.get("/difference.csv")
 def difference_csv(store: Store, table: Table, first: Chosen, second: Chosen) -> Response:
     """d33 of each sensor in both campaigns, and the second less the first."""
-    both = [store.read(campaigns.find, one) for one in (first, second)]
+    both = [store.read(campaigns.find, campaign_id) for campaign_id in (first, second)]
     rows = _rows([d33_cache.answer(store, table, row, None) for row in both])
     return csv_of_rows(_file(both, "difference"), _COLUMNS, rows)
 
@@ -158,16 +166,16 @@ def _answer(store: Database, table: SigmaTable, campaign_id: str) -> dict[str, A
 
 
 def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Of each sensor of two campaigns; those of one alone have no difference."""
+    """The rows of the sensors of two campaigns; a sensor of only one has no difference."""
     if len(answers) < 2:
         return []
     of_sensor: dict[str, dict[str, Any]] = {}
     for which, answer in zip(("first", "second"), answers, strict=True):
-        for entry in answer["sensors"]:
-            row = of_sensor.setdefault(entry["sensor"], dict.fromkeys(_COLUMNS) | {"sensor": entry["sensor"]})
-            row[f"{which}_pc_per_n"] = entry["d33_pc_per_n"]
+        for sensor in answer["sensors"]:
+            row = of_sensor.setdefault(sensor["sensor"], dict.fromkeys(_COLUMNS) | {"sensor": sensor["sensor"]})
+            row[f"{which}_pc_per_n"] = sensor["d33_pc_per_n"]
             for part in ("uncertainty", "low", "high"):
-                row[f"{which}_{part}_pc_per_n"] = entry[f"d33_{part}_pc_per_n"]
+                row[f"{which}_{part}_pc_per_n"] = sensor[f"d33_{part}_pc_per_n"]
     for row in of_sensor.values():
         if None not in (row["first_pc_per_n"], row["second_pc_per_n"]):
             row["difference_pc_per_n"] = row["second_pc_per_n"] - row["first_pc_per_n"]
@@ -179,28 +187,28 @@ def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
-    """The maps of both in the same colours, and that of the difference; none where no sensor's d33 is known."""
+    """The maps of both with a common colour scale, and that of the difference; none if no d33 is known."""
     from underskin.figures.array_discs import disc_size
     from underskin.figures.array_map import Quantity, array_map, significance_note
 
     if not rows or not all(answer["sensors"] for answer in answers):
         return []
     values = [row[f"{which}_pc_per_n"] for row in rows for which in ("first", "second")]
-    known = [value for value in values if value is not None]
-    if not known:
+    finite_values = [value for value in values if value is not None]
+    if not finite_values:
         return []
-    ends = min(known), max(known)
+    ends = min(finite_values), max(finite_values)
     maps = []
     for name, row, answer in zip(("first", "second"), both, answers, strict=True):
-        own = sensors_of(row, answer)
-        names, x_mm, y_mm, reasons = columns_of(own, "sensor", "x_mm", "y_mm", "reasons")
-        d33, uncertainty, *intervals = columns_of(own, *D33Value.model_fields)
+        sensors = sensors_of(row, answer)
+        names, x_mm, y_mm, reasons = columns_of(sensors, "sensor", "x_mm", "y_mm", "reasons")
+        d33, uncertainty, *intervals = columns_of(sensors, *D33Value.model_fields)
         quantity = Quantity("d33", "pC/N", ends=ends, intervals=tuple(zip(*intervals, strict=True)))
         radius = row.about["skin"].get("sensor_radius_mm")
         figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, None, radius)
         figure.update_layout(title=f"d33, {name}")
-        told = significance_note(d33, uncertainty, quantity)
-        about = f"{row.name}, skin {row.skin_id}; colours as on the other map. {disc_size(x_mm, y_mm, radius)} {told}"
+        scale = significance_note(d33, uncertainty, quantity)
+        about = f"{row.name}, skin {row.skin_id}; colours as on the other map. {disc_size(x_mm, y_mm, radius)} {scale}"
         maps.append(drawn(f"map-{name}", figure, about))
     places = {sensor["id"]: sensor for row in both for sensor in row.about["skin"]["sensors"]}
     shared = [row for row in rows if row["difference_pc_per_n"] is not None]
@@ -214,7 +222,6 @@ def drawn_maps(
     radius = both[1].about["skin"].get("sensor_radius_mm")
     figure = array_map(names, x_mm, y_mm, gap, uncertainty, [""] * len(names), quantity, None, radius)
     figure.update_layout(title="Difference of d33")
-    about = "The second's d33 less the first's, 0 in the middle of the colours. "
-    about += significance_note(gap, uncertainty, quantity)
-    place = f"/compare/difference.csv?first={both[0].id}&second={both[1].id}"
-    return [*maps, drawn("map-difference", figure, about, place)]
+    about = f"The second's d33 less the first's, 0 in the middle of the colours. {significance_note(gap, uncertainty, quantity)}"
+    csv_address = f"/compare/difference.csv?first={both[0].id}&second={both[1].id}"
+    return [*maps, drawn("map-difference", figure, about, csv_address)]

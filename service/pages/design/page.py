@@ -1,4 +1,4 @@
-"""The design view: sliders, and at once what the skin would tell."""
+"""The design view: sliders, and the properties of the designed skin, updated at once."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -61,14 +61,14 @@ def at_once(request: Request, table: Table, sliders: SlidersOfQuery) -> Response
     shown = _tried(table, sliders)
     same = _same(request, sliders.values)
     changed = {
-        "results": {entry.name: [entry.text, entry.exact, entry.note] for entry in shown.results},
+        "results": {result.name: [result.text, result.exact, result.note] for result in shown.results},
         "figures": {figure.name: figure.json for figure in shown.figures},
-        "compared": {entry.name: [entry.stands, entry.change] for entry in shown.compared},
+        "compared": {comparison.name: [comparison.stands, comparison.change] for comparison in shown.compared},
         "outside": shown.outside,
         "materials": with_values(sliders.values),
         "same": [same.curl, same.python],
     }
-    content = orjson.dumps({"wrong": shown.wrong.told} if shown.wrong else changed)
+    content = orjson.dumps({"wrong": shown.wrong.sentences} if shown.wrong else changed)
     answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
     compress(request, answer)
     return answer
@@ -89,14 +89,14 @@ def sweeps_csv(table: Table, sliders: SlidersOfQuery) -> Response:
 
 @router.get("/response.csv")
 def response_csv(table: Table, sliders: SlidersOfQuery) -> Response:
-    """A sensor's response against the place of the load."""
+    """A sensor's response against the position of the load."""
     return csv_answer("response", _computed(table, sliders).response.model_dump())
 
 
 @dataclass(frozen=True)
 class ShownDesign:
-    """What a design tells, in numbers and figures; the limit of the table that it exceeds; what is wrong with it; its
-    numbers beside those of the pinned one."""
+    """A design's results in numbers and figures; the limit of the table that it exceeds; its errors; its numbers
+    compared with the pinned design's."""
 
     results: Sequence[DesignResult]
     figures: Sequence[Drawn]
@@ -108,8 +108,8 @@ class ShownDesign:
 def _computed(table: SigmaTable, sliders: Sliders) -> DesignAnswer:
     if sliders.error is not None:
         raise sliders.error
-    asked = parsed(DesignRequest, sliders.values)
-    return design_answer(table, asked, design_of(table, asked))
+    demand = parsed(DesignRequest, sliders.values)
+    return design_answer(table, demand, design_of(table, demand))
 
 
 def _tried(table: SigmaTable, sliders: Sliders) -> ShownDesign:
@@ -118,48 +118,48 @@ def _tried(table: SigmaTable, sliders: Sliders) -> ShownDesign:
     try:
         if sliders.error is not None:
             raise sliders.error
-        asked = parsed(DesignRequest, sliders.values)
+        demand = parsed(DesignRequest, sliders.values)
         with np.errstate(all="ignore"):
-            designed = design_of(table, asked)
-        answer = design_answer(table, asked, designed)
+            designed = design_of(table, demand)
+        answer = design_answer(table, demand, designed)
     except UnderskinError as refused:
-        return ShownDesign([], [], wrong=wrong_fields(refused, _said))
+        return ShownDesign([], [], wrong=wrong_fields(refused, _message))
     try:
         if sliders.wrong_pin is not None:
             raise sliders.wrong_pin
-        beside = parsed(DesignRequest, sliders.own if sliders.pinned is None else sliders.pinned)
+        reference_demand = parsed(DesignRequest, sliders.own if sliders.pinned is None else sliders.pinned)
         with np.errstate(all="ignore"):
-            other = design_of(table, beside)
+            reference = design_of(table, reference_demand)
     except UnderskinError as refused:
         return ShownDesign(
-            [], [], wrong=wrong_fields(refused, lambda error: f"A, pinned: {_said(error)}", lambda _: "")
+            [], [], wrong=wrong_fields(refused, lambda error: f"A, pinned: {_message(error)}", lambda _: "")
         )
     name = "the paper's prototype" if sliders.skin_id is None else "the skin as it is"
     rows: list[Compared] = []
     pinned = None
     if sliders.pinned is not None:
-        name, pinned = "A, pinned", Pinned("A, pinned", other)
-        rows = compared((sliders.pinned, design_answer(table, beside, other)), (sliders.values, answer))
-    query = urlencode({name: getattr(asked, name) for name, *_ in SLIDERS})
+        name, pinned = "A, pinned", Pinned("A, pinned", reference)
+        rows = compared((sliders.pinned, design_answer(table, reference_demand, reference)), (sliders.values, answer))
+    query = urlencode({name: getattr(demand, name) for name, *_ in SLIDERS})
     figures = [
         drawn(
             "design",
-            design_overview(designed, Pinned(name, other)),
+            design_overview(designed, Pinned(name, reference)),
             "σ under the sphere and γ under a point load, above a sensor's centre, against contact radius, sensor "
             "radius and load; the other two stay as designed.",
             f"/design/sweeps.csv?{query}",
         ),
         drawn(
             "row",
-            array_response(designed, asked.pitch_mm, pinned),
+            array_response(designed, demand.pitch_mm, pinned),
             "The reading of each sensor of a row while the sphere moves along it, over that above a sensor.",
             f"/design/response.csv?{query}",
         ),
     ]
-    return ShownDesign(results(answer, other_sigma(table, asked, answer)), figures, answer.limit, compared=rows)
+    return ShownDesign(results(answer, other_sigma(table, demand, answer)), figures, answer.limit, compared=rows)
 
 
-def _said(error: UnderskinError) -> str:
+def _message(error: UnderskinError) -> str:
     return in_form_words(error, LABELS)
 
 

@@ -1,4 +1,4 @@
-"""What a design tells, in order; and of two designs, beside each other."""
+"""The results of a design, in order, and the comparison of two designs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,12 +8,12 @@ from service.pages.shared.formats import change_in_percent, short_and_exact
 from service.schemas.design import DesignAnswer
 from underskin.prediction.answers import OTHER, WORDS
 
-BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
+BLIND_PERCENT = 10.0  # of the response above a sensor: below, it is invisible
 
 
 @dataclass(frozen=True)
 class DesignResult:
-    """One thing that a design tells: short, exact, and with a remark."""
+    """One result of a design: short, exact, and with a remark."""
 
     name: str
     words: str
@@ -35,7 +35,7 @@ class DesignResult:
 
 
 def results(answer: DesignAnswer, other_sigma: float | None = None) -> list[DesignResult]:
-    """What a design tells, in order; `other_sigma`: σ by the other contact model, where it is told."""
+    """The results of a design, in order; `other_sigma`: σ by the other contact model, if it is shown."""
     apart = answer.two_point_separation_mm
     blind = answer.response_amid_percent is not None and answer.response_amid_percent < BLIND_PERCENT
     point = f"a/h {answer.a_over_h:.3g}, rT/h {answer.rt_over_h:.3g}, L {answer.load_parameter:.2g}"
@@ -58,12 +58,12 @@ def results(answer: DesignAnswer, other_sigma: float | None = None) -> list[Desi
     ]  # fmt: skip
     if answer.status == "ok":
         return entries
-    return [replace(entry, note="outside the table") if entry.value is None else entry for entry in entries]
+    return [replace(result, note="outside the table") if result.value is None else result for result in entries]
 
 
 @dataclass(frozen=True)
 class Compared:
-    """One number of the pinned design and of the one that stands, and by how much the second lies above."""
+    """One number of the pinned and of the present design, and the relative change to the latter."""
 
     name: str
     words: str
@@ -75,17 +75,17 @@ class Compared:
 def compared(
     pinned: tuple[Mapping[str, float], DesignAnswer], stands: tuple[Mapping[str, float], DesignAnswer]
 ) -> list[Compared]:
-    """What was chosen and what it tells, of both."""
+    """Inputs and results of both designs."""
     numbers = [values for values, _ in (pinned, stands)]
     chosen = [
         _compared(name, words, [(f"{values[name]:g} {unit}", values[name]) for values in numbers])
         for name, words, unit, *_ in SLIDERS
     ]
-    told = [
-        _compared(f"told-{one.name}", one.words, [(one.text, one.value), (other.text, other.value)])
-        for one, other in zip(*(results(answer) for _, answer in (pinned, stands)), strict=True)
+    comparisons = [
+        _compared(f"told-{result.name}", result.words, [(result.text, result.value), (reference.text, reference.value)])
+        for result, reference in zip(*(results(answer) for _, answer in (pinned, stands)), strict=True)
     ]
-    return chosen + told
+    return chosen + comparisons
 
 
 def _compared(name: str, words: str, both: Sequence[tuple[str, float | None]]) -> Compared:

@@ -1,4 +1,4 @@
-"""The design the other way round: what is to be resolved, and which skins do."""
+"""The inverse design problem: which skins achieve a required resolution."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ import numpy as np
 from fastapi import APIRouter, Depends, Request, Response
 
 from service.dependencies import Store, Table
-from service.heavy_answers import each_in_turn
+from service.heavy_answers import computed_in_turn
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import in_form_words
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import start
-from service.pages.shared.wrong_fields import NOTHING_WRONG, quantity, told_together, wrong_fields
+from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, quantity, wrong_fields
 from service.problems import parsed
 from service.schemas.design import DesignDemand
 from service.usecases.design_search import NEARLY, Offer, Searched, search
@@ -40,7 +40,7 @@ _LABELS = {name: f"{words} [{unit}]" for name, words, unit, _ in FIELDS}
 
 @dataclass(frozen=True)
 class Typed:
-    """The skin from which it starts, what stands in the form, and in sentences what nobody declared."""
+    """The skin whose values are the defaults, the values of the form, and sentences on undeclared ones."""
 
     skin_id: str | None
     fields: Mapping[str, str]
@@ -48,9 +48,9 @@ class Typed:
 
     @property
     def demand(self) -> DesignDemand:
-        """What is asked; raises SeveralInvalid."""
+        """The requirement; raises SeveralInvalid."""
         values: dict[str, float] = {}
-        with told_together(list(_LABELS)) as wrong:
+        with errors_together(list(_LABELS)) as wrong:
             for name, text in self.fields.items():
                 with noting(wrong):
                     values[name] = quantity(name, text)
@@ -59,9 +59,9 @@ class Typed:
 
 def _typed(request: Request, store: Store, table: Table, skin: str | None = None) -> Typed:
     given = {name: request.query_params[name] for name, *_ in FIELDS if name in request.query_params}
-    words = {name: (said, unit) for name, said, unit, first in FIELDS if first is None and name not in given}
-    own, taken = start(store, table, skin, words)
-    fields = {name: given.get(name, first or f"{own[name]:g}") for name, _, _, first in FIELDS}
+    words = {name: (words_of, unit) for name, words_of, unit, first in FIELDS if first is None and name not in given}
+    start_values, taken = start(store, table, skin, words)
+    fields = {name: given.get(name, first or f"{start_values[name]:g}") for name, _, _, first in FIELDS}
     return Typed(skin, fields, taken)
 
 
@@ -69,13 +69,13 @@ TypedInQuery = Annotated[Typed, Depends(_typed)]
 
 
 @router.get("")
-@each_in_turn
+@computed_in_turn
 def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
     """The page."""
-    found, wrong = None, NOTHING_WRONG
+    searched, wrong = None, NOTHING_WRONG
     try:
         with np.errstate(all="ignore"):
-            found = search(table, typed.demand)
+            searched = search(table, typed.demand)
     except UnderskinError as refused:
         wrong = wrong_fields(refused, lambda error: in_form_words(error, _LABELS))
     return page(
@@ -85,38 +85,40 @@ def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
         fields=[(name, words, unit, typed.fields[name]) for name, words, unit, _ in FIELDS],
         taken=typed.taken,
         wrong=wrong,
-        offers=[] if found is None else [(offer, _address(typed, offer)) for offer in found.offers],
-        binding=[] if found is None else found.binding,
-        count=0 if found is None else int(found.feasible.sum()),
-        of=0 if found is None else found.feasible.size,
-        figures=[] if found is None else [_figure(found, typed)],
+        offers=[] if searched is None else [(offer, _address(typed, offer)) for offer in searched.offers],
+        binding=[] if searched is None else searched.binding,
+        count=0 if searched is None else int(searched.feasible.sum()),
+        of=0 if searched is None else searched.feasible.size,
+        figures=[] if searched is None else [_figure(searched, typed)],
         nearly=100 * (1 - NEARLY),
     )
 
 
 @router.get("/region.csv")
-@each_in_turn
+@computed_in_turn
 def region_csv(table: Table, typed: TypedInQuery) -> Response:
-    """Every pair of thickness and sensor radius that was looked at."""
+    """Every examined pair of thickness and sensor radius."""
     with np.errstate(all="ignore"):
-        found = search(table, typed.demand)
-    region = found.region
+        searched = search(table, typed.demand)
+    region = searched.region
     thickness, radius = np.meshgrid(region.thickness_mm, region.sensor_radius_mm)
     columns = {
         "thickness_mm": thickness,
         "sensor_radius_mm": radius,
         "largest_pitch_mm": region.largest_pitch_mm,
         "frf_pc_per_n": region.frf_pc_per_n,
-        "feasible": found.feasible,
+        "feasible": searched.feasible,
     }
     return csv_answer("region", {name: values.ravel().tolist() for name, values in columns.items()})
 
 
-def _figure(found: Searched, typed: Typed) -> Drawn:
+def _figure(searched: Searched, typed: Typed) -> Drawn:
     from underskin.figures.design_region import Offered, design_region
 
-    region = found.region
-    offered = [Offered(one.merit, one.request.thickness_mm, one.request.sensor_radius_mm) for one in found.offers]
+    region = searched.region
+    offered = [
+        Offered(offer.merit, offer.request.thickness_mm, offer.request.sensor_radius_mm) for offer in searched.offers
+    ]
     return drawn(
         "region",
         design_region(
@@ -124,7 +126,7 @@ def _figure(found: Searched, typed: Typed) -> Drawn:
             region.sensor_radius_mm,
             region.largest_pitch_mm,
             region.frf_pc_per_n,
-            found.feasible,
+            searched.feasible,
             offered,
         ),
         "Each square is a skin; its colour is the largest pitch that still resolves what is asked, to about 5 %.",

@@ -1,4 +1,4 @@
-"""The numbers of a design: where they start and stand, and those of another that is pinned beside it."""
+"""The values of a design: defaults, present values, and those of a pinned design."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from fastapi import Depends, Request
 
 from service.dependencies import Store, Table
 from service.pages.shared.skin_values import start
-from service.pages.shared.wrong_fields import quantity, told_together
+from service.pages.shared.wrong_fields import errors_together, quantity
 from service.problems import parsed
 from service.schemas.design import DesignRequest
 from service.usecases.design import require_apart
@@ -35,9 +35,9 @@ PIN, ACTION, MATERIAL = "pin", "do", "material"
 
 @dataclass(frozen=True)
 class Sliders:
-    """Where they start and stand, as they were `typed` and as numbers; the `pinned` design, where there is one, which
-    `pin` has as text; what is wrong with what was typed, and with what is pinned; `taken`: in sentences what of it,
-    beyond what the address gives, nobody declared."""
+    """Defaults (`own`) and present values of the sliders, as text (`typed`) and as numbers; the `pinned` design if
+    there is one, as text `pin`; errors of both; `taken`: sentences on values that neither the address nor the skin
+    declares."""
 
     skin_id: str | None
     own: Mapping[str, float]
@@ -51,31 +51,31 @@ class Sliders:
 
 
 def _sliders(request: Request, store: Store, table: Table, skin: str | None = None) -> Sliders:
-    """With the values of the address, or else those of the skin, or of the paper's prototype."""
+    """With the values of the address, or else those of the skin or of the paper's prototype."""
     given = {name: request.query_params[name] for name, *_ in SLIDERS if name in request.query_params}
-    own, taken = start(store, table, skin, {name: words for name, words in WORDS.items() if name not in given})
-    own = {name: own[name] for name, *_ in SLIDERS}
-    values, error = _numbers(own, given)
+    start_values, taken = start(store, table, skin, {name: words for name, words in WORDS.items() if name not in given})
+    start_values = {name: start_values[name] for name, *_ in SLIDERS}
+    values, error = _numbers(start_values, given)
     pin = request.query_params.get(PIN, "")
-    pinned, wrong_pin = _numbers(own, dict(parse_qsl(pin, keep_blank_values=True))) if pin else (None, None)
-    typed = {name: given.get(name, f"{own[name]:g}") for name, *_ in SLIDERS}
-    return Sliders(skin, own, typed, values, pin, pinned, error, wrong_pin, taken)
+    pinned, wrong_pin = _numbers(start_values, dict(parse_qsl(pin, keep_blank_values=True))) if pin else (None, None)
+    typed = {name: given.get(name, f"{start_values[name]:g}") for name, *_ in SLIDERS}
+    return Sliders(skin, start_values, typed, values, pin, pinned, error, wrong_pin, taken)
 
 
 SlidersOfQuery = Annotated[Sliders, Depends(_sliders)]
 
 
 def _numbers(own: Mapping[str, float], given: Mapping[str, str]) -> tuple[dict[str, float], InvalidInput | None]:
-    """Those given, or else one's own, and all that is wrong with them."""
+    """The given values, or else the defaults, and all errors."""
     values = dict(own)
     try:
-        with told_together(list(LABELS)) as wrong:
-            for name in (one for one in own if one in given):
+        with errors_together(list(LABELS)) as wrong:
+            for name in (slider for slider in own if slider in given):
                 with noting(wrong):
                     values[name] = quantity(name, given[name])
             with noting(wrong):
                 parsed(DesignRequest, values)
-            if not {"pitch_mm", "sensor_radius_mm"} & {one.field for one in wrong}:
+            if not {"pitch_mm", "sensor_radius_mm"} & {invalid.field for invalid in wrong}:
                 require_apart(values["pitch_mm"], values["sensor_radius_mm"])
     except InvalidInput as error:
         return values, error
@@ -83,8 +83,8 @@ def _numbers(own: Mapping[str, float], given: Mapping[str, str]) -> tuple[dict[s
 
 
 def after_action(request: Request, sliders: Sliders) -> str | None:
-    """Where a button of the form leads: what stands pinned, or no more, or the value of a material taken; None where
-    none was pressed. Raises InvalidInput for an unknown material."""
+    """The address to which a button of the form leads: design pinned or unpinned, or a material's value used; None
+    if no button was pressed. Raises InvalidInput for an unknown material."""
     action, material = (request.query_params.get(name) for name in (ACTION, MATERIAL))
     if action is None and material is None:
         return None

@@ -1,4 +1,4 @@
-"""The array on the page of a diagnosis: a sensor that is chosen gets FRFs with both models, a table, its history."""
+"""The array on the page of a diagnosis: for the chosen sensor the FRFs with both models, a table, and its history."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ _ABOUT += "predicted on the band that 95 % of the noise stays in."
 
 @dataclass(frozen=True)
 class ShownArray:
-    """The sensors that were fitted, the one that is chosen, the figures, and the rows of its recordings."""
+    """The fitted sensors, the chosen one, the figures, and the rows of its recordings."""
 
     sensors: list[str]
     chosen: str | None
@@ -34,12 +34,12 @@ class ShownArray:
 def shown_array(
     store: Database, table: SigmaTable, row: AnyRow, texts: Mapping[str, str], sensor: str | None
 ) -> ShownArray | None:
-    """Of the diagnosis `row` of one campaign, whose figures are `texts`; None where it shows no FRFs of sensors."""
+    """For the diagnosis `row` of one campaign with the figures `texts`; None if it shows no FRFs of sensors."""
     if "frf" not in texts:
         return None
     figure = orjson.loads(texts["frf"])
-    told = figure["layout"]["meta"]
-    sensors = sorted(set(told["sensors"]))
+    meta = figure["layout"]["meta"]
+    sensors = sorted(set(meta["sensors"]))
     sensor = sensor if sensor in sensors else None
     campaign = store.read(campaigns.find, row.campaign_id)
     of_sensors = sensors_of(campaign, d33_cache.answer(store, table, campaign, None))
@@ -48,13 +48,13 @@ def shown_array(
     figures = [_map(campaign, of_sensors, sensor)]
     if sensor is None:
         return ShownArray(sensors, None, figures, [])
-    own = [number for number, name in enumerate(told["sensors"]) if name == sensor]
+    indices = [number for number, name in enumerate(meta["sensors"]) if name == sensor]
     root = store.read(skins.require_root, campaign.skin_id)
     computed = d33_cache.complete(store, table, root)
     history = drawn_history(root, history_by_model(store, table, root, "paper", computed), sensor, "paper")
     about = _ABOUT.format(sensor=sensor)
-    frf = drawn_before("frf", _only(figure, own), about, f"/diagnoses/{row.id}/frf.csv")
-    return ShownArray(sensors, sensor, [*figures, replace(frf, name="frf-of-sensor"), history], _rows(told, own))
+    frf = drawn_before("frf", _only(figure, indices), about, f"/diagnoses/{row.id}/frf.csv")
+    return ShownArray(sensors, sensor, [*figures, replace(frf, name="frf-of-sensor"), history], _rows(meta, indices))
 
 
 def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None) -> Drawn:
@@ -75,16 +75,17 @@ def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None
 
 
 def _only(figure: Mapping[str, Any], numbers: list[int]) -> str:
-    """The figure of FRFs with these recordings alone."""
+    """The FRF figure restricted to these recordings."""
     for menu in figure["layout"].get("updatemenus", []):
         menu["buttons"] = [menu["buttons"][number] for number in numbers]
     return orjson.dumps(figure).decode()
 
 
-def _rows(told: Mapping[str, Any], numbers: list[int]) -> list[dict[str, Any]]:
-    """Recordings with sphere, preload and what either model leaves; figures of older versions tell the names alone."""
+def _rows(meta: Mapping[str, Any], numbers: list[int]) -> list[dict[str, Any]]:
+    """Recordings with sphere, preload and the residual of either model; figures of older versions have only the
+    names."""
     columns = ("indenters_mm", "preloads_n", "left_percent")
     return [
-        {"recording": told["recordings"][number], **{name: told[name][number] for name in columns if name in told}}
+        {"recording": meta["recordings"][number], **{name: meta[name][number] for name in columns if name in meta}}
         for number in numbers
     ]

@@ -14,24 +14,27 @@ FigureColumns = dict[str, list[Any]]
 
 
 def columns(name: str, report: Mapping[str, Any], figures: Mapping[str, str]) -> FigureColumns:
-    """Of the figure `name`; raises KeyError where it has none."""
+    """The columns of the figure `name`; raises KeyError if it has none."""
     return _OF_REPORT[name](report) if name in _OF_REPORT else _OF_FIGURE[name](orjson.loads(figures[name]))
 
 
 def _explanations(report: Mapping[str, Any]) -> FigureColumns:
     stated = {"no_mismatch": ["nothing_missing"], "unexplained": ["none_of_these"]}
-    leader = stated.get(report["verdict"]) or [entry["name"] for entry in report["mechanisms"]]
+    leader = stated.get(report["verdict"]) or [mechanism["name"] for mechanism in report["mechanisms"]]
     rows = [(leader, report["probability"], "")]
-    rows += [(entry["mechanisms"], entry["probability"], entry["why_not"]) for entry in report["alternatives"]]
+    rows += [
+        (alternative["mechanisms"], alternative["probability"], alternative["why_not"])
+        for alternative in report["alternatives"]
+    ]
     return _by_name(("explanation", "probability", "why_not"), [(" + ".join(names), *more) for names, *more in rows])
 
 
 def _parameters(report: Mapping[str, Any]) -> FigureColumns:
     names = ("mechanism", "parameter", "unit", "value", "low", "high")
     rows = [
-        (entry["name"], one["name"], unit(one["unit"]), *(one[name] for name in names[3:]))
-        for entry in report["mechanisms"]
-        for one in entry["parameters"]
+        (mechanism["name"], parameter["name"], unit(parameter["unit"]), *(parameter[name] for name in names[3:]))
+        for mechanism in report["mechanisms"]
+        for parameter in mechanism["parameters"]
     ]
     return _by_name(names, rows)
 
@@ -44,9 +47,9 @@ def _sensors(report: Mapping[str, Any]) -> FigureColumns:
 def _population(report: Mapping[str, Any]) -> FigureColumns:
     names = ("skin", "value", "low", "high")
     rows = [
-        (entry["parameter"], entry["unit"], entry["mean"], entry["sd"], *(one[name] for name in names))
-        for entry in report["population"]
-        for one in entry["skins"]
+        (parameter["parameter"], parameter["unit"], parameter["mean"], parameter["sd"], *(skin[name] for name in names))
+        for parameter in report["population"]
+        for skin in parameter["skins"]
     ]
     return _by_name(("parameter", "unit", "mean", "sd", *names), rows)
 
@@ -85,21 +88,21 @@ def _curve(figure: Mapping[str, Any]) -> FigureColumns:
 
 
 def _frf(figure: Mapping[str, Any]) -> FigureColumns:
-    """Every recording's lines, what models predict of them and leave, and the band of the noise."""
+    """Lines, model predictions, residuals and noise band of every recording."""
     layout, meta = figure["layout"], figure["layout"]["meta"]
     first = {axis: [trace[axis] for trace in figure["data"]] for axis in ("x", "y")}
     buttons = [button for menu in layout.get("updatemenus", []) for button in menu["buttons"]]
-    own = [{**first, **button["args"][0]} for button in buttons] or [first]
+    views = [{**first, **button["args"][0]} for button in buttons] or [first]
     rows: list[tuple[Any, ...]] = []
-    for name, sensor, numbers in zip(meta["recordings"], meta["sensors"], own, strict=True):
+    for name, sensor, numbers in zip(meta["recordings"], meta["sensors"], views, strict=True):
         lines = zip(*map(_numbers, (numbers["x"][0], *numbers["y"])), strict=True)
         rows += [(name, sensor, *line) for line in lines]
     return _by_name(("recording", "sensor", "frequency_hz", *map(_with_unit, meta["shows"])), rows)
 
 
-def _with_unit(shows: str) -> str:
-    unit = "deg" if "phase" in shows else "percent" if " " in shows else "pc_per_n"
-    return f"{shows.replace(' ', '_')}_{unit}"
+def _with_unit(heading: str) -> str:
+    unit = "deg" if "phase" in heading else "percent" if " " in heading else "pc_per_n"
+    return f"{heading.replace(' ', '_')}_{unit}"
 
 
 def _rounded(value: float) -> float:
@@ -112,7 +115,7 @@ def _by_name(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> FigureColum
 
 
 def _numbers(column: Any) -> list[float]:
-    """A column as plotly writes it: a list, or the bytes of an array; one of two axes row by row."""
+    """A column as plotly writes it: a list, or the bytes of an array; a two-dimensional one row by row."""
     if isinstance(column, Mapping):
         values: list[float] = np.frombuffer(base64.b64decode(column["bdata"]), dtype=column["dtype"]).tolist()
         return values

@@ -1,4 +1,4 @@
-"""A diagnosis: asked for, watched while it runs, read, saved, adopted."""
+"""A diagnosis: requested, monitored while it runs, read, saved, adopted."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -14,11 +14,11 @@ from sqlalchemy import Connection
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.diagnosis.array import shown_array
 from service.pages.diagnosis.figure_columns import columns
-from service.pages.diagnosis.plan import FIELDS, left_open
+from service.pages.diagnosis.plan import FIELDS, is_undecided
 from service.pages.diagnosis.planned import PlannedRow, heads, planned_rows, rig_answer
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
-from service.pages.shared.forms import OWN_FORM, Form, see
+from service.pages.shared.forms import FORM_OF_SESSION, Form, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
 from service.store import AnyRow, Database, Missing, campaigns, diagnoses, models, skins
@@ -57,9 +57,9 @@ _ABOUT = {
 _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import
 
 
-@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, OWN_FORM])
+@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, FORM_OF_SESSION])
 def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Puts it into the queue; one that was diagnosed as it is now is shown."""
+    """Queue it; an existing diagnosis of the campaign's present state is shown."""
     row = store.write(usecase.ask, campaign_id, table, sender(request))
     runner.stir()
     return see(f"/diagnoses/{row.id}")
@@ -69,7 +69,7 @@ def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: S
 def ask_again(
     request: Request, diagnosis_id: DiagnosisId, sent: Form, runner: RunnerInUse, store: Store, table: Table
 ) -> Response:
-    """Puts the same into the queue, of the campaigns as they are now, without the mechanisms that the form names."""
+    """Queue the same for the campaigns' present state, without the mechanisms that the form names."""
     row = store.write(usecase.ask_again, diagnosis_id, table, sender(request), sent.get("without", "").split())
     runner.stir()
     return see(f"/diagnoses/{row.id}")
@@ -79,33 +79,33 @@ def ask_again(
 def diagnosis(
     request: Request, diagnosis_id: DiagnosisId, store: Store, table: Table, sensor: str | None = None
 ) -> Response:
-    """How far it is, or what it found; `sensor` picks the one whose recordings and history are shown."""
+    """Its progress or its result; `sensor`: the one whose recordings and history are shown."""
     with store.reading() as connection:
-        row, report, figures = _kept(connection, diagnosis_id)
+        row, report, figures = _stored(connection, diagnosis_id)
         of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
-        own = next((model for model in of_skin if model.id == row.id), None)
-        adopted_as = None if own is None else verdicts.adopted_versions(connection, [own])[0]
+        adopted = next((model for model in of_skin if model.id == row.id), None)
+        adopted_as = None if adopted is None else verdicts.adopted_versions(connection, [adopted])[0]
         members = diagnoses.members(connection, row)
         outdated = _outdated(connection, row)
-    alone = row.kind == "campaign"
-    not_adopted = None if report is None or not alone else _not_adopted(report)
-    planned = _planned(store, row, report) if report is not None and alone else []
+    of_campaign = row.kind == "campaign"
+    not_adopted = None if report is None or not of_campaign else _not_adopted(report)
+    planned = _planned(store, row, report) if report is not None and of_campaign else []
     return page(
         request,
         "diagnosis.html",
         row=row,
         name=row.name or members[0].name,
-        alone=alone,
+        alone=of_campaign,
         members=members,
         shown=None if report is None else _shown(row, report, figures),
-        array=shown_array(store, table, row, figures, sensor) if alone else None,
-        lacks_figures=alone and report is not None and report["fit"] is not None and not figures,
+        array=shown_array(store, table, row, figures, sensor) if of_campaign else None,
+        lacks_figures=of_campaign and report is not None and report["fit"] is not None and not figures,
         outdated=outdated,
         adopted_as=adopted_as,
-        in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
-        may_be_adopted=alone and report is not None and not_adopted is None,
+        in_force=adopted is not None and adopted is of_skin[0] and adopted.model_withdrawn_at is None,
+        may_be_adopted=of_campaign and report is not None and not_adopted is None,
         settled=report is not None and _settled(report),
-        open=alone and report is not None and "curve" not in figures and left_open(report),
+        open=of_campaign and report is not None and "curve" not in figures and is_undecided(report),
         limit_fields=FIELDS,
         planned=planned,
         heads=heads(planned),
@@ -113,20 +113,20 @@ def diagnosis(
         without_names=" ".join(diagnoses.without(row)),
         supposed=[] if report is None else _supposed(report, diagnoses.without(row)),
         has_law=report is not None and report.get("unnamed") is not None,
-        not_kept=None if report is None else _not_kept(report),
+        not_kept=None if report is None else _why_not_adopted(report),
         not_adopted=not_adopted,
         same=same_request.get(request, f"/v1/diagnoses/{row.id}", f"client.diagnoses.get({row.id!r})"),
     )
 
 
 def _outdated(connection: Connection, row: AnyRow) -> str | None:
-    """Why it is not of its campaigns as they are now, with names for the ids of campaigns."""
+    """Why it is outdated, with the names of the campaigns in place of their ids."""
 
-    def named(found: re.Match[str]) -> str:
+    def named(match: re.Match[str]) -> str:
         try:
-            return f"“{campaigns.find(connection, found[0]).name}”"
-        except Missing:  # it stands in what a person wrote
-            return found[0]
+            return f"“{campaigns.find(connection, match[0]).name}”"
+        except Missing:  # the text is user input
+            return match[0]
 
     why = diagnoses.outdated(row)
     return None if why is None else _CAMPAIGN.sub(named, why)
@@ -134,7 +134,7 @@ def _outdated(connection: Connection, row: AnyRow) -> str | None:
 
 @router.get("/diagnoses/{diagnosis_id}/report.html")
 def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
-    """The whole as one file that needs nothing else, to be kept or sent."""
+    """The report as a single self-contained file."""
     import plotly.io
 
     from underskin.diagnosis.reporting import html_report as file
@@ -151,7 +151,7 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
 
 @router.get("/diagnoses/{diagnosis_id}/planned.csv")
 def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
-    """The recordings that the report plans, a row each."""
+    """The recordings that the report plans, one per row."""
     row, report, _ = _done(store, diagnosis_id)
     planned = (report["next_experiment"] or {}).get("recordings", [])
     if not planned:
@@ -161,7 +161,7 @@ def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
 
 @router.get("/diagnoses/{diagnosis_id}/planned/{number}/rig.yaml")
 def planned_rig(diagnosis_id: DiagnosisId, number: Annotated[int, Path(ge=1)], store: Store) -> Response:
-    """The rig description of one of them, with which its file can be sent."""
+    """The rig description of a planned recording, for sending its file."""
     row, report, _ = _done(store, diagnosis_id)
     return rig_answer(store, row, _planned(store, row, report), number)
 
@@ -178,17 +178,17 @@ def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Respons
         _cannot_be_shown(row)
 
 
-@router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[*WRITE, OWN_FORM])
+@router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[*WRITE, FORM_OF_SESSION])
 def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Response:
-    """Ends it."""
+    """Cancel it."""
     store.write(diagnoses.cancel, diagnosis_id)
     runner.stir()
     return see(f"/diagnoses/{quote(diagnosis_id, safe='')}")
 
 
-@router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=[*WRITE, OWN_FORM])
+@router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=[*WRITE, FORM_OF_SESSION])
 def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
-    """Makes it the model of its skin."""
+    """Make it the model of its skin."""
     with store.writing() as connection:
         skin = diagnoses.find(connection, diagnosis_id).skin_id
         model = adopt_model(connection, skin, diagnosis_id, sender(request))
@@ -203,25 +203,25 @@ def _planned(store: Database, row: AnyRow, report: Mapping[str, Any]) -> list[Pl
 
 
 def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[str, str]]:
-    """Mechanisms of the catalogue that the campaign might be diagnosed without, in words, and what would be left out in
-    all."""
+    """Catalogue mechanisms that could be excluded from another diagnosis, in words, and the complete list of those
+    excluded then."""
     named = [name for name in verdicts.mechanisms_of(report) if name in CATALOGUE]
     return [(in_words([name]), " ".join([*without, name])) for name in dict.fromkeys(named)]
 
 
-def _not_kept(report: Mapping[str, Any]) -> str | None:
-    """Why the law that a report holds cannot become a mechanism of the lab's own; None where it can."""
+def _why_not_adopted(report: Mapping[str, Any]) -> str | None:
+    """Why the law of a report cannot become a mechanism of the lab's own; None if it can."""
     from underskin.mechanisms.declared.saving import document  # the models, which few pages need
 
     try:
         document(report, "kept")
     except InvalidInput as refusal:
-        return refusal.allowed.removesuffix(": it cannot be kept")  # as the page has said
+        return refusal.allowed.removesuffix(": it cannot be kept")  # as stated on the page
     return None
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
-    """Why a report cannot become a model, and what to do; None where it can."""
+    """Why a report cannot become a model, and what to do; None if it can."""
     from underskin.prediction.adopted_model import implausible_d33, not_adopted
 
     why_not = not_adopted(report)
@@ -235,26 +235,26 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
 
 
 def _settled(report: Mapping[str, Any]) -> bool:
-    """Whether one answer holds four fifths of the probability: an explanation, or one form of an unlisted law."""
+    """Whether one answer has 80 % of the probability: an explanation, or one form of an unlisted law."""
     law = report.get("unnamed")
     share = 1.0 if law is None else law["probability"]
     return report["verdict"] in ("explained", "unexplained") and report["probability"] * share >= EXPLAINED
 
 
-def _kept(connection: Connection, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any] | None, dict[str, str]]:
+def _stored(connection: Connection, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any] | None, dict[str, str]]:
     row = diagnoses.find(connection, diagnosis_id)
     return row, diagnoses.report_of(connection, row.number), diagnoses.figures_of(connection, row.number)
 
 
 def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], dict[str, str]]:
-    row, report, figures = store.read(_kept, diagnosis_id)
+    row, report, figures = store.read(_stored, diagnosis_id)
     if report is None:
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} has no report: its state is {row.state}.")
     return row, report, figures
 
 
 def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> tuple[Markup, Markup]:
-    """The report, worded as the file has it, with the figures of a page; and with what it was made."""
+    """The report in the words of the file, with the page's figures, and its origin."""
     from underskin.diagnosis.reporting import html_report as file
 
     try:
@@ -283,25 +283,27 @@ def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
 
 
 def _about(name: str, text: str) -> str:
-    """What is to be seen in a figure; of the map of the misfit, of what it draws."""
+    """The description of a figure; for the map of the misfit also of the quantity drawn."""
     if name != "where":
         return _ABOUT[name]
     layout = orjson.loads(text)["layout"]
     axes = [layout[axis]["title"].get("text", "") for axis in ("xaxis", "yaxis")]
-    said = [_ABOUT[name]]
+    sentences = [_ABOUT[name]]
     if any(title.startswith("frequency") for title in axes):
-        said.append("Steps of frequency are even in its logarithm.")
+        sentences.append("Steps of frequency are even in its logarithm.")
     if any(title.startswith("displacement") for title in axes):
-        said.append("The displacement is that of the file; the curve's figure counts depth from the contact point.")
+        sentences.append(
+            "The displacement is that of the file; the curve's figure counts depth from the contact point."
+        )
     if layout.get("shapes"):
-        said.append("The outlined region holds most of the misfit.")
+        sentences.append("The outlined region holds most of the misfit.")
     if "noise_percent" in layout.get("meta", {}):
         noise = in_digits(layout["meta"]["noise_percent"], 2)
-        said.append(
+        sentences.append(
             f"95 % of the noise of a point, which is a recording or a part of its lines, stays within ±{noise} %, in "
             "percent of what is predicted there; the colours reach twice as far, or farther."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def _cannot_be_shown(row: AnyRow) -> NoReturn:

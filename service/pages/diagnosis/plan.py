@@ -1,4 +1,4 @@
-"""What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
+"""The next measurement within the limits of the reader's rig; planned in a worker process, and not stored."""
 
 import re
 from collections.abc import Mapping
@@ -46,12 +46,12 @@ _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
 
 
-def left_open(report: Mapping[str, Any]) -> bool:
-    """Whether a report leaves more than one explanation that recordings could tell apart."""
+def is_undecided(report: Mapping[str, Any]) -> bool:
+    """Whether a report leaves several explanations that further recordings could separate."""
     if report["verdict"] == "unexplained":
         return False
-    others = sum(entry["probability"] > _SURVIVES for entry in report["alternatives"])
-    return bool(report["next_experiment"]) or (report["fit"] is not None and others > 0)
+    surviving = sum(alternative["probability"] > _SURVIVES for alternative in report["alternatives"])
+    return bool(report["next_experiment"]) or (report["fit"] is not None and surviving > 0)
 
 
 @router.get("")
@@ -92,12 +92,12 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
 
 @router.get("/recordings.csv")
 def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
-    """The planned recordings, a row each, and how many of each have arrived."""
+    """The planned recordings, one per row, and how many of each have arrived."""
     rows = _rows_of_address(request, diagnosis_id, planner, store)
-    names = list(dict.fromkeys(name for one in rows for name in one.values))
-    told = [{name: in_a_cell(value) for name, value in one.values.items()} for one in rows]
-    counts = [{"repeats": one.repeats, "arrived": one.arrived} for one in rows]
-    joined = [own | count for own, count in zip(told, counts, strict=True)]
+    names = list(dict.fromkeys(name for planned in rows for name in planned.values))
+    cells = [{name: in_a_cell(value) for name, value in planned.values.items()} for planned in rows]
+    counts = [{"repeats": planned.repeats, "arrived": planned.arrived} for planned in rows]
+    joined = [values | count for values, count in zip(cells, counts, strict=True)]
     row, name = _diagnosed(store, diagnosis_id)
     return csv_of_rows(file_name(row.skin_id, name, "plan"), [*names, "repeats", "arrived"], joined)
 
@@ -106,7 +106,7 @@ def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: Planner
 def rig_yaml(
     request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store, number: Annotated[int, Path(ge=1)]
 ) -> Response:
-    """The rig description of one planned recording, with which its file can be sent."""
+    """The rig description of a planned recording, for sending its file."""
     rows = _rows_of_address(request, diagnosis_id, planner, store)
     return rig_answer(store, _diagnosed(store, diagnosis_id)[0], rows, number)
 
@@ -122,7 +122,7 @@ def _rows_of_address(request: Request, diagnosis_id: str, planner: Planner, stor
 
 @router.get("/progress")
 def progress(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
-    """How far it is."""
+    """Its progress."""
     row, _ = _diagnosed(store, diagnosis_id)
     planned = planner.plan(row, _checked(_limits(request.query_params)))
     return JSONResponse({"state": planned.state, "progress": planned.progress})
@@ -179,6 +179,6 @@ def _same(request: Request, campaign_id: str, limits: Mapping[str, Any]) -> same
             options += [flag, *map(repr, value)]
         else:
             values = value if name in _SEVERAL else [value]
-            options += [text for one in values for text in (flag, repr(one))]
+            options += [text for item in values for text in (flag, repr(item))]
     call = ", ".join(f"{name}={value!r}" for name, value in limits.items())
     return same_request.planned(request, campaign_id, options, call)

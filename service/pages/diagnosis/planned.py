@@ -1,4 +1,4 @@
-"""Planned recordings as pages have them: the conditions of each, how many have arrived, its rig description."""
+"""Planned recordings on pages: the conditions of each, how many have arrived, its rig description."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _HEADS = {
 
 @dataclass(frozen=True)
 class PlannedRow:
-    """A planned recording: its conditions by field, how often it is to be made, and how many have arrived."""
+    """A planned recording: its conditions by field, the number of repeats, and how many have arrived."""
 
     values: Mapping[str, Any]
     repeats: int
@@ -28,7 +28,7 @@ class PlannedRow:
 
     @property
     def complete(self) -> bool:
-        """Whether all are there."""
+        """Whether all have arrived."""
         return self.arrived >= self.repeats
 
 
@@ -38,15 +38,17 @@ def planned_rows(store: Database, row: AnyRow, plan: Mapping[str, Any] | None) -
     counts = store.read(planned_recordings.arrived, row, entries)
     return [
         PlannedRow(
-            {name: value for name, value in entry.items() if name != "repeats" and value != []}, entry["repeats"], count
+            {name: value for name, value in planned.items() if name != "repeats" and value != []},
+            planned["repeats"],
+            count,
         )
-        for entry, count in zip(entries, counts, strict=True)
+        for planned, count in zip(entries, counts, strict=True)
     ]
 
 
 def heads(rows: Sequence[PlannedRow]) -> dict[str, str]:
-    """Of a table of them, the heading of each condition."""
-    return {name: _HEADS.get(name) or axis(name) for one in rows for name in one.values}
+    """The table headings of the conditions."""
+    return {name: _HEADS.get(name) or axis(name) for row in rows for name in row.values}
 
 
 def rig_answer(store: Database, row: AnyRow, rows: Sequence[PlannedRow], number: int) -> Response:

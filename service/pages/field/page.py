@@ -1,4 +1,4 @@
-"""The stress under a sphere: section and top view, and the contact as it grows with the load."""
+"""The stress under a sphere: section and top view, and the contact's growth with the load."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from service.dependencies import Store, Table
-from service.heavy_answers import each_in_turn
+from service.heavy_answers import computed_in_turn
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import UNLIKELY, in_form_words, number
@@ -44,7 +44,7 @@ FRAMES = 20  # of the load as it grows to the one that is asked for
 
 @dataclass(frozen=True)
 class ShownField:
-    """The field of a form, its numbers, and the limit of the table that it exceeds; or what is wrong with it."""
+    """The field of a form, its numbers, and the limit of the table that it exceeds; or its errors."""
 
     field: StressField | None
     given: Mapping[str, float]
@@ -54,7 +54,7 @@ class ShownField:
 
 @router.get("")
 def view(request: Request, store: Store, table: Table, skin: str | None = None) -> Response:
-    """With the numbers of the address, or else those of the skin, or of the paper's prototype."""
+    """With the values of the address, or else those of the skin or of the paper's prototype."""
     values, taken = shown(store, table, request.query_params, skin, FIELDS)
     tried = _tried(request, table, values)
     ok = tried.field is not None and tried.outside is None
@@ -69,7 +69,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
         units_checked=UNITS in request.query_params,
         wrong=tried.wrong,
         outside=tried.outside,
-        told=_told(tried.field, 0) if ok and tried.field is not None else [],
+        told=_sentences(tried.field, 0) if ok and tried.field is not None else [],
         error_percent=_error_percent(tried.field) if ok and tried.field is not None else 0.0,
         linear=tried.given.get("poisson_ratio") != INCOMPRESSIBLE,
         figures=_figures(tried.field, query) if ok and tried.field is not None else [],
@@ -81,7 +81,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
 
 
 @router.get("/frames")
-@each_in_turn
+@computed_in_turn
 def at_once(request: Request, table: Table) -> Response:
     """What changes in the page while the load grows, a frame for each force, as JSON."""
     from underskin.figures.stress_field import frames
@@ -90,7 +90,7 @@ def at_once(request: Request, table: Table) -> Response:
     field = _computed(table, given, FRAMES, UNITS in request.query_params)
     rows = range(FRAMES) if field.contact.inside.all() else ()
     content = orjson.dumps(
-        [{"told": _told(field, row), "figures": frames(field, row)} for row in rows],
+        [{"told": _sentences(field, row), "figures": frames(field, row)} for row in rows],
         option=orjson.OPT_SERIALIZE_NUMPY,
     )
     answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
@@ -122,8 +122,8 @@ def _tried(request: Request, table: SigmaTable, values: Mapping[str, str]) -> Sh
 
 
 def _by_solved_contact(table: SigmaTable, tried: ShownField) -> float | None:
-    """The sensor's mean stress [MPa] where it differs by more than 1 %; None elsewhere, and where it is not known, as
-    without the contact table, of which /tables tells."""
+    """The sensor's mean stress [MPa] with the finite-strain contact if it differs by more than 1 %; None otherwise,
+    or without the contact table, about which /tables informs."""
     given = {name: np.array(value) for name, value in tried.given.items()}
     assert tried.field is not None
     paper = float(tried.field.contact.mean_stress[0])
@@ -135,16 +135,16 @@ def _by_solved_contact(table: SigmaTable, tried: ShownField) -> float | None:
 
 
 def _computed(table: SigmaTable, given: Mapping[str, float], count: int, units_checked: bool) -> StressField:
-    """At so many forces in equal steps up to the one given; raises InvalidInput."""
+    """For `count` forces in equal steps up to the given one; raises InvalidInput."""
     skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
     force = checked("preload_n", given["preload_n"], units_checked=units_checked)
-    with np.errstate(all="ignore"):  # what overflows is outside the table
+    with np.errstate(all="ignore"):  # an overflow is outside the table
         return stress_field(table, skin, indenter, force * np.arange(1, count + 1) / count, _RADII, _DEPTHS)
 
 
-def _told(field: StressField, row: int) -> list[str]:
-    """What the load makes, in the order in which the page says it."""
+def _sentences(field: StressField, row: int) -> list[str]:
+    """The results for a load, in the order of the page."""
     contact, force = field.contact, float(field.preload[row])
     a = float(contact.contact_radius[row])
     mean = float(to_lab("mean_stress_mpa", contact.mean_stress[row]))

@@ -1,4 +1,4 @@
-"""Fleets: skins of one make are chosen, named and diagnosed together; what was diagnosed before."""
+"""Fleets: skins of one batch are chosen, named and diagnosed together; lists earlier diagnoses."""
 
 from collections.abc import Collection, Mapping
 from typing import Annotated
@@ -32,16 +32,16 @@ def fleets(
     chosen: Annotated[tuple[str, ...], Query(max_length=_ON_A_PAGE)] = (),
     name: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
-    """The skins to choose from, by id; what was chosen and typed before the list was searched stays."""
+    """The skins to choose from, by id; choices and texts are kept when the list is searched."""
     return _choice(request, store, find, after, chosen, name)
 
 
 @router.post("/diagnosis", dependencies=WRITE)
 def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Puts the diagnosis of the chosen skins into the queue; one that there is already is shown. What is wrong stands
-    in the form, with all that was chosen."""
+    """Queue the diagnosis of the chosen skins; an existing one is shown. Errors are shown in the form, with all
+    choices."""
     try:
-        row = store.write(usecase.ask_of_fleet, table, sender(request), _asked(sent))
+        row = store.write(usecase.ask_of_fleet, table, sender(request), _requested(sent))
     except (UnderskinError, Conflict) as error:
         find, after = sent.get("find", ""), sent.get("after") or None
         return _choice(request, store, find, after, _chosen(sent), sent.get("name", ""), error)
@@ -53,8 +53,8 @@ def _chosen(sent: Mapping[str, str]) -> list[str]:
     return [value for name, value in sent.items() if name.startswith(_BOX)]
 
 
-def _asked(sent: Mapping[str, str]) -> AskForFleet:
-    """The request that the form stands for; raises InvalidInput."""
+def _requested(sent: Mapping[str, str]) -> AskForFleet:
+    """The request of the form; raises InvalidInput."""
     chosen = _chosen(sent)
     if len(chosen) < FEWEST_SKINS:
         raise too_few("skins", f"{len(chosen)} chosen", f"must be {FEWEST_SKINS} at least: tick those of one make")

@@ -1,4 +1,4 @@
-"""The glossary: docs/glossary.md as a page, since a lab's server may have no network to read it elsewhere."""
+"""The glossary: docs/glossary.md as a page, because a lab's server may have no network."""
 
 import re
 from functools import cache
@@ -26,7 +26,7 @@ def view(request: Request) -> Response:
 def _parts() -> tuple[str, list[tuple[str, str]]]:
     """In HTML what stands below the title, and each subject with the table of its terms."""
     markdown = MarkdownIt("js-default", {"html": False})
-    first, *others = _LINK.sub(r"\1", _FILE.read_text(encoding="utf-8")).split("\n## ")
-    subjects = [one.partition("\n")[::2] for one in others]
+    first, *parts = _LINK.sub(r"\1", _FILE.read_text(encoding="utf-8")).split("\n## ")
+    subjects = [part.partition("\n")[::2] for part in parts]
     tables = [(subject, markdown.render(text).replace("<table>", '<table class="list">')) for subject, text in subjects]
     return markdown.render(first.partition("\n")[2]), tables

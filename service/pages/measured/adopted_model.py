@@ -1,4 +1,4 @@
-"""d33 by a skin's adopted model, beside the paper's, on the page of a few measured values."""
+"""d33 by a skin's adopted model, next to the paper's, on the page of a few measured values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 if TYPE_CHECKING:
     from underskin.prediction.adopted_model import AdoptedModel
 
-# Words and unit of what a model may need beside sphere and preload.
+# Words and unit of the additional values that a model may need besides sphere and preload.
 _NEEDED = {
     "dynamic_force_n": ("dynamic force", "N"),
     "dwell_s": ("time the preload was held", "s"),
@@ -31,10 +31,10 @@ _LABELS = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) 
 
 @dataclass(frozen=True)
 class ByModel:
-    """What the model in force says of the same measurements.
+    """The result of the model in force for the same measurements.
 
-    `fields`: what the form asks for besides (name, words, unit, value); `document`: the request of `POST /v1/d33` and
-    `answer`: its answer, both None where `unavailable` says why.
+    `fields`: additional fields of the form (name, words, unit, value); `document`: the request of `POST /v1/d33` and
+    `answer`: its answer, both None if `unavailable` gives a reason.
     """
 
     fields: Sequence[tuple[str, str, str, str]] = ()
@@ -64,8 +64,8 @@ def by_model(
         return ByModel(unavailable=str(outdated))
     fields = [(name, *_NEEDED[name], given.get(name, "").strip()) for name in model.needs]
     try:
-        asked = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
-        return ByModel(fields, asked, d33(table, store, D33Columns.model_validate(asked)))
+        document_of_model = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
+        return ByModel(fields, document_of_model, d33(table, store, D33Columns.model_validate(document_of_model)))
     except UnderskinError as refused:
         return ByModel(fields, unavailable=in_form_words(refused, _LABELS))
 

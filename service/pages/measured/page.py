@@ -1,4 +1,4 @@
-"""d33 from single measured values of the FRF, for whom a file of recordings would be too much."""
+"""d33 from single measured values of the FRF, without a file of recordings."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from service.pages.shared.forms import UNLIKELY, in_form_words, numbers
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_values import UNITS, shown
-from service.pages.shared.wrong_fields import NOTHING_WRONG, quantities, told_together, wrong_fields
+from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, quantities, wrong_fields
 from service.problems import parsed
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
@@ -35,7 +35,7 @@ FIELDS = tuple(field for field in SKIN_FIELDS if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
 _WITHOUT_UNCERTAINTY = 3  # numbers of a row
 _ROWS = "4 1 7.06 0.1\n4 3 7.45 0.1"
-_ROW, _ALL_ROWS = "row", "measurements"  # as errors call what is in the rows
+_ROW, _ALL_ROWS = "row", "measurements"  # names in errors of the columns of the rows
 _CHECKS: dict[str, Check] = {
     "indenter_radius_mm": declared,
     "preload_n": declared,
@@ -69,8 +69,8 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         answer = _answered(table, store, document)
         adopted = by_model(store, table, skin, request.query_params, document)
     except UnderskinError as problem:
-        wrong = wrong_fields(problem, _said, _form_field)
-    asked = document if adopted is None or adopted.document is None else adopted.document
+        wrong = wrong_fields(problem, _message, _form_field)
+    document_used = document if adopted is None or adopted.document is None else adopted.document
     return page(
         request,
         "measured.html",
@@ -87,7 +87,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         adopted=adopted,
         outside=[] if answer is None else reasons(document, answer, table),
         query=request.url.query,
-        same=same_request.post(request, "/v1/d33", asked, f"client.d33(**{asked!r})"),
+        same=same_request.post(request, "/v1/d33", document_used, f"client.d33(**{document_used!r})"),
     )
 
 
@@ -100,7 +100,7 @@ def rows_csv(request: Request, store: Store, table: Table, skin: str | None = No
     return csv_answer("d33", _columns(document, _answered(table, store, document), adopted, table))
 
 
-def _said(error: UnderskinError) -> str:
+def _message(error: UnderskinError) -> str:
     row = "" if not isinstance(error, InvalidInput) or error.index is None else f"{_ROW} {error.index + 1}, "
     return row + in_form_words(error, _LABELS, unlikely=UNLIKELY)
 
@@ -120,19 +120,19 @@ def _columns(
     """What was sent and what is answered, a row a measurement."""
     sent = {name: document.get(name, [math.nan] * answer.rows) for name in _ORDER}
     answered = {name: answer.full(name).tolist() for name in _ANSWERED}
-    beside = {} if adopted is None else adopted.columns()
+    adopted_columns = {} if adopted is None else adopted.columns()
     return {
         **sent,
         **answered,
         **_by_solved_contact(document, answer, table),
-        **beside,
+        **adopted_columns,
         "status": list(answer.status()),
     }
 
 
 def _by_solved_contact(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> dict[str, list[float]]:
-    """d33 by it, a row a measurement, where any differs from the paper's by more than 1 %; none without the contact
-    table, of which /tables tells."""
+    """d33 with the finite-strain contact, a row a measurement, if any differs from the paper's by more than 1 %;
+    none without the contact table, about which /tables informs."""
     given = {name: np.asarray(value, dtype=float) for name, value in document.items() if name != UNITS}
     try:
         other = other_contact(table, "paper", given, answer.full("d33_pc_per_n"), units_checked=UNITS in document)
@@ -144,7 +144,7 @@ def _by_solved_contact(document: Mapping[str, Any], answer: Columns, table: Sigm
 
 def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) -> dict[str, Any]:
     """The request of `POST /v1/d33`; raises SeveralInvalid."""
-    with told_together() as wrong:
+    with errors_together() as wrong:
         document: dict[str, Any] = {}
         with noting(wrong):
             document |= quantities(values, [name for name, *_ in FIELDS], units_checked=UNITS in given)
@@ -155,11 +155,11 @@ def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) ->
 def _columns_of(rows: str, *, units_checked: bool) -> dict[str, list[float]]:
     """The measurements, a column for each quantity; raises SeveralInvalid."""
     parts: list[list[float]] = []
-    with told_together() as wrong:
-        for place, line in enumerate(rows.splitlines(), 1):
+    with errors_together() as wrong:
+        for line_number, line in enumerate(rows.splitlines(), 1):
             if line.strip():
                 with noting(wrong):
-                    parts.append(_row(place, line, units_checked=units_checked))
+                    parts.append(_row(line_number, line, units_checked=units_checked))
     if not parts:
         raise required(_ALL_ROWS, "fill in at least one row: R F FRF, in mm, N and pC/N")
     if len({len(part) for part in parts}) != 1:
@@ -169,21 +169,23 @@ def _columns_of(rows: str, *, units_checked: bool) -> dict[str, list[float]]:
     return dict(zip(_ORDER, (list(column) for column in zip(*parts, strict=True)), strict=False))
 
 
-def _row(place: int, line: str, *, units_checked: bool) -> list[float]:
-    parts = numbers(f"{_ROW} {place}", line, [_LABELS[name] for name in _ORDER])
+def _row(line_number: int, line: str, *, units_checked: bool) -> list[float]:
+    parts = numbers(f"{_ROW} {line_number}", line, [_LABELS[name] for name in _ORDER])
     if len(parts) not in (_WITHOUT_UNCERTAINTY, len(_ORDER)):
-        raise wrong_type(f"{_ROW} {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
-    with told_together() as wrong:
+        raise wrong_type(
+            f"{_ROW} {line_number}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)"
+        )
+    with errors_together() as wrong:
         for (name, check), value in zip(_CHECKS.items(), parts, strict=False):
             try:
                 check(name, value, units_checked)
             except InvalidInput as error:
-                wrong.append(InvalidInput(name, error.value, error.allowed, place - 1, code=error.code))
+                wrong.append(InvalidInput(name, error.value, error.allowed, line_number - 1, code=error.code))
     return parts
 
 
 def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> list[str]:
-    """Of each row outside the table, which value is and what is allowed; `document`: the request of the answer."""
+    """For each row outside the table the value and the allowed range; `document`: the request of the answer."""
     numbers = [answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
     status = answer.status()
     skin = document["youngs_modulus_mpa"], document["poisson_ratio"]

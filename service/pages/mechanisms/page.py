@@ -1,6 +1,5 @@
-"""The catalogue of mechanisms: what each does to an FRF, in a picture and a formula, what acts like it, where it was
-found; and the lab's own, which are kept from a diagnosis and can be discarded.
-"""
+"""The catalogue of mechanisms: the effect of each on an FRF as picture and formula, similar mechanisms, and
+diagnoses that found it; also the lab's own mechanisms, stored from diagnoses, which can be discarded."""
 
 import base64
 import hashlib
@@ -12,7 +11,7 @@ from service.dependencies import WRITE, Store, Table
 from service.pages.mechanisms.picture import STYLE, picture
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
-from service.pages.shared.forms import OWN_FORM, Form, see
+from service.pages.shared.forms import FORM_OF_SESSION, Form, see
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.usecases import mechanisms as usecase
@@ -32,14 +31,14 @@ _SHOWN = 8  # diagnoses of each mechanism; the file of numbers has all
 @router.get("")
 def mechanisms(request: Request, store: Store, table: Table) -> Response:
     """The lab's own first."""
-    known = catalogue(store, table)
+    listed = catalogue(store, table)
     return page(
         request,
         "mechanisms.html",
-        own=[one for one in known.entries if one.entry.own],
-        others=[one for one in known.entries if not one.entry.own],
+        own=[row for row in listed.entries if row.entry.own],
+        others=[row for row in listed.entries if not row.entry.own],
         unusable=usecase.unusable(),
-        diagnoses=known.diagnoses,
+        diagnoses=listed.diagnoses,
         shown=_SHOWN,
         sure=EXPLAINED,
         rig=RIG,
@@ -49,7 +48,7 @@ def mechanisms(request: Request, store: Store, table: Table) -> Response:
 
 @router.get("/{name}/picture.svg")
 def drawn(name: str, request: Request, table: Table) -> Response:
-    """What it does to the FRF of the reference rig, or to its force curve."""
+    """Its effect on the FRF of the reference rig, or on its force curve."""
     content = picture(name, _effect(name, table))
     tag = f'"{hashlib.sha256(content.encode()).hexdigest()[:16]}"'
     headers = {
@@ -78,45 +77,45 @@ def numbers(name: str, table: Table) -> Response:
 @router.get("/{name}/found.csv")
 def found_csv(name: str, store: Store) -> Response:
     """Every diagnosis that states it."""
-    _require_known(name)
+    _require_listed(name)
     rows = findings(store).by_mechanism.get(name, ())
     columns: Mapping[str, list[object]] = {
-        "diagnosis": [one.diagnosis_id for one in rows],
-        "campaign": [one.campaign_id or "" for one in rows],
-        "skin": [one.skin_id for one in rows],
-        "name": [one.name for one in rows],
-        "ended_at": [one.at for one in rows],
-        "verdict": [one.verdict for one in rows],
-        "probability": [one.probability for one in rows],
+        "diagnosis": [row.diagnosis_id for row in rows],
+        "campaign": [row.campaign_id or "" for row in rows],
+        "skin": [row.skin_id for row in rows],
+        "name": [row.name for row in rows],
+        "ended_at": [row.at for row in rows],
+        "verdict": [row.verdict for row in rows],
+        "probability": [row.probability for row in rows],
     }
     return csv_answer(f"{name}-found", columns)
 
 
 @router.post("", dependencies=WRITE)
 def keep_found(sent: Form, store: Store) -> Response:
-    """Keep the law that a diagnosis found."""
+    """Store the law that a diagnosis found as a mechanism."""
     description = sent.get("description", "").strip()[:500] or None
     store.read(usecase.keep_found, sent.get("diagnosis_id", ""), sent.get("name", "").strip(), description)
     return see("/mechanisms")
 
 
-@router.post("/{name}/discard", dependencies=[*WRITE, OWN_FORM])
+@router.post("/{name}/discard", dependencies=[*WRITE, FORM_OF_SESSION])
 def discard(name: str, store: Store) -> Response:
-    """Take it out of the catalogue."""
+    """Remove it from the catalogue."""
     store.read(usecase.discard, name)
     return see("/mechanisms")
 
 
 def _effect(name: str, table: SigmaTable) -> LawEffect:
-    """Raises Refusal 404, also where the reference rig has not what the mechanism follows."""
-    _require_known(name)
+    """Raises Refusal 404, also if the reference rig lacks the quantity on which the mechanism depends."""
+    _require_listed(name)
     try:
         return effect(name, table)
     except Unsupported as lacking:
         raise Refusal(404, f"There is no picture of {name!r}: {lacking.reason}.") from None
 
 
-def _require_known(name: str) -> None:
+def _require_listed(name: str) -> None:
     """Raises Refusal 404."""
     if name not in usecase.catalogue():
         raise Refusal(404, f"There is no mechanism {name!r}.")

@@ -1,6 +1,5 @@
-"""The picture of a mechanism as SVG: what it does to the FRF of the reference rig, or to a force curve; in the reader's
-colours.
-"""
+"""The picture of a mechanism as SVG: its effect on the FRF of the reference rig or on a force curve, in light or
+dark colours."""
 
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
@@ -23,7 +22,7 @@ _GROUND = "#ffffff"
 _DARK = {
     INK: "#e4e9ee", _QUIET: "#a9b5c0", _BASE: "#a9b5c0", GRID: "#38434e", _GROUND: "#14191f", COLOURS[0]: "#56a7dc",
 }  # fmt: skip
-_RULES = "".join(f'[fill="{one}"]{{fill:{dark}}}[stroke="{one}"]{{stroke:{dark}}}' for one, dark in _DARK.items())
+_RULES = "".join(f'[fill="{light}"]{{fill:{dark}}}[stroke="{light}"]{{stroke:{dark}}}' for light, dark in _DARK.items())
 STYLE = f"@media (prefers-color-scheme:dark){{{_RULES}}}"
 
 
@@ -55,7 +54,7 @@ def _looks(effect: LawEffect) -> list[tuple[str, float, str]]:
     stronger."""
     count = len(effect.strengths)
     places = range(count) if count > 1 else (1,)
-    return [(COLOURS[place], _WIDTHS[place], "") for place in places]
+    return [(COLOURS[index], _WIDTHS[index], "") for index in places]
 
 
 def _stroke(colour: str, width: float, dashes: str) -> str:
@@ -74,8 +73,8 @@ def _panel(effect: LawEffect, panel: EffectPanel, along: Floats, top: float, *, 
     ticks = (1.0, 10.0, 100.0, 1000.0) if effect.logarithmic else _ticks(float(effect.x.min()), float(effect.x.max()))
     ends = _axis(effect.x, effect)
     for value in ticks:
-        place = float(np.log10(value)) if effect.logarithmic else value
-        x = _LEFT + (place - ends.min()) / (ends.max() - ends.min()) * (WIDTH - _LEFT - _RIGHT)
+        position = float(np.log10(value)) if effect.logarithmic else value
+        x = _LEFT + (position - ends.min()) / (ends.max() - ends.min()) * (WIDTH - _LEFT - _RIGHT)
         parts.append(f'<path d="M{x:.1f} {top}v{_PANEL}" stroke="{GRID}"/>')
         if last:
             parts.append(
@@ -101,7 +100,8 @@ def _scaled(values: Floats, low: float, high: float) -> Floats:
 
 
 def _range(curves: Sequence[Floats]) -> tuple[float, float]:
-    """What all curves fill, with an edge; no less than a hundredth of their size, or 1, so that nothing looks so."""
+    """The range of all curves with a margin; at least a hundredth of their magnitude, or 1, so that zero does not
+    look like noise."""
     low, high = float(np.min(curves)), float(np.max(curves))
     half = max((high - low) / 2 * 1.08, 0.01 * max(abs(low), abs(high)), 1e-6)
     half = max(half, 1.0) if max(abs(low), abs(high)) < 1e-6 else half

@@ -1,6 +1,5 @@
-"""What pages load: style, scripts, those of figures' colours and paper, which files without a server have too, and
-plotly's own from its package. A version in the address lets browsers keep them for good.
-"""
+"""Static files of pages: style, scripts (those of colours and paper also go into files saved from pages), and
+plotly's own from its package. A version in the address lets browsers cache them permanently."""
 
 import base64
 import hashlib
@@ -58,7 +57,7 @@ def version(name: str) -> str:
 
 @cache
 def library_style_hash() -> str:
-    """How a policy names the one style sheet that plotly carries in its script, for its maps."""
+    """The hash by which the content security policy allows the style sheet that plotly's script adds for its maps."""
     script = _content(LIBRARY).decode()
     style = re.search(r"textContent='([^'\\]*)',document\.head\.appendChild", script)
     if style is None:

@@ -1,4 +1,4 @@
-"""What a lab noted of its recordings by names of its own, as columns of a table."""
+"""Conditions that a lab noted under names of its own, as columns of a table."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class ConditionColumn:
 
 @dataclass(frozen=True)
 class ConditionColumns:
-    """The columns that are shown, and the names of those for which there is no room."""
+    """The shown columns, and the names of those without room."""
 
     shown: Sequence[ConditionColumn]
     others: Sequence[str]
@@ -31,4 +31,4 @@ def condition_columns(recordings: Iterable[Noted | None]) -> ConditionColumns:
         for name, value in (noted or {}).items():
             numeric[name] = numeric.get(name, True) and not isinstance(value, str)
     columns = [ConditionColumn(name, all_numbers) for name, all_numbers in numeric.items()]
-    return ConditionColumns(columns[:_MOST], [one.name for one in columns[_MOST:]])
+    return ConditionColumns(columns[:_MOST], [column.name for column in columns[_MOST:]])

@@ -1,4 +1,4 @@
-"""A plotly figure in a page: its JSON, its words, and where its numbers are."""
+"""A plotly figure in a page: its JSON, its description, and the address of its numbers."""
 
 import re
 import unicodedata
@@ -38,7 +38,7 @@ class Drawn:
     json: Markup
     numbers: str | None  # address of its numbers as CSV
     about: str
-    choices: tuple[str, ...] = ()  # what one can choose to see, the first at first
+    choices: tuple[str, ...] = ()  # selectable views, the first is the default
 
 
 def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None) -> Drawn:
@@ -49,7 +49,7 @@ def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None
 
 @cache
 def prepare() -> None:
-    """Load what draws and what it needs, before somebody asks for the first figure: it takes half a second."""
+    """Load the plotting code before the first request for a figure: it takes half a second."""
     import underskin.figures.campaign_figures
     from underskin.figures.frf import frf_overview
 
@@ -66,24 +66,26 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
 
 
 def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:
-    """The first recordings of curves in one figure, of a single one its loading and its way back; none where there are
-    none. `noun`: what they are called."""
+    """The first curve recordings in one figure, for a single one its loading and unloading; empty if there are none.
+    `noun`: their name."""
     from underskin.figures.curves import ForceCurve, force_curves
 
-    chosen = [one for one in recordings if not isinstance(one, FrfRecording)]
+    chosen = [recording for recording in recordings if not isinstance(recording, FrfRecording)]
     if not chosen:
         return []
     parts = _there_and_back(chosen[0]) if len(chosen) == 1 else []
     if parts:
         figure = force_curves([ForceCurve(*part) for part in parts])
         return [drawn("curves", figure, "Force against displacement, loading and way back.", numbers)]
-    figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:most]])
+    figure = force_curves(
+        [ForceCurve(recording.id, recording.displacement_mm, recording.force_n) for recording in chosen[:most]]
+    )
     about = f"Force against displacement of {min(len(chosen), most)} of {len(chosen)}{noun}."
     return [drawn("curves", figure, about, numbers)]
 
 
 def _there_and_back(curve: CurveRecording) -> list[tuple[str, Floats, Floats]]:
-    """A curve's loading and its way back from the deepest sample, by name; none where it has not both."""
+    """Loading and unloading of a curve, split at the deepest sample, by name; empty if it lacks one."""
     depth, force = np.asarray(curve.displacement_mm), np.asarray(curve.force_n)
     turn = int(np.argmax(depth))
     if not 0 < turn < len(depth) - 1:
@@ -110,7 +112,7 @@ def attachment(file: str, content: str | bytes, media_type: str, **headers: str)
 
 
 def file_name(*parts: str) -> str:
-    """Of what a file is about, such as a skin, a campaign and what of them: without what a file system minds."""
+    """A file name made of skin, campaign and so on, without characters that file systems reject."""
     plain = (_NOT_IN_NAMES.sub("-", part)[:_LONGEST_PART].strip("-.") for part in parts)
     return "-".join(part for part in plain if part)
 
@@ -118,8 +120,8 @@ def file_name(*parts: str) -> str:
 def _saved(file: str) -> dict[str, str]:
     """Headers of a file to be saved; a name beyond ASCII also as RFC 6266 has it."""
     plain = unicodedata.normalize("NFKD", file).encode("ascii", "ignore").decode()
-    told = f'attachment; filename="{plain}"' + ("" if plain == file else f"; filename*=UTF-8''{quote(file)}")
-    return {"Content-Disposition": told, "X-Content-Type-Options": "nosniff"}
+    disposition = f'attachment; filename="{plain}"' + ("" if plain == file else f"; filename*=UTF-8''{quote(file)}")
+    return {"Content-Disposition": disposition, "X-Content-Type-Options": "nosniff"}
 
 
 def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> CsvAnswer:
@@ -133,9 +135,13 @@ def columns_of(rows: Sequence[Mapping[str, Any]], *names: str) -> list[list[Any]
 
 
 def sensors_of(row: AnyRow, answer: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Each sensor of the d33 of a campaign, with its place and in words why it stands out (`reasons`)."""
+    """Each sensor of the d33 of a campaign, with its position and in words why it is an outlier (`reasons`)."""
     places = {sensor["id"]: sensor for sensor in row.about["skin"]["sensors"]}
     return [
-        {**entry, **places[entry["sensor"]], "reasons": "; ".join(flag["reason"] for flag in entry["flags"])}
-        for entry in answer["sensors"]
+        {
+            **of_sensor,
+            **places[of_sensor["sensor"]],
+            "reasons": "; ".join(flag["reason"] for flag in of_sensor["flags"]),
+        }
+        for of_sensor in answer["sensors"]
     ]

@@ -1,4 +1,4 @@
-"""Numbers, times and words as pages show them: short, with the exact value under the pointer."""
+"""Numbers, times and words as pages show them: short, with the exact value as tooltip."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -18,16 +18,16 @@ _LOPSIDED = 1.1  # how many times as far up as down: less is not seen in the dig
 
 
 def number(value: float | None, unit: str = "", digits: int = 3) -> Markup:
-    """A computed number to so many digits, with its unit; the pointer shows all its digits."""
+    """A computed number to so many digits, with its unit; the tooltip shows all digits."""
     shown, exact = short_and_exact(value, unit, digits)
     return _with_unit(shown, exact, unit)
 
 
 def interval(value: float | None, low: float | None, high: float | None, unit: str = "") -> Markup:
-    """A number with its 95 % interval, all to the digits that the width tells: 13.25 (95 %: 13.11 to 13.39)."""
+    """A number with its 95 % interval, rounded according to its width: 13.25 (95 %: 13.11 to 13.39)."""
     if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
         return number(value, unit)
-    shown = [_to_places(one, _places(low, high)) for one in (value, low, high)]
+    shown = [_to_places(bound, _places(low, high)) for bound in (value, low, high)]
     text = Markup('<b><span class="number" title="{}">{}</span></b>').format(f"{value!r} {unit}".strip(), shown[0])
     if unit:
         text += Markup('&nbsp;<span class="unit">{}</span>').format(unit)
@@ -38,7 +38,7 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
 
 
 def reaches_up(value: float | None, low: float | None, high: float | None) -> bool:
-    """Whether an interval reaches clearly further above its value than below."""
+    """Whether an interval extends clearly further above its value than below."""
     return value is not None and low is not None and high is not None and high - value > _LOPSIDED * (value - low)
 
 
@@ -60,7 +60,7 @@ def _to_places(value: float, places: int) -> str:
 
 
 def given(value: float | None, unit: str = "") -> Markup:
-    """A number as somebody gave it, with its unit."""
+    """A number as entered, with its unit."""
     if value is None:
         return _with_unit("–", "", "")
     return _with_unit(with_minus(f"{value or 0.0:.6g}"), repr(value), unit)

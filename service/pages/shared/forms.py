@@ -1,6 +1,5 @@
-"""Forms: read, and refused unless they were made for this session; what was typed into them, and errors in their own
-words: the labels that the reader sees, not the fields of the request behind them.
-"""
+"""Forms: read, rejected unless made for this session, and errors in the labels that the reader sees instead of the
+request's field names."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -48,11 +47,11 @@ _LABELS = {
     "reason": "Reason",
     "who": "Your name",
     "skin_id": "Id of the other skin",
-}  # of forms that change what is kept
+}  # of forms that change stored data
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """The fields of a form, the first of each name; raises Refusal where another site may have made it."""
+    """The fields of a form, the first of each name; raises Refusal if another site may have made it."""
     body = b""
     async for chunk in request.stream():
         body += chunk
@@ -63,22 +62,22 @@ async def _fields(request: Request) -> dict[str, str]:
     except ValueError:
         raise Refusal(400, "The form has too many fields.") from None
     fields = {name: entries[0] for name, entries in values.items()}
-    require_own(request, fields.get(TOKEN, ""))
+    require_form_token(request, fields.get(TOKEN, ""))
     return fields
 
 
-def require_own(request: Request, token: str) -> None:
-    """Refuses what was not sent from a page of this session."""
+def require_form_token(request: Request, token: str) -> None:
+    """Rejects a form that was not sent from a page of this session."""
     if not session.is_form_token(session.cookie_in(dict(request.scope["headers"])), token):
         raise Refusal(403, "This form was not made for your session, or the session has ended: go back and reload it.")
 
 
 Form = Annotated[dict[str, str], Depends(_fields)]
-OWN_FORM = Depends(_fields)  # of a route that needs no field, only that the form is of this session
+FORM_OF_SESSION = Depends(_fields)  # of a route that needs no field, only that the form is of this session
 
 
 def reason(sent: dict[str, str]) -> str:
-    """Why, as somebody wrote it; raises InvalidInput."""
+    """The reason typed in a form; raises InvalidInput."""
     why = sent.get("reason", "").strip()
     if not 0 < len(why) <= 1000:
         raise out_of_range("reason", why[:80], "must say why in 1 to 1000 characters")
@@ -108,7 +107,7 @@ def see(path: str) -> RedirectResponse:
 
 @dataclass(frozen=True)
 class RefusedForm:
-    """A form that was refused: which one of its page, why, what was typed into it, and the status of the answer."""
+    """A rejected form: which one of its page, the reason, the typed values, and the status of the answer."""
 
     form: str
     why: str
@@ -117,7 +116,7 @@ class RefusedForm:
 
 
 def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> RefusedForm | None:
-    """Do what a form was sent for; where it cannot be done, the form with the reason."""
+    """Do the action of a form; if it fails, the form with the reason."""
     try:
         do()
     except InvalidInput as error:
@@ -130,8 +129,7 @@ def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> R
 
 
 def number(name: str, typed: str) -> float:
-    """A number that somebody typed, with a decimal point or a decimal comma; raises InvalidInput, also where it is
-    empty."""
+    """A typed number with decimal point or comma; raises InvalidInput, also if it is empty."""
     if not typed.strip():
         raise required(name, "fill it in")
     value = _value(typed)
@@ -142,7 +140,7 @@ def number(name: str, typed: str) -> float:
 
 
 def number_or_text(typed: str) -> float | str | None:
-    """The same; what is no number is left to later checks, which name it. None: nothing was typed."""
+    """The same; text that is not a number is left to later checks, which name it. None if empty."""
     value = _value(typed)
     return typed.strip() or None if value is None else value
 
@@ -166,9 +164,9 @@ def numbers(name: str, line: str, parts: Sequence[str] = ()) -> list[float]:
     names = [*(f"{name}, {part}" for part in parts), *[name] * len(typed)]
     wrong: list[InvalidInput] = []
     read: list[float] = []
-    for known_as, cell, value in zip(names, typed, values, strict=False):
+    for field_name, cell, value in zip(names, typed, values, strict=False):
         with noting(wrong):
-            read.append(number(known_as, cell) if value is None else value)
+            read.append(number(field_name, cell) if value is None else value)
     if wrong:
         raise SeveralInvalid(wrong)
     return read
@@ -188,8 +186,8 @@ def in_form_words(
 
 def unsigned(field: str, allowed: str) -> str:
     """What is allowed, without the words on its magnitude where a field has no sign, or is one of a single file."""
-    known = LAB.get(field.rpartition(".")[2])
-    return allowed if known is not None and known.signed else allowed.replace(" in magnitude", "")
+    quantity = LAB.get(field.rpartition(".")[2])
+    return allowed if quantity is not None and quantity.signed else allowed.replace(" in magnitude", "")
 
 
 def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
@@ -212,8 +210,8 @@ def label_of(field: str, labels: Mapping[str, str], lines: Sequence[int] = ()) -
 def _load(path: re.Match[str], lines: Sequence[int]) -> str:
     """`contacts[0].normal_force_n` as `load in line 1, F`."""
     number, field, part = int(path[1]), path[2], path[3]
-    place = f"load in line {lines[number] if number < len(lines) else number + 1}"
+    load = f"load in line {lines[number] if number < len(lines) else number + 1}"
     if field is None:
-        return place
+        return load
     name = _TANGENTIAL[int(part)] if field == "tangential_force_n" and part is not None else _OF_LOAD.get(field, field)
-    return f"{place}, {name}"
+    return f"{load}, {name}"

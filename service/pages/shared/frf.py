@@ -14,18 +14,18 @@ def drawn_frf(
     row: AnyRow,
     loaded: Callable[[], Campaign],
     answer: Mapping[str, Any],
-    kept_spreads: Sequence[Mapping[str, Any]] | None,
+    stored_spreads: Sequence[Mapping[str, Any]] | None,
     show: str,
 ) -> list[Drawn]:
-    """None where no recording is shown; `loaded`: the campaign with all numbers, `answer`: its d33, `kept_spreads`: of
-    its conditions, where they are kept, `show`: a sensor or a recording, all where it is empty."""
+    """Empty where no recording is shown. `loaded`: the campaign with all numbers; `answer`: its d33; `stored_spreads`:
+    those of its conditions, if stored; `show`: a sensor or a recording, empty for all."""
     from underskin.figures.frf import frf_overview, frf_recordings
     from underskin.recordings.frf import flat_zone
 
     band = answer["band"]
     zone = None if band is None else (band["low_hz"], band["high_hz"])
-    place = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
-    if show or kept_spreads is None:
+    page = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
+    if show or stored_spreads is None:
         chosen = measured(loaded(), show)
         if not chosen:
             return []
@@ -34,22 +34,22 @@ def drawn_frf(
             conditions = _conditions([recording for recording, _ in chosen])
             about = "Magnitude, phase and coherence of each recording; R is the sphere's radius."
             about += " Colours tell preloads apart, marks along the lines spheres." if conditions else ""
-            return [drawn("frf", frf_recordings(lines, zone, conditions), about, place)]
+            return [drawn("frf", frf_recordings(lines, zone, conditions), about, page)]
         summaries = spreads_of(chosen)
     else:
-        summaries = spreads(kept_spreads)
+        summaries = spreads(stored_spreads)
     count = sum(spread.recordings for spread in summaries)
     about = (
         f"{count} recordings: for each sphere and preload the median magnitude "
         "and phase and the lowest coherence; as a band, the magnitudes of all its recordings. R is the sphere's radius."
     )
-    return [drawn("frf", frf_overview(summaries, zone), about, place)]
+    return [drawn("frf", frf_overview(summaries, zone), about, page)]
 
 
 def _conditions(recordings: Sequence[FrfRecording]) -> list[tuple[float, float]]:
     """Sphere [mm] and preload [N] of each recording, where these are of one sensor under several loads."""
-    conditions = [(one.indenter_radius_mm, one.preload_n) for one in recordings]
-    of_one_sensor = len({one.sensor for one in recordings}) == 1
+    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
+    of_one_sensor = len({recording.sensor for recording in recordings}) == 1
     return conditions if of_one_sensor and len(set(conditions)) > 1 else []
 
 

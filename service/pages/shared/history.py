@@ -18,17 +18,17 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
     numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
     points = [
         SensorPoints(
-            entry.sensor,
-            [point.time for point in entry.points],
-            [point.d33_pc_per_n for point in entry.points],
-            [point.d33_uncertainty_pc_per_n for point in entry.points],
-            _trend_in_words(entry),
+            sensor_history.sensor,
+            [point.time for point in sensor_history.points],
+            [point.d33_pc_per_n for point in sensor_history.points],
+            [point.d33_uncertainty_pc_per_n for point in sensor_history.points],
+            _trend_in_words(sensor_history),
         )
-        for entry in history.sensors
+        for sensor_history in history.sensors
     ]
     whose = "each sensor" if sensor is None else sensor
     about = f"d33 of {whose} in every campaign, {RESTS[by]}, with its 95 % interval."
-    if is_summarised(len(points), sum(len(entry.times) for entry in points)):
+    if is_summarised(len(points), sum(len(sensor_history.times) for sensor_history in points)):
         about = (
             f"Median d33 over the sensors in each campaign, {RESTS[by]}, the range of 90 % of them, and by name those "
             f"that stand apart{'' if sensor is None else f'; the line is {sensor}'}. Point at a sensor for its line."
@@ -36,13 +36,13 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
     return drawn("history", d33_history(points, sensor), about, numbers)
 
 
-def _trend_in_words(entry: SensorHistory) -> str:
-    """What the sensor's d33 does over time: beside the array's, where there are enough sensors."""
-    if entry.departure is not None:
-        return with_minus(_besides(entry.departure))
-    line = entry.trend
+def _trend_in_words(sensor: SensorHistory) -> str:
+    """The trend of the sensor's d33, relative to the array's if there are enough sensors."""
+    if sensor.departure is not None:
+        return with_minus(_besides(sensor.departure))
+    line = sensor.trend
     if line is None:
-        return f"no trend: {entry.no_trend}"
+        return f"no trend: {sensor.no_trend}"
     slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
     slope = with_minus(slope)
     return slope if line.significant else f"no significant trend ({slope})"

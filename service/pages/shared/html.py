@@ -1,4 +1,4 @@
-"""Templates into answers: every page goes through here, one that shows an error too, and gets its policy here."""
+"""Renders templates as answers: every page, also an error page, gets its content security policy here."""
 
 import gzip
 from functools import cache
@@ -27,7 +27,7 @@ _COMPRESSION = 5  # of 9: the rest takes longer than it saves
 
 @cache
 def _policy() -> str:
-    """Nothing from outside, no script or style of a page's own; plotly sets style attributes, reaching no network."""
+    """Nothing from outside, no inline script or style; plotly sets style attributes, which reach no network."""
     styles = f"'self' {_EMPTY_STYLE} {library_style_hash()}"
     return (
         f"default-src 'none'; script-src 'self'; style-src {styles}; style-src-elem {styles}; "
@@ -41,7 +41,7 @@ def headers() -> dict[str, str]:
     return {
         "Content-Security-Policy": _policy(),
         "X-Content-Type-Options": "nosniff",
-        "Referrer-Policy": "same-origin",  # with no referrer, a form would tell no origin either
+        "Referrer-Policy": "same-origin",  # without a referrer, a form would send no origin either
         "Cross-Origin-Opener-Policy": "same-origin",
         "Cache-Control": "no-store",
     }
@@ -90,16 +90,16 @@ def page(
 
 def problem_page(refusal: Refusal, request_id: str) -> Response:
     """What happened and what to do; where the gate sends elsewhere, the way there."""
-    place = refusal.headers.get("Location")
-    if place is not None and not urlsplit(place).netloc:
-        return RedirectResponse(place, refusal.status)
+    location = refusal.headers.get("Location")
+    if location is not None and not urlsplit(location).netloc:
+        return RedirectResponse(location, refusal.status)
     text = render("problem.html", refusal=refusal, request_id=request_id, viewer=None)
     return HTMLResponse(text, refusal.status, {**headers(), **refusal.headers})
 
 
 def compress(request: Request, answer: Response) -> None:
-    """Gzip an answer where the browser reads that. What it holds of secrets is the session's own token, and another
-    site's requests carry no session, so that lengths tell nobody anything."""
+    """Gzip an answer if the browser accepts that. Its only secret is the session's own token, and requests from
+    other sites carry no session, so lengths reveal nothing."""
     if "gzip" in request.headers.get("accept-encoding", ""):
         answer.body = gzip.compress(bytes(answer.body), _COMPRESSION)
         answer.headers.update({"Content-Encoding": "gzip", "Content-Length": str(len(answer.body))})

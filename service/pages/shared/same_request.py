@@ -1,4 +1,4 @@
-"""Which request would return what a page shows, to copy: for a shell and for Python."""
+"""The request that returns what a page shows, to copy: for a shell and for Python."""
 
 import json
 import shlex
@@ -40,11 +40,11 @@ def files(
     request: Request, labels: Sequence[str], rig: str | None, skin: str, estimator: str | None = None
 ) -> SameRequest:
     """POST files as a form, with a rig description where they need one."""
-    said = {name: value for name, value in (("skin", skin), ("estimator", estimator)) if value}
-    query = "?" + urlencode(said, quote_via=quote, safe="") if said else ""
+    fields = {name: value for name, value in (("skin", skin), ("estimator", estimator)) if value}
+    query = "?" + urlencode(fields, quote_via=quote, safe="") if fields else ""
     parts = [f"file=@{label}" for label in labels] + ([] if rig is None else [f"rig=@{rig}"])
     curl = _curl(request, f"/v1/campaigns{query}", *(f"-F {shlex.quote(part)}" for part in parts))
-    options = {**said, **({} if rig is None else {"rig": rig})}
+    options = {**fields, **({} if rig is None else {"rig": rig})}
     arguments = [repr(list(labels)), *(f"{name}={value!r}" for name, value in options.items())]
     call = f"client.campaigns.post_files({', '.join(arguments)})"
     return SameRequest(curl, _python(request, call))

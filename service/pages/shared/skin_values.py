@@ -1,6 +1,5 @@
-"""The skin's fields that several forms ask for, and the numbers that a view starts from: a skin's own, and which of
-them nobody declared.
-"""
+"""The skin fields common to several forms and the default values of a view: the skin's own or the prototype's, and
+which are undeclared."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -37,10 +36,10 @@ PROTOTYPE = {
 def start(
     store: Database, table: SigmaTable, skin_id: str | None, words: Mapping[str, tuple[str, str]]
 ) -> tuple[dict[str, float], list[str]]:
-    """Where the view starts: what the campaign that describes the skin says, of the sphere that pressed it and, where
-    no d33 is declared, its measured one; else the paper's prototype.
+    """The defaults of a view: the values of the campaign that describes the skin, those of its sphere and, if no d33
+    is declared, the measured one; else the paper's prototype.
 
-    And in sentences, of the fields in `words` (each with its words and unit), what nobody declared.
+    Also sentences on the undeclared ones of the fields in `words` (each with its words and unit).
     """
     if skin_id is None:
         return dict(PROTOTYPE), []
@@ -53,27 +52,26 @@ def start(
         measured = overview.medians(connection, [latest.number], table.sha256).get(latest.number)
         sensors = overview.measured_sensors(connection, [latest.number], table.sha256).get(latest.number, (0, 0))
     described = latest.about["skin"]
-    known = {name: float(described[name]) for name in PROTOTYPE if described.get(name) is not None}
-    known |= _pressed([entry.scalars for entry in recordings if "preload_n" in entry.scalars])
-    known |= _pitch(described["sensors"])
+    values = {name: float(described[name]) for name in PROTOTYPE if described.get(name) is not None}
+    values |= _pressed([recording.scalars for recording in recordings if "preload_n" in recording.scalars])
+    values |= _pitch(described["sensors"])
     taken = []
-    if "d33_pc_per_n" not in known and measured is not None and measured > 0:
-        known["d33_pc_per_n"], sentence = _measured_d33(store, table, root, latest, measured, sensors)
+    if "d33_pc_per_n" not in values and measured is not None and measured > 0:
+        values["d33_pc_per_n"], sentence = _measured_d33(store, table, root, latest, measured, sensors)
         taken += [f"{sentence}; the skin declares none"] if "d33_pc_per_n" in words else []
-    lacking = [name for name in words if name in PROTOTYPE and name not in known]
+    lacking = [name for name in words if name in PROTOTYPE and name not in values]
     sentence = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)
     if lacking:
         taken.append(f"Not declared, so taken from the paper's prototype: {sentence}")
-    return {**PROTOTYPE, **known}, taken
+    return {**PROTOTYPE, **values}, taken
 
 
 def _measured_d33(
     store: Database, table: SigmaTable, root: str, row: AnyRow, by_paper: float, sensors: tuple[int, int]
 ) -> tuple[float, str]:
-    """d33 [pC/N] of the campaign `row` to four digits, by the skin's adopted model where one is in force and gives it,
-    else by the paper's, of the array or, where it has none, `by_paper`, the median over the sensors; and in a sentence
-    whose it is, and whether it may be quoted. `sensors`: of how many the campaign tells d33, and how many the skin has.
-    """
+    """d33 [pC/N] of the campaign `row` to four digits, by the skin's adopted model if one is in force and applies,
+    else by the paper's, of the array or, without one, `by_paper`, the median over the sensors; and a sentence on its
+    origin and whether it may be quoted. `sensors`: for how many the campaign has d33, and how many the skin has."""
     array = overview.of_array(d33_cache.answer(store, table, row, None))
     by_paper = by_paper if array is None else array
     measured, all_sensors = sensors
@@ -104,19 +102,21 @@ def shown(
     skin_id: str | None,
     fields: Sequence[tuple[str, str, str]] = FIELDS,
 ) -> tuple[dict[str, str], list[str]]:
-    """What a form with these fields shows: as it was sent, also empty, or else where the view starts, with
-    `start`'s sentences."""
+    """The values of a form: as sent, even if empty, or else the defaults with the sentences of `start`."""
     missing = {name: (words, unit) for name, words, unit in fields if name not in given}
-    known, taken = start(store, table, skin_id, missing)
-    return {name: given.get(name, f"{known[name]:g}") for name, *_ in fields}, taken
+    start_values, taken = start(store, table, skin_id, missing)
+    return {name: given.get(name, f"{start_values[name]:g}") for name, *_ in fields}, taken
 
 
 def _pressed(scalars: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     """The smallest sphere and the median preload."""
     if not scalars:
         return {}
-    smallest = float(np.min([one["indenter_radius_mm"] for one in scalars]))
-    return {"indenter_radius_mm": smallest, "preload_n": float(np.median([one["preload_n"] for one in scalars]))}
+    smallest = float(np.min([conditions["indenter_radius_mm"] for conditions in scalars]))
+    return {
+        "indenter_radius_mm": smallest,
+        "preload_n": float(np.median([conditions["preload_n"] for conditions in scalars])),
+    }
 
 
 def _pitch(sensors: Sequence[Mapping[str, Any]]) -> dict[str, float]:

@@ -1,7 +1,5 @@
-"""What a diagnosis came to, in the few words that a list has room for: what it says, how sure it is, what rivals it.
-
-And the model adopted from one, as pages head it: what it adds, since when and until when, d33 by it beside the paper's.
-"""
+"""The result of a diagnosis in the few words of a list: verdict, probability, alternatives. Also the adopted model
+in page headers: what it adds, since when, and d33 by it next to the paper's."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +19,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
 _MOST_RIVALS = 3
-_SAYS = {
+_WORDS_OF_VERDICT = {
     "explained": "mismatch explained",
     "ambiguous": "mismatch with several explanations",
     "unexplained": "mismatch without explanation",
@@ -33,12 +31,12 @@ _BY_A_LAW = "mismatch by a law that nobody listed"
 
 @dataclass(frozen=True)
 class VerdictSummary:
-    """The diagnosis, the words of its tag, what they mean for the reader, and what stands beside the tag."""
+    """The diagnosis, the words and the mood of its tag, and the text next to the tag."""
 
     id: str
     tag: str
     mood: Literal["good", "look", "quiet"]
-    beside: str
+    addition: str
     at: str  # when it ended, or was asked for
     name: str | None  # of one of several campaigns
     modulus: str | None = None  # of curves, under an answer that is settled
@@ -54,17 +52,17 @@ def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[st
 
 def mechanisms_of(report: Mapping[str, Any]) -> list[str]:
     """Names of the mechanisms that a report states."""
-    return [entry["name"] for entry in report["mechanisms"]]
+    return [mechanism["name"] for mechanism in report["mechanisms"]]
 
 
 def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSummary:
     at = row.ended_at or row.asked_at
     outdated = diagnoses.outdated(row) is not None
     if not report:
-        beside = "open it to see why and what to do" if row.state == "failed" else ""
-        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", beside, at, row.name, outdated=outdated)
+        addition = "open it to see why and what to do" if row.state == "failed" else ""
+        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", addition, at, row.name, outdated=outdated)
     law = report["verdict"] == "unexplained" and report.get("unnamed")
-    tag = _BY_A_LAW if law else _SAYS[report["verdict"]]
+    tag = _BY_A_LAW if law else _WORDS_OF_VERDICT[report["verdict"]]
     if report["verdict"] == "insufficient_data":
         return VerdictSummary(row.id, tag, "quiet", "", at, row.name, outdated=outdated)
     probability = report["probability"]
@@ -76,7 +74,7 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
     d33 = report["d33"]
     unsettled = d33 is not None and "low" in d33 and not d33.get("quotable", True)
     not_quoted = _quoted(report) if unsettled else None
-    return VerdictSummary(row.id, tag, mood, _beside(report), at, row.name, _modulus(report), outdated, not_quoted)
+    return VerdictSummary(row.id, tag, mood, _addition(report), at, row.name, _modulus(report), outdated, not_quoted)
 
 
 def _modulus(report: Mapping[str, Any]) -> str | None:
@@ -88,22 +86,25 @@ def _modulus(report: Mapping[str, Any]) -> str | None:
     return f"{value} {after['unit']} (95 %: {low} to {high})"
 
 
-def _beside(report: Mapping[str, Any]) -> str:
-    """What the model lacks, each mechanism with its own probability; of several answers each with its probability; or
-    the law; of no mismatch, what is not ruled out."""
+def _addition(report: Mapping[str, Any]) -> str:
+    """The mechanisms that the model lacks with their probabilities; for several answers each with its probability;
+    or the unlisted law; without mismatch, what is not ruled out."""
     verdict, probability = report["verdict"], report["probability"]
     law = report.get("unnamed")
     if verdict == "unexplained" and law:
         return f"{acted_on(law['acts_on'], law['axis'])} over {followed(law['axis'])}"
     leader = [f"{in_words(mechanisms_of(report))} {in_percent(probability)}"] if report["mechanisms"] else []
     rivals = [
-        f"{in_words(entry['mechanisms'])} {in_percent(entry['probability'])}"
-        for entry in report.get("alternatives", ())[:_MOST_RIVALS]
-        if entry["probability"] > _WORTH_NAMING
+        f"{in_words(alternative['mechanisms'])} {in_percent(alternative['probability'])}"
+        for alternative in report.get("alternatives", ())[:_MOST_RIVALS]
+        if alternative["probability"] > _WORTH_NAMING
     ]
     if report["mechanisms"] and verdict == "explained":
-        said = [f"{in_words([one['name']])} ({in_percent(one['probability'])})" for one in report["mechanisms"]]
-        return f"the model lacks {' and '.join(said)}"
+        words = [
+            f"{in_words([mechanism['name']])} ({in_percent(mechanism['probability'])})"
+            for mechanism in report["mechanisms"]
+        ]
+        return f"the model lacks {' and '.join(words)}"
     if probability >= EXPLAINED or verdict == "unexplained":
         return " ".join(leader)
     if verdict == "no_mismatch":
@@ -137,8 +138,11 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 
 
 def _quoted(report: Mapping[str, Any]) -> str:
-    """Of a report with a d33; why it may not be quoted is what the report states."""
-    from underskin.diagnosis.reporting.wording import as_stated, not_quoted  # with what draws, which takes long
+    """The d33 of a report in words; if it may not be quoted, with the report's reason."""
+    from underskin.diagnosis.reporting.wording import (
+        as_stated,
+        not_quoted,
+    )  # with plotting code, which is slow to import
 
     d33 = report["d33"]
     low, high = as_stated(d33["low"]), as_stated(d33["high"])

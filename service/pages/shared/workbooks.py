@@ -1,4 +1,4 @@
-"""The numbers of pages as workbooks (XLSX), beside every CSV: the same table, its numbers as numbers."""
+"""The numbers of pages as workbooks (XLSX), next to every CSV: the same table with typed cells."""
 
 import functools
 import inspect
@@ -24,12 +24,12 @@ _MOST_CELLS = 250_000  # takes some 2.5 s of this process
 
 
 def add_to(router: APIRouter) -> None:
-    """Answer `NAME.xlsx` wherever `NAME.csv` is answered."""
+    """Answer `NAME.xlsx` for every `NAME.csv`."""
     for route in list(router.routes):
         if isinstance(route, APIRoute) and route.path.endswith(CSV):
             endpoint = _as_workbook(inspect.unwrap(route.endpoint))
-            own = route.path.removeprefix(router.prefix).removesuffix(CSV)
-            router.add_api_route(own + XLSX, endpoint)
+            name = route.path.removeprefix(router.prefix).removesuffix(CSV)
+            router.add_api_route(name + XLSX, endpoint)
 
 
 def _as_workbook(endpoint: Callable[..., Any]) -> Callable[..., Awaitable[Response]]:

@@ -1,4 +1,4 @@
-"""What is wrong with a form, all of it at once: read field by field, and told with each wrong field marked."""
+"""All errors of a form at once, with each invalid field marked."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -11,22 +11,21 @@ from underskin.recordings.validation import declared, poisson_ratio
 from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
 from underskin.units import LAB
 
-_MOST_TOLD = 20
+_MOST_LISTED_ERRORS = 20
 
 
 @dataclass(frozen=True)
 class WrongFields:
-    """What is wrong, in sentences, each with the name of the form's field that it is about; empty where it is about
-    none."""
+    """Errors in sentences, each with the name of its form field; empty for an error of no field."""
 
-    told: Sequence[tuple[str, str]] = ()
+    sentences: Sequence[tuple[str, str]] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.told)
+        return bool(self.sentences)
 
     def ids(self, name: str) -> str:
-        """Ids on the page of the sentences about a field, with blanks between them."""
-        return " ".join(f"wrong-{place}" for place, (field, _) in enumerate(self.told, 1) if field == name)
+        """HTML ids of the error sentences of a field, separated by blanks."""
+        return " ".join(f"wrong-{index}" for index, (field, _) in enumerate(self.sentences, 1) if field == name)
 
 
 NOTHING_WRONG = WrongFields()
@@ -37,33 +36,33 @@ def wrong_fields(
     in_words: Callable[[UnderskinError], str],
     field_of: Callable[[InvalidInput], str] = lambda error: error.field,
 ) -> WrongFields:
-    """What an error says of a form: each of several `in_words` of the form, about the field that `field_of` gives."""
+    """The errors of a form from an exception, each worded by `in_words`, for the field that `field_of` gives."""
     if not isinstance(error, InvalidInput):
         return WrongFields([("", in_words(error))])
     errors = errors_of(error)
-    told = [(field_of(one), in_words(one)) for one in errors[:_MOST_TOLD]]
-    more = len(errors) - len(told)
-    return WrongFields([*told, *([("", f"and {more} more")] if more else [])])
+    entries = [(field_of(invalid), in_words(invalid)) for invalid in errors[:_MOST_LISTED_ERRORS]]
+    more = len(errors) - len(entries)
+    return WrongFields([*entries, *([("", f"and {more} more")] if more else [])])
 
 
 @contextmanager
-def told_together(order: Sequence[str] = ()) -> Iterator[list[InvalidInput]]:
-    """Takes what is wrong, by `noting`; after the block raises SeveralInvalid with the first error of each place, as
-    what cannot be read is missing to later checks too. `order`: of the fields in the form, where checks have another.
-    """
+def errors_together(order: Sequence[str] = ()) -> Iterator[list[InvalidInput]]:
+    """Collects errors through `noting`; after the block raises SeveralInvalid with the first error of each place,
+    because an unreadable value fails later checks too. `order`: the order of the fields in the form, if checks have
+    another."""
     wrong: list[InvalidInput] = []
     with noting(wrong):
         yield wrong
     first: dict[str, InvalidInput] = {}
-    for one in wrong:
-        first.setdefault(one.place, one)
+    for invalid in wrong:
+        first.setdefault(invalid.place, invalid)
     if first:
-        places = {name: place for place, name in enumerate(order)}
-        raise SeveralInvalid(sorted(first.values(), key=lambda one: places.get(one.field, len(places))))
+        places = {name: index for index, name in enumerate(order)}
+        raise SeveralInvalid(sorted(first.values(), key=lambda invalid: places.get(invalid.field, len(places))))
 
 
 def quantity(name: str, typed: str, *, units_checked: bool = False) -> float:
-    """A number that somebody typed; that of a skin or a sphere within what is allowed of it. Raises InvalidInput."""
+    """A typed number, checked against the range of its field. Raises InvalidInput."""
     value = number(name, typed)
     if name == "poisson_ratio":
         return poisson_ratio(name, value, units_checked)

@@ -1,6 +1,5 @@
-"""What is asked for and changed on the page of a skin: diagnosed together, its model withdrawn, another one joined, its
-title, remark and tags; put away.
-"""
+"""Requests and changes on the page of a skin: joint diagnosis, model withdrawn, skins joined, title, remark and
+tags, skin discarded."""
 
 from collections.abc import Callable
 from urllib.parse import quote
@@ -9,7 +8,7 @@ from fastapi import APIRouter, Request, Response
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, RunnerInUse, SkinId, Store, Table, sender
-from service.pages.shared.forms import OWN_FORM, Form, annotated, attempted, reason, see, signed
+from service.pages.shared.forms import FORM_OF_SESSION, Form, annotated, attempted, reason, see, signed
 from service.pages.skin.page import shown
 from service.problems import parsed
 from service.schemas.diagnoses import AskForSkin
@@ -23,9 +22,9 @@ from underskin.surrogate.sigma_table import SigmaTable
 router = APIRouter(prefix="/skins/{skin_id}", dependencies=WRITE)
 
 
-@router.post("/diagnosis", dependencies=[OWN_FORM])
+@router.post("/diagnosis", dependencies=[FORM_OF_SESSION])
 def diagnose_together(request: Request, skin_id: SkinId, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Puts one diagnosis of all campaigns in use into the queue; one that there is already is shown."""
+    """Queue one diagnosis of all campaigns in use; an existing one is shown."""
     row = store.write(diagnosis_usecase.ask_of_skin, skin_id, table, sender(request), AskForSkin())
     runner.stir()
     return see(f"/diagnoses/{row.id}")
@@ -33,7 +32,7 @@ def diagnose_together(request: Request, skin_id: SkinId, runner: RunnerInUse, st
 
 @router.post("/model/withdraw")
 def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
-    """Has no model in force."""
+    """Withdraw the model in force."""
 
     def do() -> None:
         _of_root(store, skin_id, models.withdraw, reason(sent), signed(request, sent))
@@ -43,11 +42,11 @@ def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store, 
 
 @router.post("/join")
 def join(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
-    """Count the other as this one from now on."""
+    """Count the other skin as this one from now on."""
 
     def do() -> None:
-        asked = parsed(Join, {"skin_id": sent.get("other", "").strip(), "reason": reason(sent)})
-        usecase.join(store, skin_id, asked.skin_id, asked.reason, signed(request, sent))
+        demand = parsed(Join, {"skin_id": sent.get("other", "").strip(), "reason": reason(sent)})
+        usecase.join(store, skin_id, demand.skin_id, demand.reason, signed(request, sent))
 
     return _done(request, skin_id, store, table, "join", sent, do)
 
@@ -65,7 +64,7 @@ def annotate(request: Request, skin_id: SkinId, sent: Form, store: Store, table:
 
 @router.post("/discard")
 def discard(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
-    """Put a skin that holds nothing in use into no list any more."""
+    """Remove a skin without campaigns in use from all lists."""
 
     def do() -> None:
         _of_root(store, skin_id, annotations.discard, reason(sent), signed(request, sent))

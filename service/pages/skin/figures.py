@@ -18,7 +18,7 @@ _MOST_NAMED = 5  # sensors, in a sentence
 
 Shown = Literal["d33", "uncertainty", "trend"]
 
-# Column of the values, column of their uncertainties, name, unit, what colours are compared against.
+# Column of the values, column of their uncertainties, name, unit, reference of the colour scale.
 _QUANTITIES: dict[Shown, tuple[str, str, str, str, Literal["others", "zero", "nothing"]]] = {
     "d33": ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33", "pC/N", "others"),
     "uncertainty": ("d33_uncertainty_pc_per_n", "d33_uncertainty_pc_per_n", "uncertainty of d33", "pC/N", "nothing"),
@@ -33,19 +33,19 @@ _ENDS: dict[Shown, tuple[str, str]] = {
 def map_rows(
     row: AnyRow, answer: Mapping[str, Any] | None, history: History, places: Sequence[Mapping[str, Any]]
 ) -> list[dict[str, Any]]:
-    """Each sensor of the skin, which has `places`, with its trend, where it has one: as a campaign's answer tells it,
-    else with its last value in `history` and in words since when that stands (`absent`), else without a value."""
-    answered = {} if answer is None else {entry["sensor"]: entry for entry in sensors_of(row, answer)}
-    known = {entry.sensor: entry for entry in history.sensors}
+    """A row per sensor in `places`, with its trend if known: from the answer of a campaign, or else its last value
+    in `history` with the date (`absent`), or else without a value."""
+    answered = {} if answer is None else {sensor["sensor"]: sensor for sensor in sensors_of(row, answer)}
+    histories = {sensor_history.sensor: sensor_history for sensor_history in history.sensors}
     rows = []
-    for place in places:
-        name = place["id"]
-        of_sensor = known.get(name)
+    for position in places:
+        name = position["id"]
+        of_sensor = histories.get(name)
         its = answered.get(name) or _last(of_sensor)
         trend: dict[str, Any] = {"no_trend": "never measured with FRFs" if of_sensor is None else of_sensor.no_trend}
         if of_sensor is not None and of_sensor.trend is not None:
             trend = _trend(of_sensor.trend, len(of_sensor.points))
-        rows.append({"sensor": name, "x_mm": place["x_mm"], "y_mm": place["y_mm"], "absent": "", **its, **trend})
+        rows.append({"sensor": name, "x_mm": position["x_mm"], "y_mm": position["y_mm"], "absent": "", **its, **trend})
     return rows
 
 
@@ -53,7 +53,7 @@ def _last(of_sensor: SensorHistory | None) -> dict[str, Any]:
     """The last value of a sensor that the latest campaign did not measure."""
     if of_sensor is None or not of_sensor.points:
         return {"reasons": "", "absent": "never measured with FRFs"}
-    from underskin.figures.style import SDS_OF_95  # with what draws, which takes long
+    from underskin.figures.style import SDS_OF_95  # with plotting code, which is slow to import
 
     point = of_sensor.points[-1]
     half = SDS_OF_95 * point.d33_uncertainty_pc_per_n
@@ -80,23 +80,23 @@ def _trend(line: TrendAnswer, count: int) -> dict[str, Any]:
 def drawn_map(
     root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By, sensor: str | None
 ) -> Drawn:
-    """The sensors of `map_rows` where they lie, one of them chosen; `row` is the campaign that answered."""
+    """The sensors of `map_rows` at their positions, one of them chosen; `row`: the campaign of the answer."""
     from underskin.figures.array_discs import disc_size
     from underskin.figures.array_map import Quantity, array_map, significance_note
 
     value, uncertainty, name, unit, against = _QUANTITIES[show]
-    # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
+    # With few campaigns a slope's uncertainty is smaller than Student's t allows, so its own test decides.
     significant = tuple(row.get("significant", False) for row in rows) if show == "trend" else None
     ends = _ENDS.get(show)
-    own = None if ends is None else tuple((row.get(ends[0]), row.get(ends[1])) for row in rows)
-    quantity = Quantity(name, unit, against, differing=significant, intervals=own)
+    intervals = None if ends is None else tuple((row.get(ends[0]), row.get(ends[1])) for row in rows)
+    quantity = Quantity(name, unit, against, differing=significant, intervals=intervals)
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     radius = row.about["skin"].get("sensor_radius_mm")
     values, uncertainties = columns_of(rows, value, uncertainty)
     # A trend is of all campaigns, whichever measured a sensor last.
     absent = ["" if show == "trend" else row["absent"] for row in rows]
     figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor, radius, absent)
-    compared = [math.nan if away else one for away, one in zip(absent, values, strict=True)]
+    compared = [math.nan if away else shown_value for away, shown_value in zip(absent, values, strict=True)]
     about = (
         f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {RESTS[by]}. "
     )
@@ -104,12 +104,12 @@ def drawn_map(
     about += f"It tells of {measured} of the {len(rows)} sensors. " if measured < len(rows) else ""
     about += "The hollow ones stand at their last value, with its date under the pointer. " if any(absent) else ""
     about += f"{disc_size(x_mm, y_mm, radius)} {significance_note(compared, uncertainties, quantity)} "
-    about += _alone(rows) + _without_trend(rows) if show == "trend" else ""
+    about += _trends_of_single_sensors(rows) + _without_trend(rows) if show == "trend" else ""
     return drawn("map", figure, about + CLICK, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
 
 
 def _without_trend(rows: Sequence[Mapping[str, Any]]) -> str:
-    """How many sensors have no trend, and the reason that most of them have."""
+    """How many sensors have no trend, and the most frequent reason."""
     reasons = Counter(row["no_trend"] for row in rows if row.get("no_trend"))
     if not reasons:
         return ""
@@ -118,9 +118,9 @@ def _without_trend(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"{of} {have} no trend, {'' if count == of else f'{count} of them since '}{most}. "
 
 
-def _alone(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Which sensors have a trend by their own interval that is not told over the whole array: few campaigns of many
-    sensors tell hardly any."""
+def _trends_of_single_sensors(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Which sensors have a trend by their own interval but not by the test over the whole array: few campaigns of
+    many sensors hardly show any."""
     low, high = _ENDS["trend"]
     names = [
         row["sensor"] for row in rows if not row.get("significant", False) and row.get(low, 0) * row.get(high, 0) > 0

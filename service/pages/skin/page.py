@@ -1,4 +1,4 @@
-"""A skin: its array as a map, its sensors over time, its campaigns; of a sensor that is chosen its FRFs too."""
+"""A skin: its array as a map, its sensors over time, its campaigns; for a chosen sensor also its FRFs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -44,7 +44,7 @@ router = APIRouter(prefix="/skins/{skin_id}")
 _ON_A_PAGE = 50
 _SEVERAL: tuple[DiagnosisKind, ...] = ("skin", "fleet")
 _MOST_TOGETHER = 5  # of the latest diagnoses of each kind
-_AT_ONCE = 2  # campaigns whose d33 a page waits for
+_AT_ONCE = 2  # campaigns whose d33 a page computes before it answers
 _MAP_COLUMNS = (
     "sensor", "x_mm", "y_mm", *D33Value.model_fields,
     "slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year", "absent",
@@ -67,8 +67,8 @@ def skin(
     before: str | None = None,
     by: Annotated[By | None, Query(alias="model")] = None,
 ) -> Response:
-    """All at a glance; `sensor` picks the one whose FRFs and history are drawn, `by` the model that d33 rests on: the
-    one in force where none is given, or the paper's where that tells nothing of the latest campaign with FRFs."""
+    """The page of a skin. `sensor`: the one whose FRFs and history are drawn; `by`: the model of d33, by default the
+    one in force, or the paper's if that has no d33 of the latest campaign with FRFs."""
     return shown(request, skin_id, store, table, show, sensor, before, by)
 
 
@@ -112,7 +112,7 @@ def shown(
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, last)
     by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
     history = usecase.history_by_model(store, table, root, by, computed)
-    sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
+    sensor = sensor if sensor in {sensor_history.sensor for sensor_history in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
     if last is not None and (history.sensors or (mapped is not None and mapped["sensors"])):
@@ -176,10 +176,15 @@ def shown(
 def _measured_last(
     store: Database, last: AnyRow, answer: Mapping[str, Any] | None, history: History, sensor: str
 ) -> AnyRow:
-    """The campaign that describes the skin, where it tells of the sensor, else the last one that does."""
-    told = [] if answer is None else [entry["sensor"] for entry in answer["sensors"]]
-    points = [point for entry in history.sensors if entry.sensor == sensor for point in entry.points]
-    return last if sensor in told or not points else store.read(campaigns.find, points[-1].campaign_id)
+    """The campaign that describes the skin if it measured the sensor, else the last one that did."""
+    measured_sensors = [] if answer is None else [measured["sensor"] for measured in answer["sensors"]]
+    points = [
+        point
+        for sensor_history in history.sensors
+        if sensor_history.sensor == sensor
+        for point in sensor_history.points
+    ]
+    return last if sensor in measured_sensors or not points else store.read(campaigns.find, points[-1].campaign_id)
 
 
 def _frfs(store: Database, table: SigmaTable, row: AnyRow, sensor: str) -> list[Drawn]:
@@ -187,15 +192,15 @@ def _frfs(store: Database, table: SigmaTable, row: AnyRow, sensor: str) -> list[
     loaded = partial(store.read, campaigns.load, row, with_excluded=False)
     answer = d33_cache.answer(store, table, row, None)
     return [
-        replace(one, title=f"FRF of {sensor} in {row.name[:80]}")
-        for one in drawn_frf(row, loaded, answer, None, sensor)
+        replace(figure, title=f"FRF of {sensor} in {row.name[:80]}")
+        for figure in drawn_frf(row, loaded, answer, None, sensor)
     ]
 
 
 def _of_sensor(history: History, sensor: str | None) -> dict[str, float]:
     """d33 [pC/N] of a sensor in each campaign, by the campaign's id."""
-    chosen = [entry for entry in history.sensors if entry.sensor == sensor]
-    return {point.campaign_id: point.d33_pc_per_n for entry in chosen for point in entry.points}
+    chosen = [sensor_history for sensor_history in history.sensors if sensor_history.sensor == sensor]
+    return {point.campaign_id: point.d33_pc_per_n for sensor_history in chosen for point in sensor_history.points}
 
 
 def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[AnyRow]:
@@ -204,7 +209,7 @@ def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[
 
 @router.get("/mark")
 def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
-    """Another one whenever anything has changed that the page shows."""
+    """A text that changes whenever anything on the page has changed."""
     with store.reading() as connection:
         return {"mark": skin_changes.mark(connection, skins.require_root(connection, skin_id), table.sha256)}
 
@@ -228,16 +233,16 @@ def history_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "pape
     """d33 of every sensor in every current campaign, and the model that each value rests on."""
     root, _, computed = _completed(store, table, skin_id)
     points = [
-        {"sensor": entry.sensor, **point.model_dump(), "model_id": point.model_id or ""}
-        for entry in usecase.history_by_model(store, table, root, by, computed).sensors
-        for point in entry.points
+        {"sensor": sensor_history.sensor, **point.model_dump(), "model_id": point.model_id or ""}
+        for sensor_history in usecase.history_by_model(store, table, root, by, computed).sensors
+        for point in sensor_history.points
     ]
     return csv_of_rows(file_name(root, "history"), _HISTORY_COLUMNS, points)
 
 
 def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int, dict[str, dict[str, Any]]]:
-    """The skin's own id, of how many campaigns d33 is still to be computed, and what was computed, by the campaigns'
-    ids: a few are at once."""
+    """The skin's root id, the number of campaigns whose d33 is still to be computed, and the answers computed now (a
+    few at a time), by campaign id."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
         missing = len(inversions.missing_of_skin(connection, root, table.sha256))

@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from service.dependencies import WRITE, Store, Table, sender
 from service.ingest.accept import IngestOptions, accept
 from service.ingest.uploads import Upload
-from service.pages.shared.forms import OWN_FORM, see
+from service.pages.shared.forms import FORM_OF_SESSION, see
 from service.store import campaigns, skins
 from service.usecases import d33_cache
 
@@ -20,19 +20,19 @@ SKIN = "example"
 _FOLDER = Path(__file__).parent / "example"
 
 
-@router.post("/example", dependencies=[*WRITE, OWN_FORM])
+@router.post("/example", dependencies=[*WRITE, FORM_OF_SESSION])
 async def load(request: Request, store: Store, table: Table) -> Response:
-    """Keeps the example's campaigns, once however often it is asked for; afresh where all were withdrawn."""
+    """Store the example's campaigns once; again if all were withdrawn."""
     withdrawn = await run_in_threadpool(store.read, _withdrawn)
     if withdrawn is None:
         return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
-    asked = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
+    request_text = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
     settings = request.app.state.settings
     most = settings.max_body_bytes, settings.max_unfolded_bytes
-    options = IngestOptions(SKIN, None, None, False, None, asked, sender(request), *most)
+    options = IngestOptions(SKIN, None, None, False, None, request_text, sender(request), *most)
     answer, _ = await run_in_threadpool(accept, store, uploads, options)
-    await run_in_threadpool(d33_cache.derive, store, table, [entry["id"] for entry in answer["campaigns"]])
+    await run_in_threadpool(d33_cache.derive, store, table, [campaign["id"] for campaign in answer["campaigns"]])
     return see(f"/skins/{SKIN}")
 
 

@@ -11,7 +11,7 @@ from service.auth.access_control import AccessControl
 from service.auth.client_address import client_address, network_of
 from service.auth.keys import Key
 from service.auth.login_throttle import LoginThrottle
-from service.pages.shared.forms import OWN_FORM, Form, see
+from service.pages.shared.forms import FORM_OF_SESSION, Form, see
 from service.pages.shared.html import page, set_session
 from service.problems import Refusal
 
@@ -45,12 +45,12 @@ def login(request: Request, sent: Form) -> Response:
         missing = access.keys_missing()
         return page(request, "login.html", status=401, back=back, unsent=False, refused=True, missing=missing)
     throttle.succeeded(network_of(address))
-    answer = see(_own(back))
+    answer = see(_local_path(back))
     set_session(request, answer, access.sessions.begin(key, address, request.headers.get("user-agent", "")))
     return answer
 
 
-@router.post("/logout", dependencies=[OWN_FORM])
+@router.post("/logout", dependencies=[FORM_OF_SESSION])
 def logout(request: Request) -> Response:
     """Ends it, for whoever has a copy of its cookie too."""
     key: Key | None = request.scope["key"]
@@ -62,7 +62,7 @@ def logout(request: Request) -> Response:
     return answer
 
 
-def _own(path: str) -> str:
-    """An address of this server, its parts quoted already, whatever the form said."""
+def _local_path(path: str) -> str:
+    """An address of this server, already quoted, whatever the form contains."""
     plain = path.startswith("/") and not path.startswith("//") and "\\" not in path and path.isprintable()
     return quote(path, safe="/?=&%+,;:@!$'()*") if plain else "/"

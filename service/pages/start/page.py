@@ -32,14 +32,14 @@ def start(
     find: Annotated[str, Query(max_length=200)] = "",
     before: str | None = None,
 ) -> Response:
-    """The skins whose latest campaigns were recorded last, first."""
+    """The skins, most recently recorded first."""
     with store.reading() as connection:
         glances = overview.glances(connection, find or None, number_of_cursor(before), _ON_A_PAGE + 1, table.sha256)
         shown = glances[:_ON_A_PAGE]
         diagnosed = [glance.diagnosis for glance in shown if glance.diagnosis is not None]
         models = [glance.model for glance in shown if glance.model is not None]
         verdict = verdicts.of_rows(connection, diagnosed, [row.id for row in models])
-        adoptions = {one.diagnosis_id: one for one in verdicts.adopted_versions(connection, models)}
+        adoptions = {adopted.diagnosis_id: adopted for adopted in verdicts.adopted_versions(connection, models)}
     answer = page(
         request,
         "start.html",
@@ -69,7 +69,7 @@ def _d33(array: Mapping[str, Any] | None) -> float | None:
 
 @cache
 def _ahead(store: Database, table: SigmaTable) -> None:
-    """What takes long at first on pages to which this one leads; once."""
+    """Load what is slow at first use on the pages linked from here; once."""
     prepare()
     with suppress(Refusal):  # which the page of mechanisms says
         mechanism_catalogue.read_ahead(store, table)

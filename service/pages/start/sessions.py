@@ -1,4 +1,4 @@
-"""The sessions of one's own key: where somebody is logged in with it, and the way to end each."""
+"""The open sessions of the reader's own key, each of which can be ended."""
 
 import re
 
@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from service.auth import session
 from service.auth.access_control import AccessControl
 from service.auth.keys import Key
-from service.pages.shared.forms import OWN_FORM, see
+from service.pages.shared.forms import FORM_OF_SESSION, see
 from service.pages.shared.html import page
 
 router = APIRouter(prefix="/sessions")
@@ -42,7 +42,7 @@ def sessions(request: Request) -> Response:
     return page(request, "sessions.html", sessions=listed, this=this, browser_name=browser_name)
 
 
-@router.post("/{session_id}/end", dependencies=[OWN_FORM])
+@router.post("/{session_id}/end", dependencies=[FORM_OF_SESSION])
 def end(session_id: str, request: Request) -> Response:
     """End one of them; raises Missing where it is none of this key's."""
     key: Key | None = request.scope["key"]

@@ -1,4 +1,4 @@
-"""A trend as a line the size of a word."""
+"""A trend as a word-sized line chart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

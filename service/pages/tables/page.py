@@ -1,4 +1,4 @@
-"""The tables that ship: what each holds, over which range, how wrong it may be, and how it was made."""
+"""The tables in use: content, range, error and origin of each."""
 
 from functools import cache
 from pathlib import Path
@@ -20,7 +20,7 @@ from underskin.surrogate.sigma_table import SIGMA_TABLE
 
 router = APIRouter(prefix="/tables")
 
-# Of each table: its file, a title, what it holds.
+# Of each table: its file, a title, its content.
 _HELD = {
     "sigma": (
         SIGMA_TABLE,
@@ -38,7 +38,7 @@ _HELD = {
         "A sphere that sinks deep: what finite strain adds to σ, contact radius and depth. No answer uses it yet.",
     ),
 }
-# Words of an axis, and what it is in lab units on the paper's prototype: symbol, factor, unit.
+# Words of an axis, and its quantity on the paper's prototype in lab units: symbol, factor, unit.
 _H, _RT, _E = (PROTOTYPE[name] for name in ("thickness_mm", "sensor_radius_mm", "youngs_modulus_mpa"))
 _R = PROTOTYPE["indenter_radius_mm"]
 _AXES = {
@@ -63,8 +63,8 @@ class DescribedTable(TableEntry):
 
     title: str
     holds: str
-    domain: list[tuple[str, TableAxis, str]]  # words, the axis, what it is on the prototype
-    errors: list[tuple[str, float, float]]  # of what, median and largest
+    domain: list[tuple[str, TableAxis, str]]  # words, the axis, its quantity on the prototype
+    errors: list[tuple[str, float, float]]  # quantity, median and largest
     made: list[tuple[str, Any]]
     versions: str
 
@@ -76,22 +76,22 @@ def view(request: Request, table: Table) -> Response:
     return page(
         request,
         "tables.html",
-        tables=[_described(folder, entry) for entry in tables(table, folder).tables],
+        tables=[_described(folder, tabulated) for tabulated in tables(table, folder).tables],
         prototype=f"h {_H:g} mm, E {_E:g} MPa, a sphere of R {_R:g} mm",
         same=same_request.get(request, "/v1/tables", "client.tables()"),
     )
 
 
-def _described(folder: Path, entry: TableEntry) -> DescribedTable:
-    file, title, holds = _HELD[entry.name]
-    versions = {name.removeprefix("version_"): value for name, value in entry.about.items() if "version_" in name}
+def _described(folder: Path, tabulated: TableEntry) -> DescribedTable:
+    file, title, holds = _HELD[tabulated.name]
+    versions = {name.removeprefix("version_"): value for name, value in tabulated.about.items() if "version_" in name}
     return DescribedTable(
-        **entry.model_dump(),
+        **tabulated.model_dump(),
         title=title,
         holds=holds,
-        domain=[(_AXES[axis.name][0], axis, _in_lab_units(axis)) for axis in entry.axes],
+        domain=[(_AXES[axis.name][0], axis, _in_lab_units(axis)) for axis in tabulated.axes],
         errors=_errors(folder / file),
-        made=[(words, entry.about[name]) for name, words in _MADE.items() if name in entry.about],
+        made=[(words, tabulated.about[name]) for name, words in _MADE.items() if name in tabulated.about],
         versions=", ".join(f"{name} {value}" for name, value in versions.items()),
     )
 

@@ -1,4 +1,4 @@
-"""A recording over its samples: loading, the way back, and what the trim leaves out; brushing it sets the trim."""
+"""A recording over its samples: loading, unloading, and the samples excluded by the trim; brushing sets the trim."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -22,13 +22,13 @@ _NAME = "course"
 _SHOWN = ("displacement_mm", "force_n", "charge_pc")
 _MOST_BINS = 400  # of many samples, the lowest and the highest of each are drawn
 _ROW, _EDGES = 150, 120  # pixels
-_LOADING, _BACK, _USED, _LEFT_OUT = "loading", "way back", "used", "left out"
+_LOADING, _BACK, _USED, _EXCLUDED = "loading", "way back", "used", "left out"
 _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#8a949e"
 
 
 def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None, *, turned: bool) -> list[Drawn]:
-    """The figure of the file's first recording over time or displacement; none of a file without channels. `turned`:
-    whether what counts pressing negative is."""
+    """The first recording of the file over time or displacement; empty for a file without channels. `turned`:
+    whether channels that count pressing negative are inverted."""
     used = rig_of(summary, rig)
     mapped = None if used is None else mapped_file(look, summary, replace(used, trim=None))
     if used is None or mapped is None or not mapped.document["recordings"]:
@@ -46,7 +46,7 @@ def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None
 
 
 def _to_turn(look: InspectedFile, summary: FileSummary, used: RigDescription) -> Sequence[str]:
-    """What is turned of the first recording, as the samples that are used tell."""
+    """The channels of the first recording to be inverted, from the samples in use."""
     trimmed = mapped_file(look, summary, used)
     return () if trimmed is None else turned_curves.counted_negative(trimmed.document["recordings"][0])
 
@@ -73,7 +73,7 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
                     name=name,
                     legendgroup=name,
                     showlegend=row == 1,
-                    line={"color": colour, "width": 1.4, "dash": BOUND if name == _LEFT_OUT else SHOWN},
+                    line={"color": colour, "width": 1.4, "dash": BOUND if name == _EXCLUDED else SHOWN},
                     hovertemplate=f"{name}, sample %{{x}}: %{{y:.4g}} {unit}<extra></extra>",
                     row=row,
                     col=1,
@@ -86,26 +86,26 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
 
 
 def _extremes(column: Floats) -> Indices:
-    """Which samples to draw: all, or the lowest and the highest of each of as many bins as a figure resolves."""
+    """Indices of the samples to draw: all, or minimum and maximum of as many bins as a figure resolves."""
     bins = np.array_split(np.arange(len(column)), min(_MOST_BINS, len(column)))
     ends = [(part[np.argmin(column[part])], part[np.argmax(column[part])]) for part in bins]
     return np.unique([0, *(end for pair in ends for end in pair), len(column) - 1])
 
 
 def _readable(field: str, column: Floats) -> tuple[str, float]:
-    """The unit in which a column reads well, and how many make the lab's."""
+    """A readable unit for a column, and its factor to the lab's unit."""
     if field == "charge_pc":
         return LAB[field].unit, 1.0
     return readable_unit(field, float(np.nanmax(np.abs(column), initial=0.0)))
 
 
 def _parts(columns: Mapping[str, Floats], used: Mask) -> dict[str, tuple[str, Mask]]:
-    """By name the colour of each part and where it is, (samples,); a curve is loaded up to its deepest sample."""
-    left_out = {_LEFT_OUT: (_GREY, ~used)}
+    """Colour and mask (samples,) of each part by name; a curve is loading up to its deepest sample."""
+    excluded = {_EXCLUDED: (_GREY, ~used)}
     if "displacement_mm" not in columns:
-        return {_USED: (_BLUE, used)} | left_out
+        return {_USED: (_BLUE, used)} | excluded
     depth = np.where(used & np.isfinite(columns["displacement_mm"]), columns["displacement_mm"], -np.inf)
     number, turn = np.arange(len(depth)), int(np.argmax(depth))
     if not (used & (number < turn)).any():  # nothing is pressed in yet, such as where a sign is to be turned
-        return {_USED: (_BLUE, used)} | left_out
-    return {_LOADING: (_BLUE, used & (number <= turn)), _BACK: (_ORANGE, used & (number >= turn))} | left_out
+        return {_USED: (_BLUE, used)} | excluded
+    return {_LOADING: (_BLUE, used & (number <= turn)), _BACK: (_ORANGE, used & (number >= turn))} | excluded

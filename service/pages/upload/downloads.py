@@ -1,4 +1,4 @@
-"""What is downloaded of an upload that is not kept: its rig description, its channels, its FRFs."""
+"""Downloads of an upload that is not stored: its rig description, channels and FRFs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

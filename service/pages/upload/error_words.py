@@ -1,4 +1,4 @@
-"""Errors of an upload in the words of its form; of files that need no form, in those of the request."""
+"""Errors of an upload in the words of its form; for files without a form, in those of the request."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -31,9 +31,9 @@ def field_words(field: str) -> str:
     """A field as the form calls it; others as they are."""
     if field.startswith("derived."):
         return f"formula of {field.removeprefix('derived.')}"
-    place, _, of_channel = field.removeprefix("channels.").partition(".")
-    if place in CHOICES and of_channel in _OF_CHANNEL:
-        return f"{_OF_CHANNEL[of_channel]} of the {CHOICES[place]}"
+    part, _, of_channel = field.removeprefix("channels.").partition(".")
+    if part in CHOICES and of_channel in _OF_CHANNEL:
+        return f"{_OF_CHANNEL[of_channel]} of the {CHOICES[part]}"
     if field in _OF_CHANNEL:
         return _OF_CHANNEL[field]
     return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
@@ -45,19 +45,19 @@ def field_of(error: Error, channels: Channels) -> str:
 
 
 def ids_of(refused: Sequence[Error], field: str) -> str:
-    """The ids on the page of what is wrong with a field of the form, with blanks between them; none where it is wrong
-    in a rig description that was sent."""
+    """HTML ids of the errors of a form field, separated by blanks; none for errors in a rig description that was
+    sent."""
     places = [error["field"].removeprefix("skin.").removeprefix("recording.") for error in refused if RIG not in error]
-    return " ".join(f"refused-{number}" for number, place in enumerate(places, 1) if place == field)
+    return " ".join(f"refused-{number}" for number, refused_field in enumerate(places, 1) if refused_field == field)
 
 
 def what_came(error: Error, channels: Channels) -> Any:
-    """The value that was refused; None where the form has none, as for a channel that its kind of recording lacks."""
+    """The rejected value; None if the form has no field for it, such as a channel that its kind of recording lacks."""
     return None if channels and _is_of_other_kind(error) else error["value"]
 
 
 def what_to_do(error: Error, channels: Channels) -> str:
-    """What is allowed; for what the form asks, where to say it."""
+    """What is allowed; for fields of the form, where to enter it."""
     if not channels:
         return str(error["allowed"])
     if _is_of_other_kind(error):
@@ -75,6 +75,6 @@ def what_to_do(error: Error, channels: Channels) -> str:
 
 
 def _is_of_other_kind(error: Error) -> bool:
-    """Whether a channel was refused since recordings of the chosen kind have none."""
-    place, _, field = str(error["field"]).partition(".")
-    return error["code"] == ErrorCode.NOT_ONE_OF and place == "channels" and field in CHOICES
+    """Whether a channel was rejected because recordings of the chosen kind have none."""
+    part, _, field = str(error["field"]).partition(".")
+    return error["code"] == ErrorCode.NOT_ONE_OF and part == "channels" and field in CHOICES

@@ -1,4 +1,4 @@
-"""An uploaded file that is an exported skin: what is in it, what of it is here already, and its coming in."""
+"""An uploaded file that is an exported skin: its content, what of it is stored already, and its import."""
 
 from urllib.parse import quote
 
@@ -19,7 +19,7 @@ KIND = "exported skin"
 
 
 def holds_skin(pending: PendingUpload) -> bool:
-    """Whether an upload is an exported skin: one comes alone."""
+    """Whether an upload is an exported skin, which must be the only file."""
     first, *others = pending.files
     if others:
         return False
@@ -59,7 +59,7 @@ def bring_in(request: Request, store: Database, pending: PendingUpload) -> None:
         with pending_uploads.in_use(pending):
             try:
                 brought = skin_imports.bring_in(store, pending.files[0])
-            except Conflict:  # somebody changed what is here since it was looked at
+            except Conflict:  # the stored data were changed since it was examined
                 look(store, pending)
                 return
         pending.kept_at = f"/skins/{quote(brought.skin_id, safe='')}"

@@ -1,4 +1,4 @@
-"""The figures of an uploaded file: its channels as they came, its FRFs, its curves."""
+"""The figures of an uploaded file: its raw channels, its FRFs, its curves."""
 
 from typing import Any
 
@@ -15,27 +15,33 @@ _MOST_FRF = 12
 _MOST_CURVES = 12
 
 
-def figures(look: InspectedFile, place: str, mapped: MappedFile | None) -> list[Drawn]:
-    """What there is to see; `place`: the address of the upload's file, under which its numbers are; `mapped`: what a
-    mapping makes of the file, whatever that still lacks."""
+def figures(look: InspectedFile, page: str, mapped: MappedFile | None) -> list[Drawn]:
+    """The figures of a file; `page`: the address of the upload's file, for its numbers; `mapped`: the document that
+    a mapping makes of the file, however incomplete."""
     campaigns = _campaigns(look)
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
     return [
         *(drawn_curves(recordings, _MOST_CURVES) or _mapped_curves(mapped)),
-        *_traces(look, place),
-        *_frf(campaigns, place),
+        *_traces(look, page),
+        *_frf(campaigns, page),
     ]
 
 
 def _mapped_curves(mapped: MappedFile | None) -> list[Drawn]:
-    """Force against displacement as soon as a mapping has both, be the sphere's radius known or not."""
+    """Force against displacement as soon as a mapping has both, even without the sphere's radius."""
     from underskin.figures.curves import ForceCurve, force_curves
 
-    recordings = [] if mapped is None else [one for one in mapped.document["recordings"] if one["kind"] != "frf"]
+    recordings = (
+        []
+        if mapped is None
+        else [recording for recording in mapped.document["recordings"] if recording["kind"] != "frf"]
+    )
     curves = [
-        ForceCurve(one["id"], one["displacement_mm"], one["force_n"])
-        for one in recordings
-        if "displacement_mm" in one and "force_n" in one and len(one["displacement_mm"]) == len(one["force_n"])
+        ForceCurve(recording["id"], recording["displacement_mm"], recording["force_n"])
+        for recording in recordings
+        if "displacement_mm" in recording
+        and "force_n" in recording
+        and len(recording["displacement_mm"]) == len(recording["force_n"])
     ]
     if not curves:
         return []
@@ -69,13 +75,13 @@ def _campaigns(look: InspectedFile) -> list[Campaign]:
     return [campaign.reading.campaign for campaign in look.campaigns if campaign.reading is not None]
 
 
-def _traces(look: InspectedFile, place: str) -> list[Drawn]:
+def _traces(look: InspectedFile, page: str) -> list[Drawn]:
     from underskin.figures.traces import raw_traces
 
     if look.contents is None or not look.contents.blocks:
         return []
     block = look.contents.blocks[0]
-    real = [one for one in block.channels if len(one.values) and not np.iscomplexobj(one.values)]
+    real = [channel for channel in block.channels if len(channel.values) and not np.iscomplexobj(channel.values)]
     if not real:
         return []
     of = (
@@ -85,19 +91,21 @@ def _traces(look: InspectedFile, place: str) -> list[Drawn]:
     )
     most = f" (the first {_MOST_TRACES} of {len(real)})" if len(real) > _MOST_TRACES else ""
     about = f"The channels{of}{most}, in the units of the file."
-    return [drawn("traces", raw_traces(real[:_MOST_TRACES], block.sample_rate_hz), about, f"{place}traces.csv")]
+    return [drawn("traces", raw_traces(real[:_MOST_TRACES], block.sample_rate_hz), about, f"{page}traces.csv")]
 
 
-def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
+def _frf(campaigns: list[Campaign], page: str) -> list[Drawn]:
     from underskin.figures.frf import frf_recordings
     from underskin.recordings.frf import flat_zone
 
-    measured_frfs = [entry for campaign in campaigns for entry in measured(campaign)]
+    measured_frfs = [recording_frf for campaign in campaigns for recording_frf in measured(campaign)]
     if not measured_frfs:
         return []
     lines = [
-        flat_zone.lines_of(f"{one.id}: {one.sensor}, R {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
-        for one, frf in measured_frfs[:_MOST_FRF]
+        flat_zone.lines_of(
+            f"{recording.id}: {recording.sensor}, R {recording.indenter_radius_mm:g} mm, {recording.preload_n:g} N", frf
+        )
+        for recording, frf in measured_frfs[:_MOST_FRF]
     ]
     some = (
         f" of the first {_MOST_FRF} of {len(measured_frfs)} recordings"
@@ -105,4 +113,4 @@ def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
         else " of each recording"
     )
     about = f"Magnitude, phase and coherence{some}. R is the sphere's radius."
-    return [drawn("frf", frf_recordings(lines, None), about, f"{place}frf.csv")]
+    return [drawn("frf", frf_recordings(lines, None), about, f"{page}frf.csv")]

@@ -1,4 +1,4 @@
-"""What was understood of an uploaded file: its channels, its recordings, what is wrong."""
+"""Summary of an uploaded file: channels, recordings, errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,7 +39,7 @@ class ChannelSummary:
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """A recording that can be kept; `frf_pc_per_n` is the median magnitude over lines at which charge follows force."""
+    """A valid recording; `frf_pc_per_n` is the median magnitude over the lines where charge follows force."""
 
     id: str
     kind: str
@@ -48,7 +48,7 @@ class RecordingSummary:
     points: int
     frf_pc_per_n: float | None
     recorded_at: str | None = None
-    conditions: Mapping[str, float | str] | None = None  # what the lab noted by names of its own
+    conditions: Mapping[str, float | str] | None = None  # conditions under names of the lab's own
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class FileSummary:
     campaigns: Sequence[str]  # their names
     skin: str | None
     described: Sequence[SkinDescription] = ()  # different ones, of its campaigns; of each the first sensors
-    known: Sequence[str] = ()  # what to know before it is kept
+    known: Sequence[str] = ()  # warnings before it is stored
     day: str | None = None  # of the first recording that has a time
     instrument: str | None = None  # that wrote it, as `instruments.recognised` has it
     parts: int = 0
@@ -78,12 +78,12 @@ class FileSummary:
 
 
 def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSummary:
-    """A summary that is small however large the file; `known`: what to know before it is kept. It does not say yet what
-    was taken for what."""
+    """A summary of bounded size; `known`: warnings to be shown before it is stored. It does not contain yet how
+    columns were interpreted."""
     arrived = [checked(campaign) for campaign in look.campaigns]
-    campaigns = [one.campaign for one in arrived if one.campaign is not None]
+    campaigns = [checked_campaign.campaign for checked_campaign in arrived if checked_campaign.campaign is not None]
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
-    written_by = [one.instrument for one in look.campaigns if one.instrument is not None]
+    written_by = [campaign_read.instrument for campaign_read in look.campaigns if campaign_read.instrument is not None]
     skins = {campaign.skin.id for campaign in campaigns if campaign.skin.id is not None}
     contents = look.contents
     about: dict[str, Any] = {} if contents is None else _about(contents)
@@ -92,35 +92,44 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
         kind=look.kind,
         recordings=len(recordings),
         listed=[_recording(recording) for recording in recordings[:MOST_LISTED]],
-        refused=[entry for one in arrived for entry in one.refused],
+        refused=[refusal for checked_campaign in arrived for refusal in checked_campaign.refused],
         # Not that all recordings of a campaign were refused, which are listed
-        errors=[error for one in arrived if not one.refused for error in one.errors],
-        notes=[note for one in arrived for note in one.notes],
+        errors=[
+            error for checked_campaign in arrived if not checked_campaign.refused for error in checked_campaign.errors
+        ],
+        notes=[note for checked_campaign in arrived for note in checked_campaign.notes],
         campaigns=[campaign.name for campaign in campaigns],
         described=_described(campaigns),
         skin=next(iter(skins)) if len(skins) == 1 else None,
         known=known,
         instrument=next(iter(written_by), None),
-        day=min((str(one.recorded_at)[:10] for one in recordings if one.recorded_at is not None), default=None),
+        day=min(
+            (str(recording.recorded_at)[:10] for recording in recordings if recording.recorded_at is not None),
+            default=None,
+        ),
         **about,
     )
 
 
 def may_state(files: Sequence[FileSummary], name: str) -> bool:
-    """Whether one of the files has a property of this name, as far as their summaries tell: one that was read by its
-    mapping has what that needs, and of many properties not all are listed."""
-    return any(one.recordings or name in one.properties or len(one.properties) >= _MOST_PROPERTIES for one in files)
+    """Whether one of the files may have a property of this name: a file already read by its mapping has what that
+    needs, and long lists of properties are truncated."""
+    return any(file.recordings or name in file.properties or len(file.properties) >= _MOST_PROPERTIES for file in files)
 
 
 def listed(look: InspectedFile, first: int) -> list[RecordingSummary]:
-    """The recordings of a page of the list, from the one of that number on."""
-    campaigns = [one.campaign for one in map(checked, look.campaigns) if one.campaign is not None]
+    """One page of the list of recordings, from this number on."""
+    campaigns = [
+        checked_campaign.campaign
+        for checked_campaign in map(checked, look.campaigns)
+        if checked_campaign.campaign is not None
+    ]
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
     return [_recording(recording) for recording in recordings[first : first + MOST_LISTED]]
 
 
 def _described(campaigns: Sequence[Campaign]) -> list[SkinDescription]:
-    """The first of the skins that campaigns describe, each once, whatever it is called."""
+    """The first of the distinct skins that campaigns describe, ignoring their ids."""
     different: list[SkinDescription] = []
     for campaign in campaigns:
         skin = replace(campaign.skin, id=None, sensors=campaign.skin.sensors[:MOST_SENSORS])
@@ -149,10 +158,10 @@ def _rate(contents: Contents) -> dict[str, Any]:
     if not contents.blocks or contents.blocks[0].sample_rate_hz is not None:
         return {"sample_rate_hz": contents.blocks[0].sample_rate_hz if contents.blocks else None}
     for channel in contents.blocks[0].channels:
-        known = unit(channel.unit)
-        if known is not None and known.dimension == "time" and len(channel.values) > 1:
+        time_unit = unit(channel.unit)
+        if time_unit is not None and time_unit.dimension == "time" and len(channel.values) > 1:
             rate = even_rate(channel.values.real)
-            return {"sample_rate_hz": rate and rate / known.to_si, "rate_from": channel.name}
+            return {"sample_rate_hz": rate and rate / time_unit.to_si, "rate_from": channel.name}
     return {}
 
 
@@ -166,14 +175,15 @@ def _channel(parts: Sequence[Channel]) -> ChannelSummary:
 
 
 def _properties(contents: Contents) -> dict[str, str | float]:
-    """What the file, and its first part, says about itself: a part's own by their own names, as mappings know them."""
+    """The properties of the file and of its first part, those of the part under their own names, as mappings know
+    them."""
     first = contents.blocks[0].name if contents.blocks else ""
-    others = tuple(f"{block.name}." for block in contents.blocks if block.name)
-    own = f"{first}."
+    prefixes = tuple(f"{block.name}." for block in contents.blocks if block.name)
+    prefix = f"{first}."
     properties = {
-        name.removeprefix(own) if first else name: value
+        name.removeprefix(prefix) if first else name: value
         for name, value in contents.properties.items()
-        if not name.startswith(others) or (first and name.startswith(own))
+        if not name.startswith(prefixes) or (first and name.startswith(prefix))
     }
     return dict(list(properties.items())[:_MOST_PROPERTIES])
 
@@ -199,8 +209,8 @@ def _measured(recording: Recording) -> RecordingSummary:
         return RecordingSummary(recording.id, recording.kind, recording.sensor, size, len(recording.force_n), None)
     column = recording.force_n if recording.force_n is not None else recording.frequency_hz
     measured = stated_preload.measured_otherwise(recording)
-    beside = "" if measured is None else f" (its force: {stated_preload.in_words(measured)})"
-    pressed = f"{recording.preload_n:g} N{beside}, sphere radius {recording.indenter_radius_mm:g} mm"
+    addition = "" if measured is None else f" (its force: {stated_preload.in_words(measured)})"
+    pressed = f"{recording.preload_n:g} N{addition}, sphere radius {recording.indenter_radius_mm:g} mm"
     points = 0 if column is None else len(column)
     return RecordingSummary(recording.id, recording.kind, recording.sensor, pressed, points, _level(recording))
 

@@ -1,7 +1,5 @@
-"""Storing an upload that was shown, or the errors that prevent it; the rig description that it is read with.
-
-And what its reader should know before it is kept: nothing kept is ever deleted, so that afterwards is late.
-"""
+"""Storing a previewed upload, or its errors; the rig description with which it is read; and warnings before it is
+stored, because stored data are never deleted."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,8 +10,8 @@ from fastapi import Request
 
 from service.dependencies import sender
 from service.ingest import repeats
-from service.ingest.accept import RIG, IngestOptions, accept, kept_rig, sent_rig
-from service.ingest.reading import InspectedFile, checked, error_entry
+from service.ingest.accept import RIG, IngestOptions, accept, sent_rig, stored_rig
+from service.ingest.reading import InspectedFile, checked, field_error
 from service.ingest.uploads import Upload
 from service.pages.shared.forms import signed
 from service.pages.upload import stated_preload
@@ -29,7 +27,8 @@ SKIN_FIELD, CORRECTS = "skin", "corrects"
 
 
 def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
-    """The ids of what was kept; errors are shown on the upload's page. A second request stores nothing again."""
+    """Store the valid campaigns; returns their ids. Errors are shown on the upload's page. A second request stores
+    nothing again."""
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending.lock:
         if pending.kept_at is not None or pending.is_stale:  # of which the page shows no button to keep it
@@ -53,7 +52,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
                 settings.max_unfolded_bytes,
                 pending.estimator,
                 turn_curves=pending.turned,
-                by_kept_rig=False,  # what the page showed is kept, and no more
+                use_stored_rig=False,  # exactly the previewed data are stored
                 signed=signed(request, sent) if pending.corrects is not None else None,
             )
             with pending_uploads.in_use(pending):
@@ -62,14 +61,14 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
             pending.refused = field_errors(error)
             return []
         stored = [result for result in answer["campaigns"] if result["id"] is not None]
-        one = f"/campaigns/{stored[0]['id']}"
-        pending.kept_at = one if len(stored) == 1 else f"/skins/{quote(stored[0]['skin_id'], safe='')}"
+        page = f"/campaigns/{stored[0]['id']}"
+        pending.kept_at = page if len(stored) == 1 else f"/skins/{quote(stored[0]['skin_id'], safe='')}"
         pending_uploads.empty(pending)
         return [result["id"] for result in stored]
 
 
 def _rig_upload(pending: PendingUpload) -> list[Upload]:
-    """The rig description that was looked with, as a part of the upload."""
+    """The rig description in use, as a part of the upload."""
     if pending.rig is None:
         return []
     path = pending.folder / RIG
@@ -78,34 +77,36 @@ def _rig_upload(pending: PendingUpload) -> list[Upload]:
 
 
 def field_errors(error: Exception) -> list[dict[str, Any]]:
-    """What is wrong, field by field."""
+    """Errors field by field."""
     if isinstance(error, InvalidInput):
-        return [error_entry(one.field, one.value, one.allowed, one.code) for one in errors_of(error)]
+        return [
+            field_error(invalid.field, invalid.value, invalid.allowed, invalid.code) for invalid in errors_of(error)
+        ]
     if isinstance(error, Refusal) and error.errors:
-        return [dict(entry) for entry in error.errors]
+        return [dict(error_of_field) for error_of_field in error.errors]
     if isinstance(error, FileError):
-        return [error_entry(error.file, None, f"{error.place} {error.reason}".strip(), error.code)]
+        return [field_error(error.file, None, f"{error.place} {error.reason}".strip(), error.code)]
     detail = error.detail if isinstance(error, Refusal) else str(error)
-    return [error_entry("upload", None, detail, ErrorCode.INVALID_VALUE)]
+    return [field_error("upload", None, detail, ErrorCode.INVALID_VALUE)]
 
 
 def skin_of(store: Database, corrects: str | None) -> str | None:
-    """The skin of the campaign that is corrected, on which its correction stays; raises Missing."""
+    """The skin of the corrected campaign, on which its correction stays; raises Missing."""
     if corrects is None:
         return None
     return str(store.read(campaigns.find, corrects).skin_id)
 
 
 def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> None:
-    """Read the upload by the rig description that was sent, or that is kept with its skin; what is wrong with the one
-    sent is said."""
+    """Read the upload by the rig description that was sent or that is stored with its skin; errors of a sent one are
+    shown."""
     if sent is not None:
         try:
             pending.rig, pending.rig_label = sent_rig(sent), sent.label
         except (FileError, InvalidInput) as error:
-            pending.refused = [{**entry, RIG: sent.label or RIG} for entry in field_errors(error)]
+            pending.refused = [{**detail, RIG: sent.label or RIG} for detail in field_errors(error)]
     elif pending.skin is not None:
-        pending.rig = store.read(kept_rig, pending.skin)
+        pending.rig = store.read(stored_rig, pending.skin)
         origin = store.read(skins.rig_origin, pending.skin)
         if pending.rig is not None and origin is not None:
             name = pending.rig.document.get("name")
@@ -113,29 +114,36 @@ def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> No
 
 
 def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, corrects: str | None) -> list[str]:
-    """In sentences, of the campaigns of one file, sent for the skin `skin_id` where that is said; `corrects`: the
-    campaign whose place they take."""
+    """Warnings in sentences on the campaigns of one file; `skin_id`: the skin it is sent for, if stated; `corrects`:
+    the campaign that they replace."""
     store, table = request.app.state.store, request.app.state.table
     sentences: list[str] = []
-    for one in map(checked, look.campaigns):
-        if one.campaign is None:
+    for in_file in map(checked, look.campaigns):
+        if in_file.campaign is None:
             continue
-        earlier = store.read(repeats.already_kept, one.campaign, skin_id, corrects)
+        earlier = store.read(repeats.earlier_campaign, in_file.campaign, skin_id, corrects)
         if earlier is not None:
             sentences.append(earlier[0])
-        if store.read(repeats.changes_nothing, one.campaign, skin_id, corrects):
+        if store.read(repeats.changes_nothing, in_file.campaign, skin_id, corrects):
             sentences.append("it says the same as the campaign that it corrects: nothing would change.")
-        kept_on = store.read(repeats.otherwise_named, one.campaign, corrects)
-        if kept_on is not None:
+        stored_skin_id = store.read(repeats.otherwise_named, in_file.campaign, corrects)
+        if stored_skin_id is not None:
             sentences.append(
-                f"the file names skin {one.campaign.skin.id}, not {kept_on}, that of the campaign that it corrects: "
-                "the name below decides."
+                f"the file names skin {in_file.campaign.skin.id}, not {stored_skin_id}, that of the campaign that it "
+                "corrects: the name below decides."
             )
-        sentences += [*stated_preload.doubts(one.campaign), *d33_cache.foreseen(table, one.campaign)]
+        sentences += [
+            *stated_preload.doubts(in_file.campaign),
+            *d33_cache.foreseen(table, in_file.campaign),
+        ]
     return sentences
 
 
 def counts_pressing_negative(looked: InspectedFile) -> bool:
-    """Whether curves of a file do."""
-    held = [one.campaign for one in map(checked, looked.campaigns) if one.campaign is not None]
+    """Whether curves of a file count pressing negative."""
+    held = [
+        checked_campaign.campaign
+        for checked_campaign in map(checked, looked.campaigns)
+        if checked_campaign.campaign is not None
+    ]
     return any(curve_preparation.findings(campaign) for campaign in held)

@@ -1,4 +1,4 @@
-"""Reading the files of an upload, as its rig description and its form say, and what they hold."""
+"""Reading the files of an upload by its rig description and its form, for preview."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -25,27 +25,27 @@ _WORKBOOK, _OF_TEXT = "XLSX", ", separated by tabs, with decimal points"
 
 
 async def in_turn(work: Callable[..., _Result], *arguments: Any) -> _Result:
-    """What `work` gives, which reads files that are only looked at: two at once, the others wait without a thread."""
+    """The result of `work`, which reads files for preview: two at once, the others wait without a thread."""
     async with READING_SLOTS:
         return await run_in_threadpool(work, *arguments)
 
 
 def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
-    """One file, read; raises Missing where there is none of that number, or no more."""
+    """One file, read; raises Missing if there is none of that number any more."""
     if not 0 <= number < len(pending.files) or pending.kept_at is not None:
         raise Missing("There is no such file in this upload.")
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending_uploads.in_use(pending):
         inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
-    campaigns = [one.with_estimator(pending.estimator) for one in inspected.campaigns]
+    campaigns = [campaign.with_estimator(pending.estimator) for campaign in inspected.campaigns]
     return replace(
-        inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns
+        inspected, campaigns=[campaign.with_curves_turned() for campaign in campaigns] if pending.turned else campaigns
     )
 
 
 def look_at_all(request: Request, pending: PendingUpload) -> None:
-    """Read every file; the figures of the first one are drawn with it. What was said of earlier files is forgotten
-    where none of these has its channels."""
+    """Read every file and draw the figures of the first. A rig description of earlier files is dropped if none of
+    these has its channels."""
     if not _look_at_all(request, pending) and pending.remembered is not None:
         pending.lacking = pending.remembered
         pending.start_afresh()
@@ -63,11 +63,11 @@ def _look_at_all(request: Request, pending: PendingUpload) -> bool:
         inspected = looked(request, pending, number)
         if inspected.contents is not None and pending.rig is not None:
             fits.append(has_channels(pending.rig, inspected.contents))
-        recordings += sum(one.recordings for one in inspected.campaigns)
+        recordings += sum(campaign.recordings for campaign in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
         pending.negative |= counts_pressing_negative(inspected)
-        known = worth_knowing(request, inspected, pending.skin, pending.corrects)
-        summary = seen(upload, inspected, known)
+        sentences = worth_knowing(request, inspected, pending.skin, pending.corrects)
+        summary = seen(upload, inspected, sentences)
         summaries.append(replace(summary, taken=_taken(inspected, _mapped(pending, inspected, summary))))
         if number == 0:
             drawn = _figures(pending, 0, inspected, summary)
@@ -78,8 +78,8 @@ def _look_at_all(request: Request, pending: PendingUpload) -> bool:
 async def shown(
     request: Request, pending: PendingUpload, number: int, first: int
 ) -> tuple[list[Drawn], Sequence[RecordingSummary]]:
-    """The figures of a file, and a page of its recordings, from the one of number `first` on; the file is read where
-    they are not at hand."""
+    """The figures of a file and one page of its recordings, from number `first` on; the file is read if they are not
+    cached."""
     drawn = pending.drawn.get(number)
     if drawn is not None and not first:
         return drawn, pending.seen[number].listed
@@ -99,18 +99,18 @@ def _shown(
 
 def _figures(pending: PendingUpload, number: int, inspected: InspectedFile, summary: FileSummary) -> list[Drawn]:
     mapped = _mapped(pending, inspected, summary)
-    course = course_figure.course(inspected, summary, pending.rig, turned=pending.turned)
-    return [*course, *figures(inspected, f"/upload/{pending.id}/{number}/", mapped)]
+    force_course = course_figure.course(inspected, summary, pending.rig, turned=pending.turned)
+    return [*force_course, *figures(inspected, f"/upload/{pending.id}/{number}/", mapped)]
 
 
 def _mapped(pending: PendingUpload, inspected: InspectedFile, summary: FileSummary) -> MappedFile | None:
-    """What a mapping makes of a file, its curves turned where that was asked."""
+    """The document that a mapping makes of a file, with curves inverted if requested."""
     mapped = mapped_file(inspected, summary, pending.rig)
     return mapped if mapped is None or not pending.turned else with_curves_turned(mapped)
 
 
 def _taken(inspected: InspectedFile, mapped: MappedFile | None) -> dict[str, str]:
-    """By field what was taken for it, under none how the text was read: a workbook's cells have no separators."""
+    """How each field was read, under the empty name how the text was read; a workbook has no separators."""
     layout = "" if inspected.contents is None else inspected.contents.layout
     taken = dict(mapped.taken) if mapped is not None else {"": layout} if layout else {}
     if inspected.kind == _WORKBOOK and "" in taken:
@@ -119,14 +119,14 @@ def _taken(inspected: InspectedFile, mapped: MappedFile | None) -> dict[str, str
 
 
 def channels_of(pending: PendingUpload) -> list[ChannelSummary]:
-    """Of all files, by name; those that hold the mapping's channels first come first."""
-    by_name = {channel.name: channel for one in reversed(pending.seen) for channel in reversed(one.channels)}
+    """Channels of all files by name, first those of files with the mapping's channels."""
+    by_name = {channel.name: channel for file in reversed(pending.seen) for channel in reversed(file.channels)}
     return list(reversed(by_name.values()))
 
 
 def held_by_some(pending: PendingUpload) -> dict[str, list[str]]:
-    """Of channels that not all files with channels have, by name: which files have them."""
-    files = [(one.label, {channel.name for channel in one.channels}) for one in pending.seen if one.channels]
+    """For channels that only some of the files with channels have, by name, these files."""
+    files = [(file.label, {channel.name for channel in file.channels}) for file in pending.seen if file.channels]
     holders: dict[str, list[str]] = {}
     for label, names in files:
         for name in names:
@@ -135,12 +135,12 @@ def held_by_some(pending: PendingUpload) -> dict[str, list[str]]:
 
 
 def used_twice(pending: PendingUpload, channels: Sequence[ChannelSummary]) -> dict[str, str]:
-    """Channels that the form took for what another one is already, and that."""
+    """Channels that the form uses twice, with the first use."""
     names = {channel.name for channel in channels}
     used = [(str(error["value"]), error["field"].removeprefix("channels.")) for error in pending.refused]
     return {name: field for name, field in used if name in names and field in CHOICES}
 
 
 def is_unsaid(pending: PendingUpload, file: FileSummary) -> bool:
-    """Whether nobody has said yet what the channels of a file are."""
+    """Whether the channels of a file are not assigned yet."""
     return pending.rig is None and bool(file.channels)

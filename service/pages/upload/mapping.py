@@ -1,4 +1,4 @@
-"""A rig description as a form: what each channel of a file is, and what the file does not say."""
+"""A rig description as a form: the meaning of each channel of a file, and values that the file does not contain."""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -52,18 +52,18 @@ _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press
 def guessed(
     channels: Sequence[ChannelSummary], properties: Mapping[str, Any], skin: Mapping[str, Any], *, dated: bool = False
 ) -> dict[str, Any]:
-    """A first rig description by units and names of channels and properties; `skin`: what is known of it; `dated`:
-    whether each part of the file says itself when it was recorded."""
+    """A first rig description from units and names of channels and properties; `skin`: its known values; `dated`:
+    whether each part of the file has its own time of recording."""
     kind, fields = _likely(channels)
     channels_by_field: dict[str, Any] = {}
-    for one, field in zip(channels, fields, strict=True):
+    for channel, field in zip(channels, fields, strict=True):
         if field and field not in channels_by_field:
-            channels_by_field[field] = {"channel": one.name}
-    known_skin = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
+            channels_by_field[field] = {"channel": channel.name}
+    skin_values = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
     return {
         "schema": SCHEMA,
         "kind": kind,
-        "skin": {"poisson_ratio": 0.5, **known_skin},
+        "skin": {"poisson_ratio": 0.5, **skin_values},
         "recording": _stated(properties, kind, dated=dated),
         "channels": spring_mapping.guessed(channels_by_field, channels, properties)
         if kind == "indentation"
@@ -72,11 +72,11 @@ def guessed(
 
 
 def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any]) -> list[str]:
-    """In words, which channels a guessed rig description leaves unused, and what they may be instead of those used."""
+    """In words, which channels a guessed rig description does not use, and what they could replace."""
     by_field: dict[str, list[str]] = {}
-    for one, field in zip(channels, _likely(channels)[1], strict=True):
-        if spring_mapping.shown_as(document, one.name)[0] in ("", field):
-            by_field.setdefault(field, []).append(one.name)
+    for channel, field in zip(channels, _likely(channels)[1], strict=True):
+        if spring_mapping.shown_as(document, channel.name)[0] in ("", field):
+            by_field.setdefault(field, []).append(channel.name)
     return [
         f"{', '.join(names[1:])} may be {CHANNELS[field]} as well as {names[0]}, which was taken for it: "
         "choose the one that is meant"
@@ -86,23 +86,23 @@ def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any])
 
 
 def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
-    """The kind of recording, and of each channel the field that it may be; empty where nothing speaks for one."""
-    dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
+    """The kind of recording, and the likely field of each channel; empty if there is no indication."""
+    dimensions = [channel_unit.dimension if (channel_unit := unit(channel.unit)) else "" for channel in channels]
     kind = "frf"
-    charged = "charge" in dimensions or any("charge" in one.name.lower() for one in channels)
+    charged = "charge" in dimensions or any("charge" in channel.name.lower() for channel in channels)
     if "length" in dimensions and not charged:
-        named = any(words in one.name.lower() for one in channels for words in _OF_COMPRESSION)
+        named = any(words in channel.name.lower() for channel in channels for words in _OF_COMPRESSION)
         kind = "compression" if named else "indentation"
-    elif not charged and any(word in one.name.lower() for one in channels for word in _OF_SPRINGS):
+    elif not charged and any(word in channel.name.lower() for channel in channels for word in _OF_SPRINGS):
         kind = "indentation"
-    phases = any("phase" in one.name.lower() for one in channels)
+    phases = any("phase" in channel.name.lower() for channel in channels)
     fields = []
-    for one, dimension in zip(channels, dimensions, strict=True):
-        word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
-        field = "frf_pc_per_n" if one.is_complex else _BY_DIMENSION[kind].get(dimension) or word
-        if field == "frf_re_pc_per_n" and "imag" in one.name.lower():
+    for channel, dimension in zip(channels, dimensions, strict=True):
+        word = next((field for word, field in _BY_WORD.items() if word in channel.name.lower()), "")
+        field = "frf_pc_per_n" if channel.is_complex else _BY_DIMENSION[kind].get(dimension) or word
+        if field == "frf_re_pc_per_n" and "imag" in channel.name.lower():
             field = "frf_im_pc_per_n"
-        if field == "frf_re_pc_per_n" and (phases or any(part in one.name.lower() for part in _MAGNITUDES)):
+        if field == "frf_re_pc_per_n" and (phases or any(part in channel.name.lower() for part in _MAGNITUDES)):
             field = MAGNITUDE
         fields.append(field if field in channel_fields(kind) else "")
     return kind, fields
@@ -111,21 +111,22 @@ def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
 def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
     """The recording's fields that the file itself states under their own names."""
     wanted = [name for name, _, _, kinds in RECORDING if kind in kinds]
-    named = {field: one for one in properties for field in (one, *(lab_field(one) or ())[:1])}
-    rate = next((one for one in properties if one.lower().replace(" ", "_") in _RATES), None)
+    named = {
+        field: stated_name for stated_name in properties for field in (stated_name, *(lab_field(stated_name) or ())[:1])
+    }
+    rate = next((stated_name for stated_name in properties if stated_name.lower().replace(" ", "_") in _RATES), None)
     if rate is not None:
         named[RATE] = rate
     when = None if dated else recorded_time.stated(properties)
-    named = {name: known_as for name, known_as in named.items() if name != recorded_time.FIELD}
+    named = {name: file_name for name, file_name in named.items() if name != recorded_time.FIELD}
     named |= {} if when is None else {recorded_time.FIELD: when}
     return {name: {"property": named[name]} for name in wanted if name in named}
 
 
 def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
-    """The rig description that a form says, and what in it cannot be: a value, a line of the layout, two channels for
-    one field.
+    """The rig description of a form and its errors: invalid values, layout lines, two channels for one field.
 
-    What no field of the form is about stays as in `base`; what was typed and cannot be is kept, to be put right.
+    Everything outside the form stays as in `base`; invalid text is kept for correction.
     """
     kind = form.get("kind", "frf")
     sensors, strange = _sensors(form.get("sensors", ""))
@@ -133,22 +134,22 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document: dict[str, Any] = {"schema": SCHEMA, **deepcopy(dict(base)), "kind": kind}
     document["skin"] = _replaced(base.get("skin", {}), {name: number_or_text(form.get(name, "")) for name, *_ in SKIN})
     document["skin"] = _replaced(document["skin"], {"sensors": sensors})
-    values = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
+    values = {name: _typed_value(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
     mistimed = _in_zone(values)
     document["recording"] = _replaced(base.get("recording", {}), values)
     travel = {"travel": ""} if "travel" in form and "displacement_mm" in workbench.derived_fields(form) else {}
     channels, unsaid = spring_mapping.with_spring(
-        channels, {**form, **travel}, _said(form, spring_mapping.SPRING), base.get("channels", {})
+        channels, {**form, **travel}, _typed_value(form, spring_mapping.SPRING), base.get("channels", {})
     )
     channels = workbench.with_derived(channels, form, CHANNELS, base)
     document["channels"] = workbench.with_tare(channels, form, base)
-    rest = {
+    remaining = {
         "name": form.get("name", base.get("name", "")).strip() or None,
         "derived": workbench.formulas(form, CHANNELS, base),
         "curves": spring_mapping.curves_of(form, base.get("curves")),
         "trim": workbench.trim_of(form, base.get("trim")),
     }
-    document = _replaced(document, rest)
+    document = _replaced(document, remaining)
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
@@ -157,19 +158,21 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:
-    """The layout, a line a sensor."""
+    """The layout, one sensor per line."""
     sensors = document.get("skin", {}).get("sensors") or []
-    rows = [[one[name] for name in ("id", "x_mm", "y_mm") if name in one] for one in sensors]
-    return "\n".join(", ".join(f"{part:g}" if isinstance(part, float | int) else part for part in one) for one in rows)
+    rows = [[sensor[name] for name in ("id", "x_mm", "y_mm") if name in sensor] for sensor in sensors]
+    return "\n".join(
+        ", ".join(f"{part:g}" if isinstance(part, float | int) else part for part in cells) for cells in rows
+    )
 
 
 def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    others = {name: value for name, value in base.items() if name not in values}
-    return others | {name: value for name, value in values.items() if value is not None}
+    remaining = {name: value for name, value in base.items() if name not in values}
+    return remaining | {name: value for name, value in values.items() if value is not None}
 
 
-def _said(form: Mapping[str, str], name: str) -> Any:
-    """A value that was typed, or else the property of the file that holds it."""
+def _typed_value(form: Mapping[str, str], name: str) -> Any:
+    """A typed value, or else the property of the file that holds it."""
     text = form.get(name, "").strip()
     if not text and form.get(f"{name}-from"):
         return {"property": form[f"{name}-from"]}
@@ -177,7 +180,7 @@ def _said(form: Mapping[str, str], name: str) -> Any:
 
 
 def _in_zone(values: dict[str, Any]) -> list[InvalidInput]:
-    """Puts a time that was typed into the lab's time zone; what is wrong with it, which is kept to be put right."""
+    """Converts a typed time to the lab's time zone; returns the errors, and keeps invalid text."""
     typed = values[recorded_time.FIELD]
     if not isinstance(typed, str):
         return []
@@ -189,7 +192,7 @@ def _in_zone(values: dict[str, Any]) -> list[InvalidInput]:
 
 
 def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInput]]:
-    """The sensors, and the lines that are none: these are kept as names without a place."""
+    """The sensors, and the invalid lines, which are kept as names without a position."""
     sensors: list[dict[str, Any]] = []
     strange = []
     for number, line in enumerate(layout.splitlines(), start=1):
@@ -226,7 +229,7 @@ def _channels(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[st
 
 
 def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> dict[str, Any]:
-    """One channel; a unit that differs from the file's label says that the label is wrong."""
+    """One channel; a unit that differs from the file's label overrides the label."""
     name, label = form[f"channel-{number}"], form.get(f"label-{number}", "")
     true_unit = form.get(f"unit-{number}", "").strip()
     wrong = bool(label and true_unit and unit(true_unit) != unit(label))
@@ -244,7 +247,7 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
 
 
 def rig_of(summary: FileSummary, rig: RigDescription | None) -> RigDescription | None:
-    """The rig description in use or, without one, as the form guesses it; None where that cannot be."""
+    """The rig description in use or, without one, the guessed one; None if it is invalid."""
     try:
         guess = guessed(summary.channels, summary.properties, {}, dated=summary.began is not None)
         return rig or rig_description.from_dict(guess)
@@ -253,8 +256,8 @@ def rig_of(summary: FileSummary, rig: RigDescription | None) -> RigDescription |
 
 
 def mapped_file(look: InspectedFile, summary: FileSummary, rig: RigDescription | None) -> MappedFile | None:
-    """The campaign document of a file and what was taken for what, by the rig description or, without one, as the form
-    guesses it; None where that cannot be."""
+    """The campaign document of a file and how its columns were read, by the rig description in use or, without one,
+    the guessed one; None if it is invalid."""
     used = rig_of(summary, rig)
     if look.contents is None or used is None:
         return None

@@ -1,4 +1,4 @@
-"""The upload that an address names, as routes are given it: the session's own."""
+"""Dependency of routes: the upload of the address, if it belongs to the session."""
 
 from typing import Annotated
 
@@ -9,20 +9,20 @@ from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.store import Missing
 
 
-def _found(request: Request, upload_id: str) -> PendingUpload:
-    """The upload of an address; raises Missing where it is not the session's own."""
+def _upload(request: Request, upload_id: str) -> PendingUpload:
+    """The upload of an address; raises Missing if it is not the session's own."""
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
 
 
-Found = Annotated[PendingUpload, Depends(_found)]
+UploadOfSession = Annotated[PendingUpload, Depends(_upload)]
 
 
-def _pending(found: Found) -> PendingUpload:
-    """The same, which was not discarded; raises Missing where it was."""
-    if found.discarded:
+def _pending(upload: UploadOfSession) -> PendingUpload:
+    """The same unless it was discarded; raises Missing if it was."""
+    if upload.discarded:
         raise Missing("This upload was discarded. For an hour it can be taken back on the page “Upload”.")
-    return found
+    return upload
 
 
 Pending = Annotated[PendingUpload, Depends(_pending)]

@@ -16,7 +16,7 @@ from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.shared import same_request
 from service.pages.shared.conditions import condition_columns
 from service.pages.shared.figures import Drawn
-from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
+from service.pages.shared.forms import FORM_OF_SESSION, TOKEN, Form, require_form_token, see
 from service.pages.shared.html import page
 from service.pages.upload import (
     error_words,
@@ -43,7 +43,7 @@ from underskin.recordings.frf.estimators import checked_estimator
 
 router = APIRouter(prefix="/upload")
 
-_LONGEST_FIELD = 1000  # bytes of a field beside the files
+_LONGEST_FIELD = 1000  # bytes of a field other than the files
 _ESTIMATOR = "estimator"
 _ESTIMATORS = {"H1": "noise in the charge", "H2": "noise in the force", "Hv": "noise in both"}  # for which each is
 _MOST_SKINS = 200  # that the form offers
@@ -57,12 +57,12 @@ def form(
     skin: Annotated[str, Query(max_length=200)] = "",
     corrects: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
-    """Asks for files; `corrects`: the campaign whose place they take."""
+    """Asks for files; `corrects`: the campaign that they replace."""
     return _form(request, store, skin, corrects)
 
 
 def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
-    known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
+    skin_ids = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     corrected = store.read(campaigns.find, corrects) if corrects else None
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     cookie = session.cookie_in(dict(request.scope["headers"]))
@@ -75,7 +75,7 @@ def _form(request: Request, store: Database, skin: str, corrects: str, error: st
         error=error,
         skin=skin,
         corrected=corrected,
-        known=known,
+        known=skin_ids,
         estimators=_ESTIMATORS,
         most_mb=request.app.state.settings.max_upload_mb,
         same=same_request.files(request, ["monday.tdms"], "rig.yaml", skin),
@@ -84,23 +84,23 @@ def _form(request: Request, store: Database, skin: str, corrects: str, error: st
 
 @router.post("", dependencies=WRITE)
 async def send(request: Request, store: Store) -> Response:
-    """Takes files to be looked at; none is kept."""
+    """Receives files for preview; nothing is stored."""
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     cookie = session.cookie_in(dict(request.scope["headers"]))
     folder: UploadFolder = request.app.state.uploads
     async with received(request, folder) as sent:
-        unlabelled = [one for one in sent if one.label is None]
+        unlabelled = [part for part in sent if part.label is None]
         fields = await folder.threads.run(partial(texts, unlabelled, _LONGEST_FIELD))
-        require_own(request, fields.get(TOKEN, ""))
-        given = [one for one in sent if one.label and one.field != RIG]
-        rig = next((one for one in sent if one.field == RIG and one.label), None)
+        require_form_token(request, fields.get(TOKEN, ""))
+        given = [part for part in sent if part.label and part.field != RIG]
+        rig = next((part for part in sent if part.field == RIG and part.label), None)
         if not given:
             error = "No file came. Choose one, or drop it on the page."
             filled = fields.get(SKIN_FIELD, ""), fields.get(CORRECTS, "")
             return await run_in_threadpool(_form, request, store, *filled, error)
         corrects = fields.get(CORRECTS) or None
-        said = fields.get(_ESTIMATOR)
-        estimator = checked_estimator(_ESTIMATOR, said) if said else None
+        estimator_typed = fields.get(_ESTIMATOR)
+        estimator = checked_estimator(_ESTIMATOR, estimator_typed) if estimator_typed else None
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
         pending = await folder.threads.run(partial(pending_uploads.put, cookie, given))
         pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
@@ -108,7 +108,7 @@ async def send(request: Request, store: Store) -> Response:
     try:
         with pending_uploads.in_use(pending):
             if await run_in_threadpool(exported_skin.holds_skin, pending):
-                async with skin_imports.one:
+                async with skin_imports.one_at_a_time:
                     await run_in_threadpool(exported_skin.look, store, pending)
             else:
                 await in_turn(look_at_all, request, pending)
@@ -126,7 +126,7 @@ async def understood(
     file: Annotated[int, Query(ge=0)] = 0,
     first: Annotated[int, Query(ge=0, le=MOST_RECORDINGS)] = 0,
 ) -> Response:
-    """What was understood, file by file; `first`: the number of the first recording that is listed."""
+    """The preview, file by file; `first`: number of the first listed recording."""
     if pending.kept_at is not None:
         return see(pending.kept_at)
     if pending.skin_summary is not None:
@@ -145,12 +145,12 @@ def _understood(
     figures: Sequence[Drawn],
     recordings: Sequence[RecordingSummary],
 ) -> Response:
-    known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
+    skin_ids = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     about = _latest(store, pending.skin or pending.seen[file].skin)
     channels = channels_of(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
     seen = pending.seen[file]
-    good = sum(one.recordings for one in pending.seen)
+    good = sum(summary.recordings for summary in pending.seen)
     document = stated or mappings.guessed(channels, seen.properties, about, dated=seen.began is not None)
     return page(
         request,
@@ -163,18 +163,24 @@ def _understood(
         refusals=similar_errors.of_recordings(pending.seen[file]),
         figures=figures,
         good=good,
-        refused=sum(len(one.refused) or len(one.errors) for one in pending.seen if not is_unsaid(pending, one)),
+        refused=sum(
+            len(summary.refused) or len(summary.errors) for summary in pending.seen if not is_unsaid(pending, summary)
+        ),
         unsaid=is_unsaid(pending, pending.seen[file]),
         is_unsaid=partial(is_unsaid, pending),
-        lost=[(at, one) for at, one in enumerate(pending.seen) if good and not one.recordings and not one.refused],
+        lost=[
+            (at, summary)
+            for at, summary in enumerate(pending.seen)
+            if good and not summary.recordings and not summary.refused
+        ],
         held_by_some=held_by_some(pending),
         recordings=recordings,
-        conditions=condition_columns(one.conditions for one in recordings),
+        conditions=condition_columns(recording.conditions for recording in recordings),
         first=first,
         most_listed=MOST_LISTED,
         most_sensors=file_summary.MOST_SENSORS,
-        apart=len({one.day for one in pending.seen if one.day is not None}) > 1,
-        known=known,
+        apart=len({summary.day for summary in pending.seen if summary.day is not None}) > 1,
+        known=skin_ids,
         skin=pending.skin or pending.seen[file].skin or "",
         channels=channels,
         passed_over=[] if stated else mappings.passed_over(channels, document),
@@ -195,7 +201,7 @@ def _understood(
         offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(
             request,
-            [one.label for one in pending.seen[:_MOST_NAMED]],
+            [summary.label for summary in pending.seen[:_MOST_NAMED]],
             pending.rig_label,
             pending.skin or "",
             pending.estimator,
@@ -205,26 +211,28 @@ def _understood(
 
 @router.post("/{upload_id}/mapping", dependencies=WRITE)
 async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
-    """Reads the files again, as a form says what they are."""
+    """Reads the files again with the values of the form."""
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
-    said, wrong = mappings.document_of(sent, base)
+    document, wrong = mappings.document_of(sent, base)
     guess = mappings.guessed(channels_of(pending), pending.seen[0].properties, {})
-    pending.draft = workbench.with_guesses(said, base, guess)
+    pending.draft = workbench.with_guesses(document, base, guess)
     of_files = single_files.typed(sent, pending.files)
-    units_checked = bool(said.get("units_checked"))
-    values, wrong_of_files = single_files.values_of(of_files, pending.files, said["kind"], units_checked=units_checked)
+    units_checked = bool(document.get("units_checked"))
+    values, wrong_of_files = single_files.values_of(
+        of_files, pending.files, document["kind"], units_checked=units_checked
+    )
     wrong += wrong_of_files
-    pending.refused = [entry for error in wrong for entry in field_errors(error)]
+    pending.refused = [detail for error in wrong for detail in field_errors(error)]
     try:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:
         wrong.append(error)
-        told = {entry["field"] for entry in pending.refused}
-        pending.refused += [entry for entry in field_errors(error) if entry["field"] not in told]
+        fields_refused = {detail["field"] for detail in pending.refused}
+        pending.refused += [detail for detail in field_errors(error) if detail["field"] not in fields_refused]
     pending.of_files = of_files
     if not wrong:
-        pending.say_of_files(of_files, values)
+        pending.state_of_files(of_files, values)
         pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
         pending.remembered = pending.lacking = None
         pending.turned &= not pending.is_depth_composed
@@ -232,17 +240,17 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/template", dependencies=[*WRITE, OWN_FORM])
+@router.post("/{upload_id}/template", dependencies=[*WRITE, FORM_OF_SESSION])
 async def use_template(request: Request, pending: Pending, store: Store) -> Response:
-    """Reads the files as those of the same instrument were read before."""
+    """Reads the files as earlier files of the same instrument."""
     await run_in_threadpool(use_template_of, store, pending)
     await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/afresh", dependencies=[*WRITE, OWN_FORM])
+@router.post("/{upload_id}/afresh", dependencies=[*WRITE, FORM_OF_SESSION])
 async def start_afresh(request: Request, pending: Pending) -> Response:
-    """Reads the files without what was said of earlier ones."""
+    """Reads the files without values remembered from earlier ones."""
     pending.start_afresh()
     await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
@@ -250,13 +258,13 @@ async def start_afresh(request: Request, pending: Pending) -> Response:
 
 def use_template_of(store: Database, pending: PendingUpload) -> None:
     """The same with the skin that the form or the first file names; raises Missing where there is no template."""
-    found = next((one.skin for one in pending.seen), None)  # of an exported skin, no file was seen
-    templates.use(store, pending, _latest(store, pending.skin or found))
+    skin = next((file.skin for file in pending.seen), None)  # of an exported skin, no file was seen
+    templates.use(store, pending, _latest(store, pending.skin or skin))
 
 
 @router.post("/{upload_id}/signs", dependencies=WRITE)
 async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
-    """Reads the files again, curves that count pressing negative turned, or as they came."""
+    """Reads the files again with curves that count pressing negative inverted, or unchanged."""
     pending.turned = sent.get("turned") == "yes" and not pending.is_depth_composed
     await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
@@ -264,19 +272,19 @@ async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response
 
 @router.post("/{upload_id}/keep", dependencies=WRITE)
 async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
-    """Keeps what is good of it."""
+    """Stores the valid part."""
     async with keeping(store):
         campaign_ids = await run_in_threadpool(keep_good, request, pending, sent, store)
         await run_in_threadpool(d33_cache.derive, store, table, campaign_ids)
     return see(pending.kept_at or f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/skin", dependencies=[*WRITE, OWN_FORM])
+@router.post("/{upload_id}/skin", dependencies=[*WRITE, FORM_OF_SESSION])
 async def bring_in(request: Request, pending: Pending, store: Store) -> Response:
-    """Brings in an exported skin."""
+    """Imports an exported skin."""
     if pending.skin_summary is None:
         raise Missing("There is no exported skin in this upload.")
-    async with skin_imports.one:
+    async with skin_imports.one_at_a_time:
         store.require_hope()
         await run_in_threadpool(exported_skin.bring_in, request, store, pending)
     return see(pending.kept_at or f"/upload/{pending.id}")

@@ -1,7 +1,7 @@
-"""Uploads that were read and not stored yet: each in a folder of its own, of one session, for an hour.
+"""Uploads that were read but not stored: each in a folder of its own, of one session, for an hour.
 
 They lie in the server's folder of uploads, which is removed with the server. A session has a few at a time, and all
-together take at most the room of one upload; those that were discarded are removed first, then the oldest.
+together take at most the room of one upload; discarded ones are removed first, then the oldest.
 """
 
 import hashlib
@@ -25,9 +25,9 @@ from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
 
 LASTS_S = 3600.0
-_MOST_KEPT = 50
+_MOST_UPLOADS = 50
 _MOST_OF_SESSION = 5
-_MOST_DRAWN = 6  # files whose figures are kept
+_MOST_DRAWN = 6  # files whose figures are cached
 _GONE = (
     "This upload is not here any more: an upload that is not kept goes after an hour, when room is needed for others, "
     "or when the server is restarted. Nothing of it was kept; send it again."
@@ -36,8 +36,8 @@ _GONE = (
 
 @dataclass(frozen=True)
 class Remembered:
-    """Where a rig description comes from that was said of earlier files: the instrument's name, when it was kept and by
-    whom, the skin that it is kept with, and the file that it came with; None where that is not known."""
+    """The origin of a rig description taken from earlier files: the instrument's name, when and by whom it was
+    stored, its skin, and its file; None if unknown."""
 
     instrument: str | None
     kept_at: str
@@ -48,7 +48,7 @@ class Remembered:
 
 @dataclass
 class PendingUpload:
-    """One upload, and what was understood of it so far."""
+    """One upload, and what was read of it so far."""
 
     id: str
     session: str  # digest of the cookie
@@ -59,36 +59,34 @@ class PendingUpload:
     skin: str | None = None
     rig: RigDescription | None = None
     rig_label: str | None = None  # the file that a request would send it as; None where none need be sent
-    remembered: Remembered | None = None  # where `rig` comes from, unless it was sent or said in the form
-    lacking: Remembered | None = None  # what was remembered for the skin, and needs channels that these files lack
+    remembered: Remembered | None = None  # origin of `rig`, unless it was sent or entered in the form
+    lacking: Remembered | None = None  # a stored rig description of the skin that needs channels which these files lack
     draft: dict[str, Any] | None = None  # the rig description as the form had it, usable or not
-    of_files: Mapping[int, Mapping[str, str]] = field(default_factory=dict)  # what was typed of single files
-    refused: list[dict[str, Any]] = field(
-        default_factory=list
-    )  # what is wrong with the form, or kept it from being kept
+    of_files: Mapping[int, Mapping[str, str]] = field(default_factory=dict)  # typed values of single files
+    refused: list[dict[str, Any]] = field(default_factory=list)  # errors of the form, or errors that prevented storing
     seen: list[FileSummary] = field(default_factory=list)
     drawn: dict[int, list[Drawn]] = field(default_factory=dict)
     estimator: Estimator | None = None  # of FRFs from time series, whatever files or rig say
-    corrects: str | None = None  # the campaign whose place it takes
+    corrects: str | None = None  # the campaign that it replaces
     reason: str = ""  # why it does
     who: str = ""  # that says so, as typed
     skin_summary: SkinSummary | None = None  # where it is an exported skin
     negative: bool = False  # whether curves of it count pressing negative
     turned: bool = False  # whether those were turned
-    kept_at: str | None = None  # the page of what was kept
+    kept_at: str | None = None  # the page of the stored data
     discarded: bool = False  # it can be taken back while it is here
     users: int = 0  # that read its files now
-    given_up: bool = False  # whether its files go as soon as nobody reads them
+    given_up: bool = False  # whether its files are removed once nobody reads them
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def is_stale(self) -> bool:
-        """Whether the form holds what cannot be used, so that what was read is not what it says."""
+        """Whether the form has invalid values, so that the reading does not correspond to it."""
         return self.draft is not None
 
     @property
     def is_depth_composed(self) -> bool:
-        """Whether the displacement is made of several channels: turned as a whole, its terms would be wrong."""
+        """Whether the displacement is computed from several channels: inverting the sum would invert each term."""
         mapping = None if self.rig is None else self.rig.channels.get("displacement_mm")
         if self.rig is None or mapping is None:
             return False
@@ -96,15 +94,15 @@ class PendingUpload:
         return mapping.deflection is not None or (formula is not None and formula.is_sum)
 
     def start_afresh(self) -> None:
-        """Forget what was said of channels, here or of earlier files."""
+        """Forget the assignment of channels, also of earlier files."""
         self.rig = self.rig_label = self.draft = self.remembered = None
         self.turned, self.refused = False, []
-        self.say_of_files({}, {})
+        self.state_of_files({}, {})
 
-    def say_of_files(self, typed: Mapping[int, Mapping[str, str]], values: Mapping[int, Mapping[str, Any]]) -> None:
+    def state_of_files(self, typed: Mapping[int, Mapping[str, str]], values: Mapping[int, Mapping[str, Any]]) -> None:
         """Read single files by the fields of their recordings that were `typed`, which are these `values`."""
         self.of_files = typed
-        self.files = [replace(one, said=values.get(number)) for number, one in enumerate(self.files)]
+        self.files = [replace(file, said=values.get(number)) for number, file in enumerate(self.files)]
 
     def draw(self, number: int, figures: list[Drawn]) -> None:
         """Keep the figures of a file."""
@@ -124,12 +122,12 @@ class PendingUploads:
         self._remover = ThreadPoolExecutor(1, "removes-uploads")
 
     def put(self, cookie: str, sent: Sequence[Upload]) -> PendingUpload:
-        """Take over the files of an upload; of a session that has too many the oldest goes, a discarded one first."""
+        """Add the files of an upload; a session with too many loses the oldest, discarded ones first."""
         name = secrets.token_urlsafe(16)
         folder = self._folder / f"shelf-{name}"
         folder.mkdir()
-        files = [replace(one, path=one.path.rename(folder / str(number))) for number, one in enumerate(sent)]
-        size = sum(one.path.stat().st_size for one in files)
+        files = [replace(file, path=file.path.rename(folder / str(number))) for number, file in enumerate(sent)]
+        size = sum(file.path.stat().st_size for file in files)
         added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic())
         with self._lock:
             gone = self._of_session(added.session)[_MOST_OF_SESSION - 1 :]
@@ -141,7 +139,7 @@ class PendingUploads:
         return added
 
     def find(self, cookie: str, name: str) -> PendingUpload:
-        """The session's own; raises Missing where it is gone or another's."""
+        """The session's own upload; raises Missing if it is gone or another's."""
         self._sweep()
         with self._lock:
             upload = self._held.get(name)
@@ -151,22 +149,21 @@ class PendingUploads:
             return upload
 
     def waiting(self, cookie: str) -> list[PendingUpload]:
-        """The session's own that were neither kept nor discarded, the one used last first."""
-        return [held for held in self._not_kept(cookie) if not held.discarded]
+        """The session's own uploads that were neither stored nor discarded, the last used first."""
+        return [held for held in self._not_stored(cookie) if not held.discarded]
 
     def discarded(self, cookie: str) -> list[PendingUpload]:
         """The session's own that were discarded and can be taken back, the one used last first."""
-        return [held for held in self._not_kept(cookie) if held.discarded]
+        return [held for held in self._not_stored(cookie) if held.discarded]
 
-    def _not_kept(self, cookie: str) -> list[PendingUpload]:
+    def _not_stored(self, cookie: str) -> list[PendingUpload]:
         self._sweep()
         with self._lock:
             return [held for held in self._of_session(_digest(cookie)) if held.kept_at is None]
 
     @contextmanager
     def in_use(self, pending: PendingUpload) -> Iterator[None]:
-        """While its files are read: until then they stay, also where it is removed meanwhile. Raises Missing where they
-        are gone."""
+        """While its files are read they stay, even if it is removed meanwhile. Raises Missing if they are gone."""
         with self._lock:
             if pending.given_up and not pending.users:
                 raise Missing(_GONE if pending.kept_at is None else "There is no such file in this upload.")
@@ -191,8 +188,8 @@ class PendingUploads:
         self._remove_files([pending])
 
     def _of_session(self, session: str) -> list[PendingUpload]:
-        own = [held for held in self._held.values() if held.session == session]
-        return sorted(own, key=_worth, reverse=True)
+        of_session = [held for held in self._held.values() if held.session == session]
+        return sorted(of_session, key=_worth, reverse=True)
 
     def _sweep(self) -> None:
         """Remove what is too old."""
@@ -201,20 +198,20 @@ class PendingUploads:
         self._remove_files(gone)
 
     def _swept(self, coming: int) -> list[PendingUpload]:
-        """What is too old, and what was discarded, then the oldest, until there is room: held no more, with its files
-        still there."""
+        """Expired uploads and discarded ones, then the oldest, until there is room: dropped here, with their files
+        still on disk."""
         gone = []
         by_age = sorted(self._held.values(), key=_worth)
         total = coming + sum(held.size for held in by_age)
         for held in by_age:
             too_old = time.monotonic() - held.used > LASTS_S
-            if too_old or total > self._most_bytes or len(self._held) >= _MOST_KEPT:
+            if too_old or total > self._most_bytes or len(self._held) >= _MOST_UPLOADS:
                 total -= held.size
                 gone.append(self._held.pop(held.id))
         return gone
 
     def _remove_files(self, gone: Sequence[PendingUpload]) -> list[Future[None]]:
-        """Each as soon as the disk does it, beside whoever asked, or when nobody reads it any more."""
+        """Remove each as soon as nobody reads it, in the background."""
         with self._lock:
             for upload in gone:
                 upload.given_up = True
@@ -223,7 +220,7 @@ class PendingUploads:
 
 
 def _worth(held: PendingUpload) -> tuple[bool, float]:
-    """In this order uploads make room for others."""
+    """The order in which uploads are removed."""
     return not held.discarded, held.used
 
 

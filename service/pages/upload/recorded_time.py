@@ -1,4 +1,4 @@
-"""When recordings were made, as the form of an upload says it: in the lab's time zone, unless a zone is typed."""
+"""Times of recordings in the form of an upload: in the lab's time zone, unless a zone is typed."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -20,7 +20,7 @@ def zone() -> str:
 
 
 def said(typed: str) -> str:
-    """A time that somebody typed, as ISO 8601 with its zone; raises InvalidInput."""
+    """A typed time as ISO 8601 with its zone; raises InvalidInput."""
     try:
         return with_zone(typed, time_zone())
     except ValueError as error:
@@ -40,7 +40,7 @@ def shown(value: Any) -> str:
 
 
 def stated(properties: Mapping[str, Any]) -> str | None:
-    """The property of a file that states when it was recorded; None where there is none that can be used."""
+    """The property of a file with its time of recording; None if no usable one exists."""
     by_name = {name.lower().replace("_", " ").strip(): name for name in properties}
     for name in _NAMES:
         if name in by_name and _is_time(properties[by_name[name]]):

@@ -1,4 +1,4 @@
-"""What is said of single files of an upload: their sensor, preload or time, where those differ from file to file."""
+"""Values of single files of an upload: sensor, preload or time, if they differ from file to file."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ _DIFFERING = (
     *("sensor", "indenter_radius_mm", "preload_n", "sample_height_mm", "sample_diameter_mm"),
     recorded_time.FIELD,
 )
-FIELDS = tuple(entry for entry in RECORDING if entry[0] in _DIFFERING)
+FIELDS = tuple(field for field in RECORDING if field[0] in _DIFFERING)
 _FIELD_WORDS = {name: words for name, words, *_ in FIELDS}
 _TEXTS = ("sensor", recorded_time.FIELD)
 

@@ -56,14 +56,14 @@ def skin_summary(export: CheckedExport) -> SkinSummary:
         listed=sorted(export.campaigns, key=lambda campaign: not campaign.differs)[:MOST_LISTED],
         rigs=len(export.skins.rigs),
         diagnoses=len(reports),
-        new_diagnoses=len(reports.keys() - export.known),
-        models=[_model(row, reports[row.diagnosis_id], row.id in export.known) for row in export.diagnosed.models],
+        new_diagnoses=len(reports.keys() - export.stored_ids),
+        models=[_model(row, reports[row.diagnosis_id], row.id in export.stored_ids) for row in export.diagnosed.models],
         clashes=export.clashes,
     )
 
 
 def _model(row: Any, report: Mapping[str, Any], present: bool) -> ModelSummary:
-    mechanisms = [entry["name"] for entry in report["mechanisms"]]
+    mechanisms = [mechanism["name"] for mechanism in report["mechanisms"]]
     return ModelSummary(
         row.skin_id, row.version, row.adopted_at, row.withdrawn_at, mechanisms, report["probability"], present
     )

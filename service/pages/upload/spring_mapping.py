@@ -1,4 +1,4 @@
-"""The part of a mapping form that is about a spring: its deflection, its constant, and what a curve is in a file."""
+"""The part of a mapping form on springs: deflection, spring constant, and the definition of a curve in a file."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,7 +7,7 @@ from service.pages.upload.file_summary import ChannelSummary
 from underskin.errors import InvalidInput, wrong_type
 from underskin.recordings.readers.unit_labels import labelled_unit, unit
 
-DEFLECTION = "deflection"  # what a channel can be in the form beside a campaign's fields
+DEFLECTION = "deflection"  # roles of a channel in the form besides a campaign's fields
 SPRING = "spring_constant_n_per_m"
 CURVES = {
     "": "each part of the file",
@@ -24,24 +24,27 @@ _DIGITS = 12  # that the conversion between N/m and N/mm leaves
 def guessed(
     fields: dict[str, Any], channels: Sequence[ChannelSummary], properties: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """The channels by field, and where none is a force, a deflection instead.
+    """The channels by field, with a deflection if no channel is a force.
 
-    It makes the force, and the stage's travel a depth; the constant is a property of the file in N/m, if there is one.
+    Deflection gives the force, and the stage's travel the depth; the constant is a property of the file in N/m, if
+    there is one.
     """
-    lengths = [one for one in channels if (known := unit(one.unit)) and known.dimension == "length"]
-    springs = [one.name for one in lengths if any(word in one.name.lower() for word in _OF_SPRING)]
-    travel = next((one.name for one in lengths if one.name not in springs), None)
+    lengths = [
+        channel for channel in channels if (channel_unit := unit(channel.unit)) and channel_unit.dimension == "length"
+    ]
+    springs = [channel.name for channel in lengths if any(word in channel.name.lower() for word in _OF_SPRING)]
+    travel = next((channel.name for channel in lengths if channel.name not in springs), None)
     if "force_n" in fields or not springs or travel is None:
         return fields
     deflection = {"channel": springs[0]}
-    constant = next((one for one in properties if _is_stiffness(labelled_unit(one))), None)
+    constant = next((name for name in properties if _is_stiffness(labelled_unit(name))), None)
     force = {} if constant is None else {"force_n": {**deflection, SPRING: {"property": constant}}}
     return {**fields, "displacement_mm": {"channel": travel, DEFLECTION: deflection}, **force}
 
 
 def _is_stiffness(label: str) -> bool:
-    known = unit(label)
-    return known is not None and known.dimension == "force/length"
+    parsed = unit(label)
+    return parsed is not None and parsed.dimension == "force/length"
 
 
 def shown_as(document: Mapping[str, Any], name: str) -> tuple[str, Mapping[str, Any]]:
@@ -57,9 +60,9 @@ def shown_as(document: Mapping[str, Any], name: str) -> tuple[str, Mapping[str, 
 def spring_constant(document: Mapping[str, Any]) -> Any:
     """The constant [N/m] that the form shows: a number, `{property: NAME}`, or None."""
     channels = document.get("channels", {})
-    given = channels.get("force_n", {}).get(SPRING)
+    stated = channels.get("force_n", {}).get(SPRING)
     stiffness = channels.get("displacement_mm", {}).get("stiffness_n_per_mm")
-    return given if stiffness is None else _rounded(1e3 * stiffness)
+    return stated if stiffness is None else _rounded(1e3 * stiffness)
 
 
 def is_travel(document: Mapping[str, Any]) -> bool:
@@ -71,10 +74,8 @@ def is_travel(document: Mapping[str, Any]) -> bool:
 def with_spring(
     channels: dict[str, Any], form: Mapping[str, str], constant: Any, base: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[InvalidInput]]:
-    """The channels with the deflection where it belongs, and what cannot be; `constant` is as the form says it.
-
-    A form that does not say what the displacement is leaves that as in `base`.
-    """
+    """The channels with the deflection inserted, and errors; `constant` as in the form. A form that does not define
+    the displacement leaves it as in `base`."""
     channels = {field: dict(how) for field, how in channels.items()}
     deflection = channels.pop(DEFLECTION, None)
     displacement = channels.get("displacement_mm")
@@ -111,7 +112,7 @@ def _rounded(value: float) -> float:
 
 def curves_of(form: Mapping[str, str], base: Any) -> Any:
     """What a curve is, as the form says; as in `base` where it does not."""
-    said = form.get("curves")
-    if said is None:
+    typed = form.get("curves")
+    if typed is None:
         return base
-    return {said: form.get("curves-by", "")} if said in ("channel", "segments") else said or None
+    return {typed: form.get("curves-by", "")} if typed in ("channel", "segments") else typed or None

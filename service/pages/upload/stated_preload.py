@@ -1,4 +1,4 @@
-"""The preload that is stated of a recording beside the one that its own force channel measured."""
+"""The stated preload of a recording compared with the one measured by its own force channel."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.spectra import mean_of
 from underskin.units import readable_unit
 
-_ALIKE = 0.2  # of the stated preload: what a measured one may differ by
-_TOLD_ANYWAY = 3.0  # times the stated preload: beyond that, the findings of a campaign's d33 say so
+_ALIKE = 0.2  # allowed deviation of the measured preload, relative to the stated one
+_REPORTED_RATIO = 3.0  # times the stated preload: beyond that, the findings of a campaign's d33 say so
 _PARTS, _STEADY = 4, 0.2  # of a recording, in which the means of a static force are alike, as a part of its mean
 
 
 def measured_otherwise(recording: FrfRecording) -> float | None:
-    """The static force [N] that the recording holds, where the stated preload is another one; None where they agree,
-    or where its force holds none: that of a piezo sensor goes to 0."""
+    """The static force [N] of the recording if it differs from the stated preload; None if they agree, or if the
+    channel has no static force: that of a piezo sensor decays to 0."""
     force = recording.force_n
     mean = None if force is None or len(force) < _PARTS else mean_of(force)
     if force is None or mean is None:
@@ -31,18 +31,22 @@ def in_words(force_n: float) -> str:
 
 
 def doubts(campaign: Campaign) -> list[str]:
-    """In a sentence, the first recording of a campaign whose stated preload is not the one that it measured, and how
+    """A sentence on the first recording of a campaign whose stated preload differs from the measured one, and how
     many more there are."""
-    frfs = [one for one in campaign.recordings if isinstance(one, FrfRecording)]
-    measured = [(one, mean) for one in frfs if (mean := measured_otherwise(one)) is not None]
-    found = [(one, mean) for one, mean in measured if 1 / _TOLD_ANYWAY <= mean / one.preload_n <= _TOLD_ANYWAY]
-    if not found:
+    frfs = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
+    measured = [(recording, mean) for recording in frfs if (mean := measured_otherwise(recording)) is not None]
+    doubtful = [
+        (recording, mean)
+        for recording, mean in measured
+        if 1 / _REPORTED_RATIO <= mean / recording.preload_n <= _REPORTED_RATIO
+    ]
+    if not doubtful:
         return []
-    (first, mean), *others = found
+    (first, mean), *further = doubtful
     which = f"{first.id}: " if len(campaign.recordings) > 1 else ""
-    alike = more_alike(len(others), "recording")
-    said = (
+    alike = more_alike(len(further), "recording")
+    words = (
         f"{which}pressed by {first.preload_n:g} N as stated, but its force is {in_words(mean)} on average{alike}: "
         "is this the preload of this recording, and is its force measured from 0?"
     )
-    return [said]
+    return [words]

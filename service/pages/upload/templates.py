@@ -1,4 +1,4 @@
-"""What was said of an instrument's files before, offered for the next ones."""
+"""Rig descriptions of earlier files of an instrument, offered for the next ones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,9 +17,8 @@ from underskin.recordings import rig_description
 
 @dataclass(frozen=True)
 class OfferedTemplate:
-    """A template as the page offers it: what the instrument is called, by whom and when it was said, what it says: also
-    which samples are used, over how much of a curve [%] a quantity, in words, is 0, and whether unusual values were
-    said to be right."""
+    """A template as offered: the instrument's name, by whom and when it was stored, its content, including the
+    samples in use, the part of a curve [%] in which a quantity is 0, and whether unusual values were confirmed."""
 
     name: str
     kept_at: str
@@ -32,7 +31,7 @@ class OfferedTemplate:
 
 
 def offered(store: Database, pending: PendingUpload, file: FileSummary) -> OfferedTemplate | None:
-    """The template of the instrument that wrote a file; None where there is none, or where it is in use already."""
+    """The template of the instrument that wrote a file; None if there is none, or if it is in use already."""
     row = _latest(store, file)
     if row is None or (pending.rig is not None and template_of(pending.rig) == row.document):
         return None
@@ -52,15 +51,13 @@ def offered(store: Database, pending: PendingUpload, file: FileSummary) -> Offer
 
 
 def use(store: Database, pending: PendingUpload, skin: Mapping[str, Any]) -> None:
-    """Read the upload by the template of its first file that has one; `skin`: what is known of the skin.
-
-    Raises Missing where there is none.
-    """
-    row = next((found for file in pending.seen if (found := _latest(store, file)) is not None), None)
+    """Read the upload by the template of its first file that has one; `skin`: known values of the skin. Raises
+    Missing if there is none."""
+    row = next((template for file in pending.seen if (template := _latest(store, file)) is not None), None)
     if row is None:
         raise Missing("There is no template for these files.")
-    known = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
-    document = with_skin(row.document, {"poisson_ratio": 0.5, **known})
+    skin_values = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
+    document = with_skin(row.document, {"poisson_ratio": 0.5, **skin_values})
     pending.rig, pending.draft, pending.refused = rig_description.from_dict(document), None, []
     pending.rig_label = "rig.json"  # as the page saves it
     pending.remembered = Remembered(document.get("name"), row.kept_at, row.kept_from)

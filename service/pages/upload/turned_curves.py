@@ -1,4 +1,4 @@
-"""Curves of a file's channels as they are taken where what counts pressing negative is turned."""
+"""Curves of a file with channels inverted that count pressing negative."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,7 +11,7 @@ from underskin.recordings.rig_mapping import MappedFile, range_of
 
 
 def counted_negative(recording: Mapping[str, Any]) -> Sequence[str]:
-    """Those of `force_n` and `displacement_mm` that fall while a curve of a campaign document is pressed."""
+    """Those of `force_n` and `displacement_mm` that decrease while a curve is pressed."""
     if recording["kind"] == "frf" or not {"force_n", "displacement_mm"} <= recording.keys():
         return ()
     columns = np.asarray(recording["force_n"]), np.asarray(recording["displacement_mm"])
@@ -19,14 +19,14 @@ def counted_negative(recording: Mapping[str, Any]) -> Sequence[str]:
 
 
 def turned(columns: Mapping[str, Any], fields: Sequence[str]) -> dict[str, Any]:
-    """The columns, those of `fields` turned."""
+    """The columns, with those of `fields` inverted."""
     return {name: -np.asarray(column) if name in fields else column for name, column in columns.items()}
 
 
 def with_curves_turned(mapped: MappedFile) -> MappedFile:
-    """A file with every such curve turned; what was taken for what says so, with the range of the first curve."""
+    """A file with every such curve inverted; the note on each channel says so, with the range of the first curve."""
     before: Sequence[dict[str, Any]] = mapped.document["recordings"]
-    recordings = [turned(one, counted_negative(one)) for one in before]
+    recordings = [turned(recording, counted_negative(recording)) for recording in before]
     taken = dict(mapped.taken)
     for field in counted_negative(before[0]) if before else ():
         channel = taken[field].rpartition(": ")[0]  # before the range that it came in

@@ -1,5 +1,5 @@
-"""What is wrong with values that were typed into the form of an upload, by the checks of a campaign, before any file is
-read. What is empty, or is a property of a file, is nothing wrong here."""
+"""Errors of typed values in the form of an upload, by the checks of a campaign, before any file is read. Empty
+fields and properties of a file are no errors here."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,8 +21,8 @@ def refused(document: Mapping[str, Any]) -> list[InvalidInput]:
     of_skin = _refused(SkinDescription, skin, units_checked=units_checked)
     of_recordings = of_recording(document["kind"], document.get("recording", {}), units_checked=units_checked)
     return [
-        *(one.at(f"skin.{one.field}") for one in of_skin),
-        *(one.at(f"recording.{one.field}") for one in of_recordings),
+        *(invalid.at(f"skin.{invalid.field}") for invalid in of_skin),
+        *(invalid.at(f"recording.{invalid.field}") for invalid in of_recordings),
     ]
 
 
@@ -34,5 +34,5 @@ def of_recording(kind: str, values: Mapping[str, Any], *, units_checked: bool) -
 
 def _refused(model: Any, typed: Mapping[str, Any], *, units_checked: bool) -> list[InvalidInput]:
     """In the form's order, without what is missing, which a file may state."""
-    wrong = {one.field: one for one in check_fields(model, typed, units_checked=units_checked)[1]}
+    wrong = {invalid.field: invalid for invalid in check_fields(model, typed, units_checked=units_checked)[1]}
     return [wrong[name] for name in typed if name in wrong]

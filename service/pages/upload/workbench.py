@@ -1,4 +1,4 @@
-"""The part of a mapping form that makes curves of raw channels: derived channels, the zero of a field, the trim."""
+"""The part of a mapping form that makes curves of raw channels: derived channels, zeroing, trim."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -47,7 +47,7 @@ def in_formulas(document: Mapping[str, Any], channels: Sequence[ChannelSummary])
     for name, text in (document.get(FIELD) or {}).items():
         with suppress(InvalidInput):  # which is told beside it
             names |= set(channel_arithmetic.parse(name, text).names)
-    return {one.name for one in channels if {one.name, (in_brackets(one.name) or ("",))[0]} & names}
+    return {channel.name for channel in channels if {channel.name, (in_brackets(channel.name) or ("",))[0]} & names}
 
 
 def formulas(form: Mapping[str, str], words: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, str] | None:
@@ -55,14 +55,14 @@ def formulas(form: Mapping[str, str], words: Mapping[str, str], base: Mapping[st
     form has none; None where there are none."""
     if f"{FIELD}-formula-0" not in form:
         return base.get(FIELD)
-    found: dict[str, str] = {}
+    formula_by_field: dict[str, str] = {}
     for number in _rows_in(form):
         text, name = form[f"{FIELD}-formula-{number}"].strip(), _name(form, number, words)
         if _is_filled(form, number):
-            while name in found:  # refused by `wrong_rows`, and there to be put right
+            while name in formula_by_field:  # refused by `wrong_rows`, and there to be put right
                 name += " again"
-            found[name] = text
-    return found or None
+            formula_by_field[name] = text
+    return formula_by_field or None
 
 
 def with_derived(
@@ -78,8 +78,8 @@ def with_derived(
         field = form.get(f"{FIELD}-is-{number}", "")
         if field and _is_filled(form, number):
             name = _name(form, number, words)
-            known = before.get(field, {})
-            result[field] = {**known, "channel": name} if known.get("channel") == name else {"channel": name}
+            previous = before.get(field, {})
+            result[field] = {**previous, "channel": name} if previous.get("channel") == name else {"channel": name}
     return result
 
 
@@ -112,19 +112,18 @@ def derived_fields(form: Mapping[str, str]) -> set[str]:
 
 
 def with_tare(channels: Mapping[str, Any], form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
-    """The channels with the part of the curve over which each is 0; as in the rig description `base` where the form
-    does not say. What was said of curves is not carried over to FRFs, of which it would take the preload, nor back.
-    """
+    """The channels with the part of the curve over which each is zeroed; as in the rig description `base` if the
+    form does not say. The values of curves are not carried over to FRFs, whose preload they would remove, nor back."""
     before = base.get("channels", {})
     other_kind = "kind" in base and (base["kind"] == "frf") != (form.get("kind", "frf") == "frf")
     result = {}
     for field, how in channels.items():
-        others = {name: value for name, value in how.items() if name != _TARE}
+        remaining = {name: value for name, value in how.items() if name != _TARE}
         typed = form.get(f"tare-{field}", "").strip().removesuffix("%")
-        known = before.get(field, {}).get(_TARE)
-        said = number_or_text(typed) if f"tare-{field}" in form else known
-        said = None if other_kind and said == known else said
-        result[field] = others if said is None else {**others, _TARE: said}
+        previous = before.get(field, {}).get(_TARE)
+        tare = number_or_text(typed) if f"tare-{field}" in form else previous
+        tare = None if other_kind and tare == previous else tare
+        result[field] = remaining if tare is None else {**remaining, _TARE: tare}
     return result
 
 
@@ -151,23 +150,23 @@ def trim_of(form: Mapping[str, str], base: Any) -> Any:
     """The samples that are used; as in `base` where the form does not say."""
     if not any(name in form for name in TRIM):
         return base
-    said = {name: number_or_text(form.get(name, "")) for name in TRIM}
-    whole = {
-        name: int(value) if isinstance(value, float) and value.is_integer() else value for name, value in said.items()
+    typed = {name: number_or_text(form.get(name, "")) for name in TRIM}
+    trim = {
+        name: int(value) if isinstance(value, float) and value.is_integer() else value for name, value in typed.items()
     }
-    return {name: value for name, value in whole.items() if value is not None} or None
+    return {name: value for name, value in trim.items() if value is not None} or None
 
 
 def errors_of(refused: Sequence[Mapping[str, Any]], file: FileSummary) -> dict[str, str]:
     """What is wrong with each derived channel, by its name."""
-    found: dict[str, str] = {}
+    message_by_field: dict[str, str] = {}
     for error in (*refused, *file.errors):
-        place, said = error["field"], str(error["allowed"])
-        if place == "file":
-            place, _, said = said.partition(": ")
-        if place.startswith(f"{FIELD}."):
-            found.setdefault(place.removeprefix(f"{FIELD}."), said)
-    return found
+        refused_field, message = error["field"], str(error["allowed"])
+        if refused_field == "file":
+            refused_field, _, message = message.partition(": ")
+        if refused_field.startswith(f"{FIELD}."):
+            message_by_field.setdefault(refused_field.removeprefix(f"{FIELD}."), message)
+    return message_by_field
 
 
 def _rows_in(form: Mapping[str, str]) -> list[int]:

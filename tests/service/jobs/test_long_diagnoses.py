@@ -10,7 +10,7 @@ from typing import Any, Self, cast
 import pytest
 
 from service.jobs import Runner, WorkerProcesses, runner
-from service.jobs.process import Given
+from service.jobs.process import CampaignInput
 from service.store import Database, campaigns, diagnoses, open_store
 from tests.support.diagnosed import asked, awaited, report, resonant, sent
 from tests.support.store_server import Place, campaign, running
@@ -52,7 +52,7 @@ class Workers:
     def __init__(self) -> None:
         self.begun: list[str] = []
 
-    def at_work(self, given: Sequence[Given], *_: object) -> Played:
+    def at_work(self, given: Sequence[CampaignInput], *_: object) -> Played:
         name = given[0].skin_id
         self.begun.append(name)
         return Played(name, dict(report()))

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from service.usecases.scheduled_backups import kept
+from service.usecases.scheduled_backups import stored_backups
 from tests.support.store_server import Place
 
 NO_WORKERS = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
@@ -19,7 +19,7 @@ def wait_for(folder: Path, count: int) -> list[Path]:
     """Until there are so many backups, or more."""
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
-        found = [entry.path for entry in kept(folder)] if folder.is_dir() else []
+        found = [entry.path for entry in stored_backups(folder)] if folder.is_dir() else []
         if len(found) >= count:
             return found
         time.sleep(0.05)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.usecases.scheduled_backups import OWNER, kept
+from service.usecases.scheduled_backups import OWNER, stored_backups
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
 from tests.support import postgres
 from tests.support.diagnosed import sent
@@ -42,7 +42,7 @@ def test_backup_made_start_restored(place: Place, tmp_path: Path) -> None:
         assert "Last backup" in server.http.get("/").text
     with running(place, **scheduled(folder)):  # the one that is there is young enough
         time.sleep(1.0)
-        assert [entry.path for entry in kept(folder)] == [file]
+        assert [entry.path for entry in stored_backups(folder)] == [file]
     restored = place.command("restore", str(file))
     assert restored.returncode == 0, restored.stderr
     with running(place, **NO_WORKERS) as server:
@@ -64,7 +64,7 @@ def test_old_ones_deleted_files(place: Place, tmp_path: Path) -> None:
         while first.exists():
             assert time.monotonic() < deadline, "the oldest backup stays"
             time.sleep(0.05)
-        assert 1 <= len(kept(folder)) <= 3
+        assert 1 <= len(stored_backups(folder)) <= 3
     assert all(other.read_text() == "mine" for other in others)
     assert not list(folder.glob("*.part*"))
 
@@ -91,7 +91,7 @@ def test_folder_disk_not_mounted_gets_no_place(place: Place, tmp_path: Path) -> 
             time.sleep(0.05)
         assert not list(folder.iterdir())
         folder.rmdir()
-        before = len(kept(away))
+        before = len(stored_backups(away))
         away.rename(folder)
         wait_for(folder, before + 1)
 
@@ -170,7 +170,7 @@ def test_store_busy_long_ends_no_schedule(tmp_path: Path) -> None:
                 assert time.monotonic() < deadline
                 time.sleep(0.2)
             other.execute("ROLLBACK")
-        count = len(kept(folder))
+        count = len(stored_backups(folder))
         wait_for(folder, count + 1)
 
 
@@ -181,7 +181,7 @@ def test_two_servers_make_backup(place: Place, tmp_path: Path) -> None:
     with running(place, **scheduled(folder)), running(place, **scheduled(folder)):
         wait_for(folder, 1)
         time.sleep(2.0)
-        assert len(kept(folder)) == 1
+        assert len(stored_backups(folder)) == 1
 
 
 def test_folder_store_left_alone_doctor_says(place: Place, tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_folder_store_left_alone_doctor_says(place: Place, tmp_path: Path) -> No
             assert time.monotonic() < deadline
             time.sleep(0.05)
         assert "overdue" in server.http.get("/").text
-    assert [entry.path for entry in kept(folder)] == theirs
+    assert [entry.path for entry in stored_backups(folder)] == theirs
     assert "holds the backups of another store" in (tmp_path / "other.log").read_text()
     status, found = doctor(other, UNDERSKIN_BACKUP_TO=str(folder), **NO_WORKERS)
     assert (status, found["backups"]["level"]) == (2, "critical")

@@ -164,14 +164,14 @@ def test_readers_hold_connections_keep_no_writer(place: Place) -> None:
 
 
 def test_no_more_wait_than_there_are_places(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(write_turns, "FOR_A_PLACE_S", 0.1)
+    monkeypatch.setattr(write_turns, "SLOT_WAIT_S", 0.1)
     turns = write_turns.WriteTurns()
     with ExitStack() as stack:
         for _ in range(write_turns.MOST_WAITING):
-            stack.enter_context(turns.place())
-        with pytest.raises(OperationalError), turns.place():
+            stack.enter_context(turns.slot())
+        with pytest.raises(OperationalError), turns.slot():
             raise AssertionError("there was no place")
-    with turns.place():
+    with turns.slot():
         pass
 
 
@@ -179,7 +179,7 @@ def test_turns_are_taken_one_at_a_time(tmp_path: Path) -> None:
     turns, inside, most = write_turns.WriteTurns(), [], []
 
     def write() -> None:
-        with turns.place(), turns.sole(tmp_path / "lock", write_turns.WAIT_S):
+        with turns.slot(), turns.sole(tmp_path / "lock", write_turns.WAIT_S):
             inside.append(threading.get_ident())
             most.append(len(inside))
             time.sleep(0.002)
