@@ -1,5 +1,6 @@
 """The elastomer's modulus from the same bench, of each recording: a compressed or pulled sample, or a sphere pressed in
-(recordings/modulus.py). Curves are read as curve_preparation leaves them."""
+(recordings/modulus.py). Curves are read as curve_preparation leaves them.
+"""
 
 from dataclasses import dataclass
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from underskin.errors import InvalidInput, unusable
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
-from underskin.recordings.curve_preparation import prepared, require_own_columns
+from underskin.recordings.curve_preparation import prepared, reject_exchanged_columns
 from underskin.recordings.modulus import CompressionModulus, IndentationModulus, of_compression, of_indentation
 from underskin.surrogate.contact_table import load_contact
 
@@ -29,7 +30,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
         result: CompressionModulus | IndentationModulus | InvalidInput
         try:
             if isinstance(recording, CompressionRecording | IndentationRecording):
-                require_own_columns(recording)
+                reject_exchanged_columns(recording)
             if isinstance(recording, CompressionRecording):
                 _require_height(recording)
                 result = of_compression(recording)

@@ -45,7 +45,7 @@ from underskin.recordings.campaign import (
     offsets,
     samples_of,
 )
-from underskin.recordings.curve_course import Course, course, foot, hidden_samples, roughness
+from underskin.recordings.curve_course import CurveLandmarks, curve_landmarks, foot, hidden_samples, roughness
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Complexes, Floats, Indices, Mask
 
@@ -144,7 +144,7 @@ _DISTINCT = 5.0  # standard deviations by which two displacements differ, betwee
 
 
 def thinned(
-    columns: Sequence[Floats], seen: Course, slow: float, kind: Kind
+    columns: Sequence[Floats], seen: CurveLandmarks, slow: float, kind: Kind
 ) -> tuple[list[Floats], Floats, Floats, Floats]:
     """The means of displacement [mm], force [N] and, where there is one, time [s] over blocks (blocks,), the deviation
     of the force's [N], how far along the curve each lies, 0 to 1, and the samples in each; `slow` is what neighbouring
@@ -193,7 +193,7 @@ def _slopes(displacement: Floats, force: Floats, noise: Floats, back: Mask) -> F
     return np.where(np.isfinite(least), least, 0.0)
 
 
-def _corners(seen: Course) -> Indices:
+def _corners(seen: CurveLandmarks) -> Indices:
     """The first samples of what is not smoothly joined to what was before."""
     places = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
     return np.unique(np.array([place for place in places if place is not None], dtype=np.intp))
@@ -254,7 +254,7 @@ def _bend(force: Floats, noise: float) -> float:
     return float((left @ left) / least**2 - freedom) / np.sqrt(2.0 * freedom)
 
 
-def _around(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> Indices:
+def _around(seen: CurveLandmarks, displacement: Floats, force: Floats, kind: Kind) -> Indices:
     """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
     far a contact has grown is told by single samples; and where contact begins and ends without a jump: a mean over
     that kink lies above the curve."""
@@ -266,7 +266,7 @@ def _around(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> In
     return np.unique(near[(near >= 0) & (near < len(force))])
 
 
-def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
+def _feet(seen: CurveLandmarks, displacement: Floats, force: Floats) -> Indices:
     """Where contact begins, and where it ends, on the ways on which no jump is seen."""
     ways = (
         (seen.snap_in, np.arange(seen.arrive + 1)),
@@ -276,7 +276,7 @@ def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
     return np.array([own[place] for own, place in feet if place is not None], dtype=np.intp)
 
 
-def _hidden_jumps(seen: Course, force: Floats) -> Indices:
+def _hidden_jumps(seen: CurveLandmarks, force: Floats) -> Indices:
     """The least force of each way on which no jump is seen, where it lies below the air: there contact may begin or
     end by a jump that noise hides, and means over it would take from the adhesion."""
     ways = (seen.snap_in, 0, seen.turn), (seen.pull_off, seen.turn, len(force))
@@ -284,7 +284,7 @@ def _hidden_jumps(seen: Course, force: Floats) -> Indices:
     return np.array([place for place in least if force[place] < -_SURE * seen.noise], dtype=np.intp)
 
 
-def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
+def _with_still_hold(columns: Sequence[Floats], seen: CurveLandmarks) -> list[Floats]:
     """With the displacement of a hold that is noisy on a straight line.
 
     Noise of the displacement moves no contact; a law would answer to it, the more the steeper it is.
@@ -548,7 +548,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         columns = finite_samples(entry)
         if len(columns[0]) < _LEAST_SAMPLES:
             continue
-        seen = course(*columns)
+        seen = curve_landmarks(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0
         slow = _slow_noise(seen, columns[1]) if kind == "indentation" else 0.0
         columns[1] = columns[1] - force_zero
@@ -597,7 +597,7 @@ def finite_samples(entry: CurveRecording) -> list[Floats]:
     return [column[finite] for column in columns]
 
 
-def _slow_noise(seen: Course, force: Floats) -> float:
+def _slow_noise(seen: CurveLandmarks, force: Floats) -> float:
     """The standard deviation of noise that neighbouring samples share, which second differences do not see: by how
     much means over blocks in the air, away from the contact, scatter about a parabola, which a drift is, beyond what a
     sample's noise gives; 0 where that is not plain."""
@@ -624,7 +624,7 @@ def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floa
     return counts, slope, np.add.reduceat((about - slope[block] * place) ** 2, starts)
 
 
-def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
+def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None) -> float:
     """How far [N] the cell runs off over the whole curve if it goes on as in the air; 0 where no plain drift and no
     snap-in tells the air from the foot of a contact.
 
@@ -645,7 +645,7 @@ def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
 
 def _error(
     kind: Kind,
-    seen: Course,
+    seen: CurveLandmarks,
     displacement: Floats,
     force: Floats,
     time: Floats | None,

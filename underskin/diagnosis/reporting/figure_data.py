@@ -32,7 +32,7 @@ from underskin.diagnosis.localisation import axis_values
 from underskin.diagnosis.reporting.numbers import place_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, frf_recordings
-from underskin.recordings.curve_course import course
+from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
 MOST_SAMPLES = 600  # of a curve
@@ -150,7 +150,7 @@ def _shown(
     raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
 ) -> ShownCurve:
     place, measured, *times = finite_samples(raw)
-    seen = course(place, measured, *times)
+    seen = curve_landmarks(place, measured, *times)
     jumps: list[int | None] = [None, None]
     if raw.kind == "indentation":
         measured = measured - seen.zero

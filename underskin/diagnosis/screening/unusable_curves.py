@@ -1,5 +1,6 @@
 """Curves that nothing can be fitted to are named, and left out of a diagnosis; so are those that no law of a sphere can
-describe."""
+describe.
+"""
 
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
-from underskin.recordings.curve_preparation import require_own_columns
+from underskin.recordings.curve_preparation import reject_exchanged_columns
 from underskin.recordings.modulus import estimate, of_compression, require_depth, tip_of
 from underskin.units import Floats, to_si
 
@@ -40,7 +41,7 @@ def _exchanged(entry: object) -> InvalidInput | None:
     """The refusal of a curve whose columns look exchanged, which its raw samples tell."""
     try:
         if isinstance(entry, IndentationRecording | CompressionRecording):
-            require_own_columns(entry)
+            reject_exchanged_columns(entry)
     except InvalidInput as refusal:
         return refusal
     return None

@@ -10,7 +10,7 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
-from underskin.recordings.curve_course import course
+from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import to_si
 
 _REASON = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²"
@@ -95,7 +95,7 @@ def _comes_back(entry: IndentationConditions) -> bool:
 
 def _works(entry: IndentationRecording) -> tuple[float, float]:
     """What the least forces on the way in and on the way back would be with -4πwR/3 and -3πwR/2 [J/m²]."""
-    seen = course(entry.displacement_mm, entry.force_n, entry.time_s)
+    seen = curve_landmarks(entry.displacement_mm, entry.force_n, entry.time_s)
     force = entry.force_n - seen.zero
     radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
     least = [-float(part.min()) / (np.pi * radius) for part in (force[: seen.turn + 1], force[seen.turn :])]

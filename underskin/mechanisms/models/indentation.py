@@ -84,7 +84,7 @@ from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
-from underskin.recordings.curve_course import course, touch
+from underskin.recordings.curve_course import curve_landmarks, touch
 from underskin.recordings.modulus import estimate
 from underskin.surrogate.contact_table import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
@@ -562,7 +562,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
         span = float(np.ptp(to_si("displacement_mm", entry.displacement_mm)))
         begins = 0.0
         if isinstance(entry, IndentationRecording):
-            seen = course(entry.displacement_mm, entry.force_n, entry.time_s)
+            seen = curve_landmarks(entry.displacement_mm, entry.force_n, entry.time_s)
             force = entry.force_n - seen.drift * times_of(entry)
             columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, force)]
             try:

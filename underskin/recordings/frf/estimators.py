@@ -32,9 +32,9 @@ _TINY = float(np.finfo(float).tiny)
 
 def checked_estimator(field: str, value: Any) -> Estimator:
     """The estimator of that name; raises InvalidInput."""
-    for known in ESTIMATORS:
-        if value == known:
-            return known
+    for estimator in ESTIMATORS:
+        if value == estimator:
+            return estimator
     raise not_one_of(field, value, ESTIMATORS)
 
 
