@@ -118,7 +118,7 @@ def from_csv(data: bytes, known: Collection[str]) -> CsvColumns:
     parts: dict[str, CsvColumn] = {}
     meanings = template_columns.fields_of(table.header, known)
     for place, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
-        if meant is None and polar and polar_columns.is_phase_alone(heading):
+        if meant is None and polar and polar_columns.is_phase_without_unit(heading):
             meant = PHASE, _angle(heading, cells, decimal, found.notes)
         if meant is not None and meant[0] in (*known, *polar):
             field, factor = meant
@@ -205,7 +205,7 @@ def _notes_under(table: list[list[str]], lines: list[int]) -> list[str]:
     while end > 2 and template_lines.is_note(table[end - 1]):
         end -= 1
     start = next((row for row in range(end, len(table)) if lines[row] > lines[row - 1] + 1), len(table))
-    notes = [template_lines.note_told(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
+    notes = [template_lines.note_message(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
     del table[start:], lines[start:]
     return notes
 

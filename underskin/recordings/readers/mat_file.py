@@ -1,7 +1,7 @@
-"""MATLAB files: version 5 by scipy, version 7.3 (HDF5) by h5py. Only numbers and texts are read; nothing is run.
+"""MATLAB files: version 5 by scipy, version 7.3 (HDF5) by h5py. Only numbers and texts are read; nothing is executed.
 
 Vectors are channels, `name`; a matrix is one channel a column, `name(:,1)`. Single numbers and texts are properties. A
-structure is a block of its own; the variables beside it are a block without a name.
+structure is a block; the variables outside structures are a block without a name.
 """
 
 from collections.abc import Iterator, Mapping
@@ -69,7 +69,7 @@ def _variables_73(stream: BinaryIO, file: str) -> dict[str, Any]:
 
 
 def _value(dataset: Any) -> Any:
-    """A variable as loadmat gives it; None for what holds neither numbers nor text (cells, references, objects)."""
+    """A variable as by loadmat; None where it holds neither numbers nor text (cells, references, objects)."""
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         return None
     if dataset.dtype.names == ("real", "imag"):
