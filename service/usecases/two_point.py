@@ -10,7 +10,7 @@ of these is then nearer to its contact than the sensor beyond it and reads more,
 
 import numpy as np
 
-from underskin.prediction.skin_design import told_apart
+from underskin.prediction.skin_design import are_resolved
 from underskin.units import Floats
 
 _PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
@@ -46,4 +46,4 @@ def _told_apart(offset: Floats, response: Floats, pitch: float, distance: float,
     width = 2 * float(offset[int(np.argmax(response < response[0] / 2))])
     farthest = distance + 2 * pitch + 2 * width  # beyond it each contact is seen on its own, again and again
     distances = np.linspace(distance, farthest, _DISTANCES)
-    return bool(told_apart(offset, response, pitch, distances, _PLACEMENTS, dip).all())
+    return bool(are_resolved(offset, response, pitch, distances, _PLACEMENTS, dip).all())

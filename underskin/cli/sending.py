@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from underskin.errors import UnderskinError
-from underskin.findings.alike import told_together, why_refused
+from underskin.findings.alike import grouped_by_reason, why_refused
 from underskin.findings.formatting import significant
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def outcome(client: "Client", result: Mapping[str, Any]) -> list[Line]:
     accepted = [entry for entry in result["recordings"] if entry["status"] == "ok"]
     lines = [(False, why_refused(error)) for error in result["errors"]]
     left_out = ((entry["id"], why_refused(error)) for entry in result["recordings"] for error in entry["errors"])
-    lines += [(False, f"{names} {reason}") for names, reason in told_together(left_out)]
+    lines += [(False, f"{names} {reason}") for names, reason in grouped_by_reason(left_out)]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
         count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"

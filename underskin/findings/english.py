@@ -1,6 +1,6 @@
 """The sentences of findings in English: for each reason a template, or a function where words depend on the arguments.
 
-This table and `sentences` are the one place that knows them; another language is another such pair.
+Only this table and `sentences` hold the words; another language is another such pair.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -456,7 +456,7 @@ def _as_deep(
     fit = _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening))
     if depth.max() - fit.contact < PARABOLOID * radius:
         return fit
-    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening, whole=True))
+    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening, full_sphere=True))
 
 
 def _to_power(law: Callable[[Floats], Floats], power: float) -> Callable[[Floats], Floats]:
