@@ -156,9 +156,9 @@ def _dead_since(sensors: Sequence[str], alive: Mask, recorded: Mask) -> dict[str
     dead_since: dict[str, int] = {}
     for name, alive_dates, recorded_dates in zip(sensors, alive, recorded, strict=True):
         present: Indices = np.flatnonzero(recorded_dates)
-        answered = np.flatnonzero(alive_dates & recorded_dates)
+        responded = np.flatnonzero(alive_dates & recorded_dates)
         if len(present) and not alive_dates[present[-1]]:
-            after = present if not len(answered) else present[present > answered[-1]]
+            after = present if not len(responded) else present[present > responded[-1]]
             dead_since[name] = int(after[0])
     return dead_since
 

@@ -127,19 +127,19 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
     sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
     spread = max(1.4826 * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
     flags: dict[int, Flag] = {}
-    for number in np.flatnonzero(np.isfinite(value)).tolist():
-        outlying = alive.sum() > 3 and abs(size[number] - array) > _OUTLYING * spread
-        if not alive[number]:
+    for index in np.flatnonzero(np.isfinite(value)).tolist():
+        outlying = alive.sum() > 3 and abs(size[index] - array) > _OUTLYING * spread
+        if not alive[index]:
             reason = Reason.DEAD
-        elif value[number] * sign < 0:
+        elif value[index] * sign < 0:
             reason = Reason.INVERTED
-        elif outlying and size[number] < _WEAK * array:
+        elif outlying and size[index] < _WEAK * array:
             reason = Reason.WEAK
-        elif outlying and size[number] > _STRONG * array:
+        elif outlying and size[index] > _STRONG * array:
             reason = Reason.STRONG
         else:
             continue
-        flags[number] = Flag(ids[number], reason, {"percent": float(100 * value[number] * sign / array)})
+        flags[index] = Flag(ids[index], reason, {"percent": float(100 * value[index] * sign / array)})
     pilot = np.full(count, array)
     pilot[list(flags)] = np.maximum(size[list(flags)], _LEAST_PILOT * array)
     return flags, pilot
@@ -161,7 +161,7 @@ def scatter_flags(
     residual = _beyond_common(level, member, rows.condition[good])
     alarm = _FALSE_ALARMS / len(numbers)
     flags = []
-    for index, name in enumerate(ids[number] for number in numbers):
+    for index, name in enumerate(ids[sensor_index] for sensor_index in numbers):
         of_sensor = member == index
         curvature, chance, scatter, freedom = _curvature(
             residual[of_sensor], rows.preload[good][of_sensor], expected[of_sensor]
@@ -180,10 +180,10 @@ def _beyond_common(level: Floats, member: Indices, condition: Indices) -> Floats
     median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
     relative = level / median[member]
     residual = relative - 1
-    for number in np.unique(condition):
-        alike = condition == number
-        if len(np.unique(member[alike])) > 2:
-            residual[alike] = relative[alike] - np.median(relative[alike])
+    for index in np.unique(condition):
+        of_condition = condition == index
+        if len(np.unique(member[of_condition])) > 2:
+            residual[of_condition] = relative[of_condition] - np.median(relative[of_condition])
     return residual
 
 
@@ -232,9 +232,9 @@ def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, po
     scatter = 1.4826 * float(np.median(np.abs(residual)))
     expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
     far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
-    for number in np.unique(sensor[far]):
-        if far[sensor == number].all():
-            far[sensor == number] = False
+    for index in np.unique(sensor[far]):
+        if far[sensor == index].all():
+            far[sensor == index] = False
     return far
 
 
@@ -244,8 +244,8 @@ def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
     A dead sensor's recordings are 1 + their distance from its median, in units of the array's d33.
     """
     over = d33 / array
-    for number in np.unique(sensor):
-        same = sensor == number
+    for index in np.unique(sensor):
+        same = sensor == index
         if same.sum() >= _ENOUGH:
             middle = float(np.median(d33[same]))
             over[same] = 1 + (d33[same] - middle) / (middle if abs(middle) > _LEAST_DEVIATION * array else array)
@@ -256,10 +256,10 @@ def _common(sensor: Indices, condition: Indices, relative: Floats) -> Floats:
     """The median over sensors for the condition of each recording; the overall median for conditions with few
     sensors."""
     common = np.full(len(relative), float(np.median(relative)))
-    for number in np.unique(condition):
-        alike = condition == number
-        if len(np.unique(sensor[alike])) >= _ENOUGH:
-            common[alike] = np.median(relative[alike])
+    for index in np.unique(condition):
+        of_condition = condition == index
+        if len(np.unique(sensor[of_condition])) >= _ENOUGH:
+            common[of_condition] = np.median(relative[of_condition])
     return common
 
 
@@ -454,8 +454,8 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         d33_uncertainty=np.where(inside, uncertainty, np.nan),
         inside=inside,
     )
-    unsure = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
-    inversion = _estimated(ids, rows, contact, zone).wider(unsure)
+    common_uncertainty = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
+    inversion = _estimated(ids, rows, contact, zone).wider(common_uncertainty)
     filtered = of_roll_off(roll_off(frfs, zone, level), zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33)
     findings = (*at_reading(campaign), *exchange_findings, *filtered, *others)
@@ -485,7 +485,7 @@ def _measured(
 ) -> tuple[list[Frf], list[FrfRecording], list[Finding], list[Finding]]:
     """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on
     recordings whose channels look exchanged although the units were checked."""
-    frfs, with_frf, left_out, exchange_findings = [], [], [], []
+    frfs, recordings, left_out, exchange_findings = [], [], [], []
     for recording in recorded:
         exchanged = exchanged_channels(recording)
         if exchanged is not None and units_checked:
@@ -500,10 +500,10 @@ def _measured(
             continue
         try:
             frfs.append(lines_of(recording))
-            with_frf.append(recording)
+            recordings.append(recording)
         except InvalidInput as refusal:
             left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    return [line_set.frf for line_set in usable_lines(frfs)], with_frf, left_out, exchange_findings
+    return [line_set.frf for line_set in usable_lines(frfs)], recordings, left_out, exchange_findings
 
 
 class _Contact:
@@ -548,7 +548,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
     unfit, pilot = population_flags(ids, sensor, d33, noise)
     mean, variance = mean[:, good], variance[:, good]
     measured = LevelRows(d33, noise, pilot[sensor], mean, variance)
-    plain = np.array([number not in unfit for number in sensor])
+    plain = np.array([index not in unfit for index in sensor])
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]

@@ -30,8 +30,10 @@ def many_sensors(values: Floats, uncertainties: Floats) -> ManySensors:
     deviation, or its own standard uncertainty, whichever is larger.
     """
     median = float(np.median(values))
-    off = np.abs(values - median)
-    deviation = np.maximum(_ROBUST * np.median(off), uncertainties)
-    far = np.flatnonzero(off > _APART * deviation)
+    distance = np.abs(values - median)
+    deviation = np.maximum(_ROBUST * np.median(distance), uncertainties)
+    outliers = np.flatnonzero(distance > _APART * deviation)
     low, high = np.quantile(values, _MIDDLE)
-    return ManySensors(median, float(low), float(high), tuple(far[np.argsort(-off[far], kind="stable")].tolist()))
+    return ManySensors(
+        median, float(low), float(high), tuple(outliers[np.argsort(-distance[outliers], kind="stable")].tolist())
+    )

@@ -95,9 +95,9 @@ class AdoptedModel:
             diagnosed = getattr(self.skin, name)
             stated = np.atleast_1d(np.asarray(declared[name], dtype=float))
             if not np.allclose(stated, diagnosed, rtol=_SAME, atol=0):
-                off = stated[~np.isclose(stated, diagnosed, rtol=_SAME, atol=0)][0]
+                differing = stated[~np.isclose(stated, diagnosed, rtol=_SAME, atol=0)][0]
                 raise conflicting(
-                    name, float(off), f"must be {diagnosed:g}, as the skin was declared when it was diagnosed"
+                    name, float(differing), f"must be {diagnosed:g}, as the skin was declared when it was diagnosed"
                 )
 
     def response(self, conditions: Conditions, table: SigmaTable, *, level: bool = False) -> Response:
@@ -140,8 +140,8 @@ class AdoptedModel:
         base_response = AdoptedModel(self.skin, {}, 0.0).response(finite, table)
         ratio = base_response.value / adopted_response.value
         recordings, omitted = [], []
-        for number, recording in enumerate(frf_recordings(finite)):
-            rows = adopted_response.recording == number
+        for index, recording in enumerate(frf_recordings(finite)):
+            rows = adopted_response.recording == index
             if adopted_response.inside[rows].all() and base_response.inside[rows].all():
                 recordings.append(_times(recording, ratio[rows]))
             else:
@@ -182,8 +182,8 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
             allowed = "must be of mechanisms that this version knows, with the parameters that it knows"
             raise InvalidInput("diagnosis_id", name, allowed)
     d33 = report["d33"]
-    unsure = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
-    model = AdoptedModel(campaign.skin, parameters, unsure)
+    relative_deviation = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
+    model = AdoptedModel(campaign.skin, parameters, relative_deviation)
     return model if report["verdict"] in ("explained", "ambiguous") else replace(model, **_law(report, campaign, table))
 
 

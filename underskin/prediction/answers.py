@@ -114,10 +114,10 @@ def d33(contact_model: ContactModel, given: Mapping[str, Floats], units_checked:
 
 def measured(given: Mapping[str, Floats]) -> dict[str, Floats]:
     """The measured plateau and its uncertainty, NaN where none is given; raises InvalidInput."""
-    unsure = np.full((), np.nan)
+    uncertainty = np.full((), np.nan)
     if _FRF_UNCERTAINTY in given:
-        unsure = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
-    return {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: unsure}
+        uncertainty = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
+    return {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: uncertainty}
 
 
 def refused(given: Mapping[str, Floats], units_checked: bool) -> list[InvalidInput]:

@@ -187,9 +187,9 @@ def in_words(
             words[row] = OTHER_MODULUS.format(ratio[index])
             continue
         beyond = [
-            (message, most[number][index])
-            for number, limit in enumerate(limits)
-            for message in _excess(limit, values[number][index])
+            (message, most[limit_index][index])
+            for limit_index, limit in enumerate(limits)
+            for message in _excess(limit, values[limit_index][index])
         ]
         forces = [force for _, force in beyond]
         # No force is inside for a row that exceeds a limit independent of force.

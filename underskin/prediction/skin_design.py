@@ -108,7 +108,7 @@ def _sweeps(contact_model: ContactModel, point: tuple[float, ...]) -> tuple[Swee
     for axis_index, (axis, (low, high)) in enumerate(contact_model.domain.items()):
         # σ turns fastest near L = 0, where it grows like its cube root.
         values = low + (high - low) * np.linspace(0, 1, _SWEEP) ** (3 if axis == "load_parameter" else 1)
-        columns = [values if number == axis_index else np.full(_SWEEP, fixed) for number, fixed in enumerate(point)]
+        columns = [values if index == axis_index else np.full(_SWEEP, fixed) for index, fixed in enumerate(point)]
         gamma = contact_model.sigma(0.0, columns[1], 0.0).sigma
         sweeps.append(Sweep(axis, values, contact_model.sigma(*columns).sigma, gamma))
     return tuple(sweeps)

@@ -248,8 +248,8 @@ def _hold(displacement: Floats, turn: int) -> tuple[int, int]:
     falls = [(hold.mean() - part.mean()) / len(part) for part in beyond if len(part) == 2 * _HOLD_BLOCK]
     # Least speed of the moving sphere: next to the hold, where noise may hide it, and over the whole approach
     speed = min([*falls, float(np.ptp(displacement)) / max(turn, 1)]) if falls else 0.0
-    still = bool(np.std(hold) < _AS_NOISE * noise)
-    return (low, high - 1) if still and speed > 0 and len(hold) * speed > _HIDDEN * noise else plain
+    is_still = bool(np.std(hold) < _AS_NOISE * noise)
+    return (low, high - 1) if is_still and speed > 0 and len(hold) * speed > _HIDDEN * noise else plain
 
 
 def _air(force: Floats, turn: int, snap_in: int | None, pull_off: int | None, noise: float, span: float) -> Indices:
@@ -389,17 +389,17 @@ def contradictions(skin: SkinDescription, curves: Sequence[CurveRecording]) -> l
     modulus = np.array([apparent_mpa(curve, skin.poisson_ratio) for curve in curves])
     if not np.isfinite(modulus).any():
         return []
-    usual, declared = float(np.nanmedian(modulus)), skin.youngs_modulus_mpa
+    median_mpa, declared = float(np.nanmedian(modulus)), skin.youngs_modulus_mpa
     low, high = _RUBBER_MPA if declared is None else (declared / FAR, declared * FAR)
     if len(curves) == 2 and modulus.max() > FAR * modulus.min():
         first, second = modulus.tolist()
         return [Finding(Reason.TWO_MODULI, "", "force_n", {"first_mpa": first, "second_mpa": second})]
-    if low <= usual <= high:
+    if low <= median_mpa <= high:
         return []
-    needed: dict[str, Any] = {"modulus_mpa": usual, "slips": _slips(usual, declared, _LAW[curves[0].kind])}
+    arguments: dict[str, Any] = {"modulus_mpa": median_mpa, "slips": _slips(median_mpa, declared, _LAW[curves[0].kind])}
     if declared is not None:
-        return [Finding(Reason.MODULUS_BESIDE_DECLARED, "", "force_n", {**needed, "declared_mpa": declared})]
-    return [Finding(Reason.MODULUS_BESIDE_RUBBER, "", "force_n", {**needed, "low_mpa": low, "high_mpa": high})]
+        return [Finding(Reason.MODULUS_BESIDE_DECLARED, "", "force_n", {**arguments, "declared_mpa": declared})]
+    return [Finding(Reason.MODULUS_BESIDE_RUBBER, "", "force_n", {**arguments, "low_mpa": low, "high_mpa": high})]
 
 
 def _slips(modulus_mpa: float, declared_mpa: float | None, power: float) -> tuple[str, ...]:
@@ -407,10 +407,16 @@ def _slips(modulus_mpa: float, declared_mpa: float | None, power: float) -> tupl
     low, high = _ELASTOMER_MPA if declared_mpa is None else (declared_mpa / FAR, declared_mpa * FAR)
     middle = float(np.log10(low * high)) / 2
     decades = {words: np.log10(modulus_mpa) + force - power * travel for words, (force, travel) in _SLIPS.items()}
-    off = {
-        words: abs(meant - middle) for words, meant in decades.items() if abs(meant - middle) <= np.log10(high) - middle
+    distances = {
+        words: abs(decade - middle)
+        for words, decade in decades.items()
+        if abs(decade - middle) <= np.log10(high) - middle
     }
-    return tuple(words for words in sorted(off, key=off.__getitem__) if off[words] <= min(off.values()) + _AS_NEAR)
+    return tuple(
+        words
+        for words in sorted(distances, key=distances.__getitem__)
+        if distances[words] <= min(distances.values()) + _AS_NEAR
+    )
 
 
 def apparent_mpa(curve: CurveRecording, poisson_ratio: float) -> float:

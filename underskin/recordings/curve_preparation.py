@@ -144,16 +144,16 @@ def turning_points(travel: Floats) -> Indices:
     the first and the last sample."""
     at = np.unique(np.linspace(0, len(travel) - 1, min(len(travel), _SAMPLED)).round().astype(np.intp))
     values, least = travel[at].tolist(), _RETURN * float(np.ptp(travel))
-    turns, extreme, way = [0], 0, 0
-    for number, value in enumerate(values):
-        if way == 0:
+    turns, extreme, direction = [0], 0, 0
+    for index, value in enumerate(values):
+        if direction == 0:
             if abs(value - values[0]) > least:
-                way, extreme = (1 if value > values[0] else -1), number
-        elif (value - values[extreme]) * way >= 0:
-            extreme = number
-        elif (values[extreme] - value) * way > least:
+                direction, extreme = (1 if value > values[0] else -1), index
+        elif (value - values[extreme]) * direction >= 0:
+            extreme = index
+        elif (values[extreme] - value) * direction > least:
             turns.append(extreme)
-            way, extreme = -way, number
+            direction, extreme = -direction, index
     return at[np.unique([*turns, len(values) - 1])]
 
 
@@ -413,11 +413,11 @@ def _keeps_pace(inside: Floats, outside: Floats) -> bool:
 
     Evaluated over the samples of most of the travel at the limit, so that a hold at its end does not count.
     """
-    gone = np.abs(inside - inside[0])
-    count = int(np.argmax(gone >= _MOST_OF_WAY * gone.max()))
+    moved = np.abs(inside - inside[0])
+    count = int(np.argmax(moved >= _MOST_OF_WAY * moved.max()))
     outside_count = min(count, len(outside) - 1)
     return outside_count > 0 and bool(
-        gone[count] / count > _PACE * abs(outside[outside_count] - outside[0]) / outside_count
+        moved[count] / count > _PACE * abs(outside[outside_count] - outside[0]) / outside_count
     )
 
 
@@ -648,6 +648,6 @@ def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tup
         "percent": 100 * error.amplitude / force_range,
     }
     if curve.time_s is not None and len(oriented.turns) <= _TURNS_OF_ONE_WAY:
-        lasting = abs(float(curve.time_s[finite[-1]] - curve.time_s[finite[0]]))
-        arguments["frequency_hz"] = float(np.ptp(travel)) / error.period / max(lasting, 1e-300)
+        duration = abs(float(curve.time_s[finite[-1]] - curve.time_s[finite[0]]))
+        arguments["frequency_hz"] = float(np.ptp(travel)) / error.period / max(duration, 1e-300)
     return replace(curve, force_n=corrected), [Finding(Reason.PERIODIC_ERROR, curve.id, "force_n", arguments)]

@@ -50,9 +50,9 @@ def _times(campaign: Campaign) -> Iterator[Finding]:
     to_come = [stamp for stamp in stated if _moment(stamp[1]) > latest]
     too_old = [stamp for stamp in stated if _moment(stamp[1]) < _EARLIEST]
     limit = {"year": _EARLIEST.year}
-    for reason, wrong, bounds in ((Reason.TIME_TO_COME, to_come, {}), (Reason.TIME_TOO_OLD, too_old, limit)):
-        if wrong:
-            (recording_id, written), *others = wrong
+    for reason, matching, bounds in ((Reason.TIME_TO_COME, to_come, {}), (Reason.TIME_TOO_OLD, too_old, limit)):
+        if matching:
+            (recording_id, written), *others = matching
             yield Finding(reason, recording_id, "recorded_at", {"written": written, "more": len(others), **bounds})
 
 
@@ -77,7 +77,7 @@ def overlapping_sensors(campaign: Campaign) -> list[Finding]:
     pitch, *pair = nearest
     in_metres = _IN_METRES * pitch >= 2 * radius and pitch < _LARGEST_IN_METRES_MM
     arguments = {
-        "sensors": [campaign.skin.sensors[number].id for number in pair],
+        "sensors": [campaign.skin.sensors[index].id for index in pair],
         "radius_mm": radius,
         "pitch_mm": pitch,
         "in_metres": in_metres,
@@ -100,7 +100,5 @@ def nearest_pair(sensors: Sequence[Sensor]) -> tuple[float, int, int] | None:
     first = int(np.argmin(distances[:, 1]))
     if not np.isfinite(distances[first, 1]):
         return None
-    second = next(
-        int(number) for number in neighbours[first] if number != first
-    )  # of two at one place either comes first
+    second = next(int(index) for index in neighbours[first] if index != first)  # of two at one place either comes first
     return float(distances[first, 1]), min(first, second), max(first, second)

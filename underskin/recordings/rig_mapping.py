@@ -443,27 +443,27 @@ def _common_rate(used: list[Channel], file: str) -> float | None:
 def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[Block, list[str]]:
     """The block with the used channels cut, and a warning; unchanged where they start within one sample."""
     first, last = min(used.values(), key=_starts_s), max(used.values(), key=_starts_s)
-    apart = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
+    start_times = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
     if block.sample_rate_hz is None:
-        raise FileError(file, "", f"{apart}, and no sample rate is stated by which to align them")
+        raise FileError(file, "", f"{start_times}, and no sample rate is stated by which to align them")
     late = {name: (last.starts_s - channel.starts_s) * block.sample_rate_hz for name, channel in used.items()}
     skipped = {name: round(samples) for name, samples in late.items()}
     odd = next((name for name in used if abs(late[name] - skipped[name]) > _OFF_SAMPLE), None)
     if odd is not None:
         reason = f"that is {late[odd]:.4g} samples: they can be aligned by whole samples alone"
-        raise FileError(file, "", f"{apart}: {reason}; resample one of them, or correct the times")
+        raise FileError(file, "", f"{start_times}: {reason}; resample one of them, or correct the times")
     if not any(skipped.values()):
         return block, []
     count = min(len(channel.values) - skipped[name] for name, channel in used.items())
     if count < _LEAST_COMMON:
-        raise FileError(file, "", f"{apart}: they have no samples in common")
+        raise FileError(file, "", f"{start_times}: they have no samples in common")
     channels = tuple(
         replace(channel, values=channel.values[skipped[channel.name] : skipped[channel.name] + count])
         if channel.name in used
         else channel
         for channel in block.channels
     )
-    warning = f"{apart}: they were aligned, with {count} samples in common"
+    warning = f"{start_times}: they were aligned, with {count} samples in common"
     return replace(block, channels=channels), [warning]
 
 

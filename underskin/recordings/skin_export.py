@@ -43,8 +43,9 @@ class ExportedCampaign:
     def same_as(self, other: "ExportedCampaign") -> bool:
         """Whether both are identical, to the last digit."""
         return (self.about, self.recordings) == (other.about, other.recordings) and all(
-            mine.keys() == others.keys() and all(np.array_equal(mine[name], others[name]) for name in mine)
-            for mine, others in zip(self.arrays, other.arrays, strict=True)
+            own_arrays.keys() == other_arrays.keys()
+            and all(np.array_equal(own_arrays[name], other_arrays[name]) for name in own_arrays)
+            for own_arrays, other_arrays in zip(self.arrays, other.arrays, strict=True)
         )
 
 

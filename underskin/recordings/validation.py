@@ -43,8 +43,8 @@ def shown(value: Any) -> Any:
     if isinstance(value, int | float | np.integer | np.floating):
         return _shown_number(value)
     if isinstance(value, str):
-        short = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
-        return short.encode("utf-8", "replace").decode("utf-8")
+        shortened = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
+        return shortened.encode("utf-8", "replace").decode("utf-8")
     if isinstance(value, list | tuple):
         return f"a list of {len(value)}"
     return f"a value of type {type(value).__name__}"

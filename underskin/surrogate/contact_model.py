@@ -251,7 +251,7 @@ def _buckets(nodes: Floats) -> tuple[Floats, NDArray[np.int64], float]:
 
 
 def _cells(axes: Sequence[Floats], points: Floats) -> tuple[Indices, ...]:
-    return tuple(np.searchsorted(axis[1:-1], points[:, number], side="right") for number, axis in enumerate(axes))
+    return tuple(np.searchsorted(axis[1:-1], points[:, index], side="right") for index, axis in enumerate(axes))
 
 
 def _largest_at_corners(values: Floats) -> Floats:

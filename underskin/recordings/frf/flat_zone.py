@@ -94,12 +94,12 @@ def _above(
 ) -> str:
     beyond = departure[:-1, last + 1 :]
     peaks = {
-        number: float(middle_hz[last + 1 + int(np.nanargmax(row))])
-        for number, row in enumerate(beyond)
+        index: float(middle_hz[last + 1 + int(np.nanargmax(row))])
+        for index, row in enumerate(beyond)
         if np.isfinite(row).any() and np.nanmax(row) > _PEAK - 1
     }
     if peaks:
-        lowest, highest = min(peaks, key=lambda number: peaks[number]), max(peaks.values())
+        lowest, highest = min(peaks, key=lambda index: peaks[index]), max(peaks.values())
         radius, preload = conditions[lowest]
         where = f"{peaks[lowest]:.3g} Hz" + (
             f" to {highest:.3g} Hz, moving with the contact" if highest > 1.2 * peaks[lowest] else ""
@@ -175,16 +175,16 @@ def flat_zone(
     """
     frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
     edges = edges_over(frequencies)
-    followed = [stack.at(np.asarray(stack.used.any(axis=0))) for stack in stacks]
-    excited = np.isin(frequencies, np.concatenate([stack.frequency for stack in followed]))
-    mains = _mains_lines(followed)
+    excited_stacks = [stack.at(np.asarray(stack.used.any(axis=0))) for stack in stacks]
+    excited = np.isin(frequencies, np.concatenate([stack.frequency for stack in excited_stacks]))
+    mains = _mains_lines(excited_stacks)
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
         if not inside.any():
             allowed = f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz"
             raise too_few("band_hz", list(band_hz), allowed)
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
-    ratio = _binned(followed, edges, mains)
+    ratio = _binned(excited_stacks, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
     if len(filled) < 2:
@@ -318,7 +318,7 @@ def _by_condition(ratio: Floats, conditions: Sequence[Condition]) -> tuple[list[
     """The conditions, the median curve of each (conditions, bins) and its noise; the last row is that of all."""
     names = sorted(set(conditions))
     member = np.array([names.index(condition) for condition in conditions])
-    groups = [ratio[member == number] for number in range(len(names))]
+    groups = [ratio[member == index] for index in range(len(names))]
     sigma = _noise(ratio)
     curves, noise = [], []
     for group in [*groups, ratio]:
@@ -503,16 +503,16 @@ def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Fl
     half = replace(zone, high_hz=float(np.sqrt(zone.low_hz * zone.high_hz)))
     lower, lower_noise, _ = band_average(stacks, half)
     with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
-        change, unsure = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)
-    valid = np.isfinite(change) & np.isfinite(unsure)
+        change, relative_noise = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)
+    valid = np.isfinite(change) & np.isfinite(relative_noise)
     if not valid.any():
         return ""
     typical = float(np.median(change[valid]))
-    by_noise = _OF_A_MEDIAN * float(np.median(unsure[valid])) / np.sqrt(valid.sum())
+    by_noise = _OF_A_MEDIAN * float(np.median(relative_noise[valid])) / np.sqrt(valid.sum())
     if abs(typical) < max(_HALVES_BEYOND_NOISE * by_noise, _LEAST_CHANGE):
         return ""
-    way = "higher" if typical > 0 else "lower"
-    return f"; averaged over its lower half alone, d33 would be {100 * abs(typical):.1f} % {way}"
+    direction = "higher" if typical > 0 else "lower"
+    return f"; averaged over its lower half alone, d33 would be {100 * abs(typical):.1f} % {direction}"
 
 
 MOST_LINES = 240  # of one recording
@@ -559,16 +559,16 @@ def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpr
     for grid in stacked(frfs):
         stack = _of_sines(grid.at(grid.frequency > 0))
         for condition in np.unique(keys[stack.rows], axis=0):
-            alike = (keys[stack.rows] == condition).all(axis=1)
-            bands.append(_spread(stack, alike, condition))
+            of_condition = (keys[stack.rows] == condition).all(axis=1)
+            bands.append(_spread(stack, of_condition, condition))
     return sorted(bands, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
 
 
-def _spread(stack: Stack, alike: Mask, condition: Floats) -> FrfSpread:
+def _spread(stack: Stack, of_condition: Mask, condition: Floats) -> FrfSpread:
     frequency, start = _bins(stack.frequency, MOST_BINS)
-    magnitude, phase = _polar(stack.values[alike])
-    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[alike])]
-    return FrfSpread(float(condition[0]), float(condition[1]), int(alike.sum()), frequency, *columns)
+    magnitude, phase = _polar(stack.values[of_condition])
+    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[of_condition])]
+    return FrfSpread(float(condition[0]), float(condition[1]), int(of_condition.sum()), frequency, *columns)
 
 
 def _of_sines(stack: Stack) -> Stack:

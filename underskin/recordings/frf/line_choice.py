@@ -264,9 +264,9 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
     factor = np.where(valid & (raw > 0), size / np.where(raw > 0, raw, 1.0), 1.0)
     explained = float(weight @ (1 - (1 - in_force[used]) * (1 - in_charge[used])))
     unexplained = max(loss - explained, 0.0)
-    unsure = float(np.hypot(weight @ sensitive[used], unexplained / np.sqrt(3.0)))
+    uncertainty = float(np.hypot(weight @ sensitive[used], unexplained / np.sqrt(3.0)))
     bias = float(weight @ (1 / factor[used] - 1))
-    return replace(measured, values=measured.values * factor, bias=bias, bias_unsure=unsure)
+    return replace(measured, values=measured.values * factor, bias=bias, bias_unsure=uncertainty)
 
 
 def _total_least_squares(force: Floats, charge: Floats, coherence: Floats, noise: "_Noise") -> Floats:
@@ -304,8 +304,8 @@ def _posterior(force: Floats, charge: Floats, coherence: Floats, count: Floats, 
     sums = np.array([[part[group].sum() for part in (product, coherence * product, force, charge)] for group in groups])
     lines = np.array([len(group) for group in groups])
     blocks = np.array([float(np.mean(count[group])) for group in groups])
-    seen = sums[:, 1] / sums[:, 0]
-    true = np.clip((seen - 1 / blocks) / (1 - seen / blocks), 0.0, 1.0)
+    estimated = sums[:, 1] / sums[:, 0]
+    true = np.clip((estimated - 1 / blocks) / (1 - estimated / blocks), 0.0, 1.0)
     inverse_force, inverse_charge = sums[:, 3] / sums[:, 0], sums[:, 2] / sums[:, 0]  # 1/S_ff and 1/S_qq of a group
     independent = np.maximum(lines / _CORRELATED, 1.0)
     variance = (2 * true + 1 / blocks) * (1 - true) ** 2 / (blocks * independent) + _MODEL**2
@@ -340,10 +340,10 @@ def noise_findings(measured: Sequence[Frf]) -> list[Finding]:
     biased = [frf for frf in measured if frf.bias or frf.bias_unsure]
     if 2 * len(biased) <= len(measured):
         return []
-    bias, unsure = (float(np.median([getattr(frf, name) for frf in biased])) for name in ("bias", "bias_unsure"))
-    if max(abs(bias), unsure) < _WORTH_SAYING:
+    bias, uncertainty = (float(np.median([getattr(frf, name) for frf in biased])) for name in ("bias", "bias_unsure"))
+    if max(abs(bias), uncertainty) < _WORTH_SAYING:
         return []
-    arguments = {"percent": 100 * bias, "estimator": biased[0].estimator, "unsure_percent": 100 * unsure}
+    arguments = {"percent": 100 * bias, "estimator": biased[0].estimator, "unsure_percent": 100 * uncertainty}
     return [Finding(Reason.NOISE_IN_FRF, "", "force_n" if biased[0].estimator == "H1" else "charge_pc", arguments)]
 
 

@@ -192,16 +192,16 @@ def _held(signal: Floats) -> Mask:
 
 def _jumps(signal: Floats) -> Mask:
     mask = np.zeros(len(signal), dtype=bool)
-    bend = np.abs(np.diff(signal, n=2))
+    curvature = np.abs(np.diff(signal, n=2))
     # Parts of two lengths, so that each length is processed at once: a long series has some ten thousand parts.
-    length, longer = divmod(len(bend), max(1, len(bend) // _LOCAL))
-    parts = np.split(bend, [longer * (length + 1)])
+    length, longer = divmod(len(curvature), max(1, len(curvature) // _LOCAL))
+    parts = np.split(curvature, [longer * (length + 1)])
     sizes = (length + 1, length)
     medians = [np.median(part.reshape(-1, size), axis=1) for part, size in zip(parts, sizes, strict=True)]
     usual = 1.4826 * np.concatenate(medians)
     around = np.max([np.roll(usual, shift) for shift in (-1, 0, 1)], axis=0)
     scale = np.repeat(around, np.repeat(sizes, [len(of_size) for of_size in medians]))
-    mask[1:-1] = (bend > _JUMP * scale) & (scale > 0)
+    mask[1:-1] = (curvature > _JUMP * scale) & (scale > 0)
     return mask
 
 

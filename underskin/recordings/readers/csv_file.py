@@ -39,7 +39,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     reader = SectionReader(table, repeated, file)
     reader.take_all(source)
     _refuse_other_rows(head[: table.start], reader.under, table, file)
-    left_out = _left_out(reader, table, headings, file)
+    column_warnings = _text_column_warnings(reader, table, headings, file)
     above, *between, under = (
         [line for line in lines if line.strip() not in repeated]
         for lines in (
@@ -56,7 +56,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
         if name:
             section_properties, _ = _properties(section_lines, table)
             properties |= {f"{name}.{name_in_section}": value for name_in_section, value in section_properties.items()}
-    return Contents(tuple(blocks), properties, (*warnings, *left_out), _layout(table, headings, reader.sections))
+    return Contents(tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, headings, reader.sections))
 
 
 def _table(source: BlockText, file: str) -> tuple[Sequence[str], Table]:
@@ -106,7 +106,7 @@ def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: s
             raise table_rows.no_row(index, line, table, file)
 
 
-def _left_out(reader: SectionReader, table: Table, headings: Headings, file: str) -> list[str]:
+def _text_column_warnings(reader: SectionReader, table: Table, headings: Headings, file: str) -> list[str]:
     """Messages on columns of text; raises FileError where one holds numbers in most rows."""
     warnings = []
     for column, text_column in reader.texts.items():

@@ -76,9 +76,9 @@ class TemplateRecordings:
         self._columns = columns
         self._row_columns = [column for column in columns if column.field in (*COLUMNS, MAGNITUDE, PHASE)]
         self._recording_columns = [column for column in columns if column not in self._row_columns]
-        places = [column.place for column in self._row_columns]
-        self._style = RowStyle(lines.separator, reader.decimal, places, width, is_template=True)
-        self._identity = next(column.place for column in columns if column.field == _ID)
+        indices = [column.index for column in self._row_columns]
+        self._style = RowStyle(lines.separator, reader.decimal, indices, width, is_template=True)
+        self._identity = next(column.index for column in columns if column.field == _ID)
         self._width = width
         self._reader = reader
         self._recordings: list[_Recording] = []
@@ -98,9 +98,9 @@ class TemplateRecordings:
         if column is None or day is clock is None:
             return
         if day is None:
-            raise self._reader.error(index, f"has a time of day, {clock!r}, and no {column.heading}", column.place)
+            raise self._reader.error(index, f"has a time of day, {clock!r}, and no {column.heading}", column.index)
         constants["recorded_at"] = self._reader.value(
-            "recorded_at", of_two_cells(day, clock or ""), (index, column.place)
+            "recorded_at", of_two_cells(day, clock or ""), (index, column.index)
         )
 
     def take(self, first: int, lines: Sequence[str]) -> None:
@@ -158,7 +158,7 @@ class TemplateRecordings:
         cells = dict(enumerate(row))
         values = {
             column.field: self._reader.value(
-                column.field, cells.get(column.place, ""), (index, column.place), column.factor
+                column.field, cells.get(column.index, ""), (index, column.index), column.factor
             )
             for column in self._columns
         }
@@ -171,13 +171,13 @@ class TemplateRecordings:
             return False
         constants: dict[str, Any] = {}
         for column in self._recording_columns:
-            different = {cell.strip() for cell in set(rows.texts(column.place, run.start, run.stop))} - {""}
+            different = {cell.strip() for cell in set(rows.texts(column.index, run.start, run.stop))} - {""}
             if len(different) > 1:
                 return False
             for cell in different:
                 try:
                     constants[column.field] = self._reader.value(
-                        column.field, cell, (index, column.place), column.factor
+                        column.field, cell, (index, column.index), column.factor
                     )
                 except FileError:
                     return False
@@ -265,14 +265,14 @@ class _Recording:
         """The recording as in a campaign document: one position, without empty columns, which belong to other kinds."""
         columns = {name: _joined(parts) for name, parts in self.columns.items() if not all(map(_is_empty, parts))}
         position = [self.constants.pop(name, None) for name in POSITION]
-        noted = {
+        conditions = {
             name.removeprefix(FURTHER): value for name, value in self.constants.items() if name.startswith(FURTHER)
         }
-        own = {name: value for name, value in self.constants.items() if not name.startswith(FURTHER)}
+        single_values = {name: value for name, value in self.constants.items() if not name.startswith(FURTHER)}
         return {
             **({} if position == [None, None] else {"position_mm": position}),
-            **own,
-            **({"conditions": noted} if noted else {}),
+            **single_values,
+            **({"conditions": conditions} if conditions else {}),
             **columns,
         }
 
@@ -290,10 +290,10 @@ def _joined(parts: Sequence[Floats | list[Any]]) -> Floats | list[Any]:
 
 def _counted(values: list[Any]) -> list[Any]:
     """The values of a column, with the count of invalid cells in the place of the first one."""
-    wrong = [index for index, value in enumerate(values) if isinstance(value, CellText)]
-    if len(wrong) > 1:
-        first = values[wrong[0]]
-        values[wrong[0]] = CellText(first, f"{first.place}, and {len(wrong) - 1} more in this column")
+    invalid = [index for index, value in enumerate(values) if isinstance(value, CellText)]
+    if len(invalid) > 1:
+        first = values[invalid[0]]
+        values[invalid[0]] = CellText(first, f"{first.place}, and {len(invalid) - 1} more in this column")
     return values
 
 
@@ -482,7 +482,7 @@ class _Template:
         try:
             columns, notes = template_columns.columns(headings, under, _FIELDS, self.decimal)
         except NoField as error:
-            raise self.error(start - 1, str(error), error.place) from None
+            raise self.error(start - 1, str(error), error.index) from None
         self.warnings += notes
         self.warnings += template_columns.halved(column.heading for column in columns)
         return columns

@@ -136,8 +136,8 @@ def _text_format(head: bytes, file: str) -> str:
     try:
         start = text.decode(head[: len(head) // 2 * 2 or 1], file).lstrip()
     except FileError as error:
-        known = "campaign JSON and HDF5, CSV, XLSX, TDMS, LVM, UFF58 and MATLAB files"
-        raise FileError(file, error.place, f"is of no format that is read here: {known}") from None
+        supported = "campaign JSON and HDF5, CSV, XLSX, TDMS, LVM, UFF58 and MATLAB files"
+        raise FileError(file, error.place, f"is of no format that is read here: {supported}") from None
     if start[:1] == "{" or _JSON_LIST.match(start):
         return "JSON"
     if start.startswith(lvm_file.MAGIC):

@@ -105,8 +105,8 @@ def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, A
         for name in ("id", "x_mm", "y_mm") if sensors else ():
             target[f"skin/sensors/{name}"] = [sensor[name] for sensor in sensors]
         groups = target.create_group("recordings")
-        for number, recording in enumerate(recordings):
-            group = groups.create_group(f"{number:06d}")
+        for index, recording in enumerate(recordings):
+            group = groups.create_group(f"{index:06d}")
             _write_attributes(group, {name: value for name, value in recording.items() if name not in COLUMNS})
             for name in recording.keys() & set(COLUMNS):
                 group[name] = np.array(recording[name], dtype=np.float64)

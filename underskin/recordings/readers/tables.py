@@ -58,10 +58,12 @@ class _Candidate:
 
     def is_units(self) -> bool:
         units = [without_brackets(cell) for cell in self.cells]
-        known = sum(unit(cell) is not None for cell in units)
-        others = sum(cell not in _NO_UNITS for cell in units) - known
+        unit_count = sum(unit(cell) is not None for cell in units)
+        other_count = sum(cell not in _NO_UNITS for cell in units) - unit_count
         states_values = any("=" in cell or ":" in cell for cell in units)  # k=3 N/m
-        return self.label == "units" or (self.label == "" and known > 0 and others <= known and not states_values)
+        return self.label == "units" or (
+            self.label == "" and unit_count > 0 and other_count <= unit_count and not states_values
+        )
 
 
 def find(lines: Sequence[str], table: Table, file: str) -> Headings:

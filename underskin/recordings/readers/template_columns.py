@@ -121,20 +121,20 @@ _NO_AMPLITUDE = re.compile(r"\b(p[- ]?p|pk[- ]?pk|peak.to.peak|rms)\b")
 
 @dataclass(frozen=True)
 class Column:
-    """The index of a column (`place`), its field, the factor to the field's unit, and the heading as written."""
+    """The `index` of a column, its field, the factor to the field's unit, and the heading as written."""
 
-    place: int
+    index: int
     field: str
     factor: float
     heading: str
 
 
 class NoField(ValueError):
-    """A heading that cannot be read; the message says why, `place` is its index."""
+    """A heading that cannot be read; the message says why, `index` is its position."""
 
-    def __init__(self, place: int, reason: str) -> None:
+    def __init__(self, index: int, reason: str) -> None:
         super().__init__(reason)
-        self.place = place
+        self.index = index
 
 
 @dataclass
@@ -301,9 +301,9 @@ def _require_complete(by_field: dict[str, Column]) -> None:
     """Raise NoField for a magnitude without its phase, and for both with real and imaginary parts."""
     given = [by_field[name] for name in (MAGNITUDE, PHASE) if name in by_field]
     if len(given) == 1:
-        raise NoField(given[0].place, f"{given[0].heading!r} {lacking(given[0].field)}")
+        raise NoField(given[0].index, f"{given[0].heading!r} {lacking(given[0].field)}")
     if given and any(part in by_field for part in PARTS):
-        raise NoField(given[0].place, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
+        raise NoField(given[0].index, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
 
 
 _FIRST_LINE = 2000
@@ -389,20 +389,20 @@ class TemplateLines:
                 yield max(start, first), selected
             first += len(lines)
 
-    def under(self, places: Sequence[int], width: int, start: int, end: int) -> Iterator[list[str]]:
+    def under(self, indices: Sequence[int], width: int, start: int, end: int) -> Iterator[list[str]]:
         """The cells at some of `width` columns of each line from `start` to `end`."""
         style = RowStyle(self.separator, ".", (), width, is_template=True)
         for first, lines in self.blocks(start, end):
             rows = PlainRows(lines, style)
             taken = 0
-            for line, row, behind in rows.runs():
-                yield from self._under(places, first + taken, lines[taken:line])
-                columns = [[cell.strip() for cell in rows.texts(place, row, behind)] for place in places]
+            for line, row, end_row in rows.runs():
+                yield from self._under(indices, first + taken, lines[taken:line])
+                columns = [[cell.strip() for cell in rows.texts(index, row, end_row)] for index in indices]
                 yield from map(list, zip(*columns, strict=True))
-                taken = line + behind - row
-            yield from self._under(places, first + taken, lines[taken:])
+                taken = line + end_row - row
+            yield from self._under(indices, first + taken, lines[taken:])
 
-    def _under(self, places: Sequence[int], first: int, lines: Sequence[str]) -> Iterator[list[str]]:
+    def _under(self, indices: Sequence[int], first: int, lines: Sequence[str]) -> Iterator[list[str]]:
         for index, line in enumerate(lines, start=first):
             cells = self.cells(index, line)
-            yield [cells[place] if place < len(cells) else "" for place in places]
+            yield [cells[column] if column < len(cells) else "" for column in indices]

@@ -85,7 +85,7 @@ class WorkbookSheets:
 
     def texts(self) -> Iterator[tuple[str, str]]:
         """Each visible sheet that has any cell: its name and its text; raises FileError that names sheet and cell."""
-        for number, sheet in enumerate(self._books[0].worksheets):
+        for index, sheet in enumerate(self._books[0].worksheets):
             if sheet.sheet_state != "visible":
                 self.notes.append(f"sheet {sheet.title!r} is hidden, and is left out")
                 continue
@@ -94,7 +94,7 @@ class WorkbookSheets:
                 damage_said(self._file, f"sheet {sheet.title!r}", lambda error: f"is damaged: {error}"),
             ):
                 warnings.simplefilter("ignore")
-                sheets = [book.worksheets[number] for book in self._books]
+                sheets = [book.worksheets[index] for book in self._books]
                 lines = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
             while lines and not lines[-1]:
                 lines.pop()
