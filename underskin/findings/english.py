@@ -21,7 +21,7 @@ def statement(reason: Reason, arguments: Mapping[str, Any]) -> str:
 
 
 def lacking(what: Lacking) -> str:
-    """What is lacking, as the end of a sentence."""
+    """A lack in words, as the end of a sentence."""
     words = LACKING[what.lack]
     text = words.format(**what.arguments) if isinstance(words, str) else words(**what.arguments)
     if not what.refused_recordings:

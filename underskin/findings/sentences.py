@@ -37,7 +37,7 @@ class ImplausibleD33(StrEnum):
 
 
 class DefectKind(StrEnum):
-    """What is wrong with a run of samples."""
+    """The kind of damage of a run of samples."""
 
     OVERLOAD = "overload"
     HELD_SAMPLES = "held_samples"
@@ -97,7 +97,7 @@ def counted_negative(fields: Sequence[str], more: int, may_be_pulled: bool) -> s
 
 
 def rows_reversed(is_timed: bool) -> str:
-    """A curve whose rows begin at its deep end."""
+    """A curve whose rows start at its deep end."""
     times = ", without its times, since a way out alone does not tell what relaxes" if is_timed else ""
     return f"its rows begin where it is deepest and end in the air: it was read from the last row to the first{times}"
 

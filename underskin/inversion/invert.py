@@ -366,12 +366,12 @@ class Inversion:
     gain: Estimate | None
     position: Estimate | None
     left_out: tuple[Finding | Flag, ...]  # each recording or sensor that the campaign's d33 does without
-    findings: tuple[Finding, ...]  # what looks wrong and is used all the same
+    findings: tuple[Finding, ...]  # suspicious data that are used all the same
     declared_percent: float  # standard deviation of all d33 together by the tolerances of the skin
 
     @property
     def absolute_d33(self) -> Estimate | None:
-        """`campaign_d33` with the tolerances of what is declared of the skin, independent of the scatter."""
+        """`campaign_d33` with the tolerances of the declared skin, independent of the scatter."""
         relative = self.campaign_d33
         if relative is None:
             return None

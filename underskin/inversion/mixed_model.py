@@ -40,7 +40,7 @@ class Estimate:
     high: Floats
 
     def wider(self, relative: float) -> "Estimate":
-        """With a further standard uncertainty, relative to the value."""
+        """The estimate with a further standard uncertainty, relative to the value."""
         further = relative * np.abs(self.value)
         low, high = (np.hypot(side, _HALF_WIDTH * further) for side in (self.value - self.low, self.high - self.value))
         return Estimate(self.value, np.hypot(self.uncertainty, further), self.value - low, self.value + high)

@@ -6,7 +6,7 @@ sphere without adhesion and a flat punch whose φ at the edge is that of adhesio
     P = F R/(E' h³),   Δ = δ R/h²,   U = √(w/(E' h³)) R
     P = (4/3) α³ A(α) − U √(8π α³) G(α),   Δ = α² B(α) − U √(2πα) V(α),   dF/dδ = 2 E' a S(α)  (edge held)
 
-A, B, G, V, S are 1 at α = 0 and depend on α, the Poisson ratio and the glue line alone: they are solved once for each
+A, B, G, V, S are 1 at α = 0 and depend only on α, the Poisson ratio and the glue line: they are solved once for each
 layer at Chebyshev points in α (`contact_integral_equation`), which takes about a millisecond.
 
 The stress follows in the same way: at the same points in α, the transforms of both pressures at given wave numbers are

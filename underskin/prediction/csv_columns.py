@@ -63,7 +63,7 @@ class RealPart:
 
     @property
     def cells(self) -> Sequence[str]:
-        """Those of the magnitude."""
+        """The cells of the magnitude."""
         return self.magnitude.cells
 
     def numbers(self, _field: str) -> list[float]:
@@ -149,7 +149,7 @@ def _twice(field: str, first: str, second: str) -> CsvError:
 
 
 def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -> float:
-    """The factor to rad of a phase without a unit, by its values; a note says so."""
+    """The factor to rad of a phase without a unit, by its values; adds a note."""
     numbers = [abs(number) for cell in cells if (number := _number(cell, decimal)) is not None]
     try:
         factor = polar_columns.angle_by_values(heading, max(numbers, default=0.0))
@@ -160,7 +160,7 @@ def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -
 
 
 def _real_part(parts: Mapping[str, CsvColumn]) -> RealPart:
-    """Of magnitude and phase; raises CsvError where one is missing."""
+    """The real part from magnitude and phase; raises CsvError where one is missing."""
     if len(parts) == 1:
         ((field, column),) = parts.items()
         raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {polar_columns.lacking(field)}")

@@ -65,7 +65,7 @@ class Design:
 def design(
     contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: float, pitch: float, dip: float
 ) -> Design:
-    """How much of a load reaches the sensors of a skin, and how finely its array locates it.
+    """The share of a load that reaches the sensors of a skin, and the resolution of its array.
 
     Parameters
     ----------

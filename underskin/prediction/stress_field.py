@@ -118,7 +118,7 @@ def stress_field(
 def field_from_lab(
     contact_model: ContactModel, given: Mapping[str, float], radii: int, depths: int, *, units_checked: bool
 ) -> StressField:
-    """The same from numbers in lab units by field name: the skin's, `indenter_radius_mm` and `preload_n`.
+    """`stress_field` from numbers in lab units by field name: the skin's, `indenter_radius_mm` and `preload_n`.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def field_from_lab(
 
 
 def _solved_section(poisson_ratio: float, a: Floats, r: Floats, depth: Floats) -> Floats:
-    """As `layer_stress`, under the pressures of the linear layer's own contacts of these radii."""
+    """`layer_stress` under the pressures of the linear layer's contacts of these radii."""
     solved = ContactEquation(a).solve(Layer(poisson_ratio)).sphere_shape.value
     parts = (SpherePressure(float(radius), shape).hertz_parts() for radius, shape in zip(a, solved, strict=True))
     sections = [

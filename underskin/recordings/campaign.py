@@ -167,7 +167,7 @@ RecordingConditions = FrfConditions | IndentationConditions | CompressionConditi
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions of several recordings of one skin; `name` is what messages call them."""
+    """Conditions of several recordings of one skin; `name` is their name in messages."""
 
     name: str
     skin: SkinDescription
@@ -392,7 +392,7 @@ SCHEMA = "campaign/1"
 
 
 def read_estimator(name: str, value: Any, units_checked: bool) -> Estimator:  # noqa: ARG001
-    """How an FRF is estimated from a time series."""
+    """The estimator of an FRF from a time series."""
     return checked_estimator(name, shown(value))
 
 

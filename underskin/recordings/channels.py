@@ -1,4 +1,4 @@
-"""What an instrument's file holds before a rig description says what its channels are."""
+"""The content of an instrument's file before a rig description maps its channels."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

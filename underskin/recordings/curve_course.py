@@ -128,7 +128,7 @@ def touch(displacement: Floats, snap_in: int) -> float:
 
 
 def foot(displacement: Floats, force: Floats) -> int | None:
-    """The sample of an approach (samples,) at which the force begins to rise by Hertz's law; None for too few samples.
+    """The sample of an approach (samples,) from which the force rises by Hertz's law; None for too few samples.
 
     F = b + k (d − d0)^(3/2) by least squares over a grid of d0, to the samples before the force is large.
     """

@@ -65,7 +65,7 @@ _UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_deep_end_known=False)
 
 
 def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
-    """Those of `force_n` and `displacement_mm` that fall while the curve is pressed."""
+    """The columns among `force_n` and `displacement_mm` that fall during loading."""
     return orientation(recording).negative
 
 
@@ -80,7 +80,7 @@ def orientation(recording: CurveRecording) -> Orientation:
 
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
-    """The same of a sphere's or a block's force and travel, (samples,) in any unit."""
+    """The columns that fall during loading, for force and travel of a sphere or a block, (samples,) in any unit."""
     return _oriented(force, travel, sphere=sphere).negative
 
 

@@ -194,7 +194,7 @@ _ROUNDING = 1e-6  # relative, and of positions [mm]: single precision, and conve
 _MOST_LISTED = 5  # repeats in a warning
 _INDEX_LABEL = "recordings["  # how a refused recording without an id is named
 
-Files = Sequence[tuple[str, Reading]]  # what each file is called, and what was read from it
+Files = Sequence[tuple[str, Reading]]  # name and content of each file
 
 
 def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
@@ -229,7 +229,7 @@ def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
 
 def _skin(files: Files, skin_id: str | None) -> SkinDescription:
     """The common skin of the files."""
-    facts: dict[str, tuple[Any, str]] = {}  # of each field its value and the file that said it first
+    facts: dict[str, tuple[Any, str]] = {}  # by field: its value, and the first file that states it
     sensors = {}
     for file, reading in files:
         skin = reading.campaign.skin if skin_id is None else replace(reading.campaign.skin, id=skin_id)

@@ -139,7 +139,7 @@ _FIELDS = (
 )
 _Model = TypeVar("_Model")
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
-MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_deg"  # channels that stand for both parts, together
+MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_deg"  # channels that together give both parts
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def from_dict(document: Any) -> RigDescription:
 
 
 def channel_fields(kind: str) -> set[str]:
-    """The fields of a kind that channels may hold; `time_s` of an frf stands for its sample rate."""
+    """The fields of a kind that channels may hold; `time_s` of an frf defines its sample rate."""
     columns = {model_field.name for model_field in fields(KINDS[kind])} & set(COLUMNS)
     return columns | {COMPLEX_FRF, MAGNITUDE, PHASE, "time_s"} if kind == "frf" else columns
 

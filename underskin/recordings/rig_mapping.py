@@ -236,7 +236,7 @@ class MappedBlock:
         return -1
 
     def _tared(self, field: str, column: Floats) -> Floats:
-        """A column less its mean over the part of the curve that the rig description says."""
+        """A column less its mean over the initial part of the curve, `tare_percent` of the rig description."""
         percent = self.rig.channels[field].tare_percent if field in self.rig.channels else None
         if percent is None:
             return column
@@ -327,7 +327,7 @@ class MappedBlock:
                 self.taken[field] += f": {range_of(field, column)}"
 
     def _require_stated_sign(self, columns: Mapping[str, Any]) -> None:
-        """Force must rise with displacement, unless the rig says a sign for both."""
+        """Raise FileError where force falls with displacement, unless the rig description states both signs."""
         signs = [self.rig.channels[name].sign for name in ("displacement_mm", "force_n") if name in self.rig.channels]
         if len(signs) < 2 or None not in signs or len(columns["displacement_mm"]) != len(columns["force_n"]):
             return
@@ -348,7 +348,7 @@ class MappedBlock:
             raise self._error("channels", Requirement(f"{reason}: say ", *how, doubt))
 
     def _also_used(self, derived: str) -> str:
-        """In words, each channel of a formula that other formulas use as well, and these formulas."""
+        """Hints on channels of a formula that other formulas use as well, in words."""
         rest = {name: formula for name, formula in self.rig.derived.items() if name != derived}
         hint = ""
         for name in filter(self.block.headed, self.rig.derived[derived].names):

@@ -206,7 +206,7 @@ def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
 
 
 def time_of_day(field: str, value: Any, units_checked: bool) -> str:
-    """Date and time as ISO 8601 writes it, kept as written."""
+    """Date and time in ISO 8601, unchanged."""
     text = name(field, value, units_checked)
     try:
         datetime.fromisoformat(text)

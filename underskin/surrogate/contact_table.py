@@ -1,4 +1,4 @@
-"""What finite strain adds to the exact linear layer's contact with a rigid frictionless sphere.
+"""The correction by finite strain to the exact linear layer's contact with a rigid frictionless sphere.
 
 A sphere of radius R is pressed with the force F into the bonded incompressible neo-Hookean layer. Each group of the
 file is a state of the material over α = a/h of the linear layer's frictionless contact at the same F, R, E, h, and

@@ -495,7 +495,7 @@ _OF_A_MEDIAN = 1.25  # its standard error over that of a mean
 
 
 def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Floats) -> str:
-    """In words, the difference of d33 over the lower half of the zone, in log f; empty within the noise.
+    """The difference of d33 over the lower half of the zone, in log f, in words; empty within the noise.
 
     A contact resonance above the zone raises its upper end first, and a high-pass lowers its lower end. `level` and
     `noise` (recordings,) are those of the whole zone, as `band_average` has them.

@@ -65,7 +65,7 @@ class CellReader(Protocol):
         """The value of a field in the cell at a place (row and column, from 0)."""
 
     def error(self, index: int, reason: str, column: int | None = None) -> FileError:
-        """What is wrong with a row, or with its cell in a column (both from 0)."""
+        """The error of a row, or of its cell in a column (both from 0)."""
 
 
 class TemplateRecordings:
@@ -239,7 +239,7 @@ class _Recording:
     def add(self, line: Mapping[str, Any]) -> str:
         """Add the values of a row; returns a contradiction to the rows above, in words."""
         line_values = {field: line[field] for field in COLUMNS if field in line}
-        if any(value is not None for value in line_values.values()):  # one missing beside others is for the checks
+        if any(value is not None for value in line_values.values()):  # a single missing value is left to the checks
             for field, value in line_values.items():
                 parts = self.columns.setdefault(field, [])
                 last = parts[-1] if parts else None
@@ -529,7 +529,7 @@ class _Template:
         return time
 
     def error(self, index: int, reason: str, column: int | None = None) -> FileError:
-        """What is wrong with a row, or with its cell in a column (both from 0)."""
+        """The error of a row, or of its cell in a column (both from 0)."""
         place = f"line {index + 1}" if column is None else f"line {index + 1}, column {column + 1}"
         return FileError(self.file, place, reason)
 

@@ -67,7 +67,7 @@ class FileFormat:
 
 @cache
 def formats_of_other_packages() -> Mapping[str, FileFormat]:
-    """By name.
+    """The formats of other packages by name.
 
     Raises
     ------

@@ -44,7 +44,7 @@ def _in_utf8(document: bytes) -> bytes:
 
 def _number_of_repeated(document: bytes) -> int | None:
     """The index, from 0, of the string of the document that is the first repeated key."""
-    if b"\\" in document:  # then leave no quotation mark but those that begin and end strings
+    if b"\\" in document:  # replace quotation marks within strings
         document = _ESCAPE.sub(lambda escape: _AS_UNICODE[escape[1]], document)
     objects: list[set[bytes]] = []  # the keys of those that are open
     number = behind = 0

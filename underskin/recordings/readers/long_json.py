@@ -17,11 +17,10 @@ from underskin.units import Floats
 
 _BOM = b"\xef\xbb\xbf"
 _PIECE = 1 << 16  # characters of a list that are objects at once
-# A string, which may hold anything; a list of numbers alone, not in place of a key; or a quotation mark that begins no
-# string.
+# A string; a list of only numbers, not in place of a key; or an unclosed quotation mark.
 _PARTS = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"|\[([-+0-9.eE,\s]{64,}+)\](?!\s*+:)|"', re.DOTALL)
-_NO_MEMORY = "Not enough memory"  # how orjson says it
-_DEEPEST = 200  # lists and objects in each other, which is what can be answered
+_NO_MEMORY = "Not enough memory"  # message of orjson
+_DEEPEST = 200  # nesting of lists and objects, the limit of an answer
 
 
 def read(stream: BinaryIO, most_plain: str, most_numbers: str) -> dict[str, Any]:

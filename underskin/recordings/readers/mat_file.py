@@ -25,7 +25,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     is_73 = stream.read(len(MAGIC_73)) == MAGIC_73
     stream.seek(0)
     with damage_said(file, "", lambda error: f"no MATLAB file: {type(error).__name__}: {error}"):
-        # SciPy's stubs know paths alone
+        # SciPy's stubs accept paths only
         variables = _variables_73(stream, file) if is_73 else scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
     return _contents({name: value for name, value in variables.items() if not name.startswith("__")})
 

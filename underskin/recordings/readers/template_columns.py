@@ -22,7 +22,7 @@ from underskin.recordings.readers.unit_labels import in_brackets, lab_field, uni
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
 IN_DEGREES = "frf_phase_deg"
 PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
-_NAME, _SHORT_NAME = "frf_phase", "phase"  # the second only beside a magnitude
+_NAME, _SHORT_NAME = "frf_phase", "phase"  # the second only with a magnitude
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
 _TURN = 2 * math.pi
 _EITHER = f"{IN_DEGREES} or {PHASE}"

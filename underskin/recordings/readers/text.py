@@ -16,14 +16,14 @@ _BOMS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-1
 
 
 def content(stream: BinaryIO, file: str) -> str:
-    """The text of a whole open file."""
+    """The text of an open file."""
     stream.seek(0)
     return decode(stream.read(), file)
 
 
 def decode(data: bytes, file: str) -> str:
-    """The text of a file: UTF-8, UTF-16 where a byte order mark or every second byte says so, else Latin-1, which older
-    instruments write.
+    """The text of a file: UTF-8, UTF-16 by a byte order mark or zero bytes, else Latin-1, which older instruments
+    write.
 
     Raises FileError where the bytes are no text.
     """
@@ -115,7 +115,7 @@ def _has_number(rows: Iterable[Sequence[str]], decimal: str, *, grouped: bool = 
 
 
 def is_grouped(cell: str) -> bool:
-    """Whether a cell such as 16,000 is a whole number with its thousands apart, or a number with a decimal comma."""
+    """Whether a cell such as 16,000 may be an integer with separated thousands or a number with a decimal comma."""
     return _GROUPED.fullmatch(cell) is not None
 
 
