@@ -15,7 +15,7 @@ from proof.real import recorded
 from underskin.diagnosis.data.dataset import curve_lines, finite_samples
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.recordings.campaign import IndentationRecording, parse
-from underskin.recordings.curve_course import course
+from underskin.recordings.curve_course import curve_landmarks
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 _LARGEST, _SMALLEST = 1.02, 0.98
@@ -87,7 +87,7 @@ def fitted(document: Mapping[str, Any], names: tuple[str, ...], table: SigmaTabl
     (explanation,) = FittingProblem(lines, table).explain([Request(names)])
     assert explanation is not None
     displacement, force = finite_samples(recording)[:2]
-    about_zero = force - course(displacement, force).zero
+    about_zero = force - curve_landmarks(displacement, force).zero
     raw = Curve(1e-3 * recording.indenter_radius_mm, campaign.skin.poisson_ratio, 1e-3 * displacement, about_zero)
     return Fitted(explanation.least_squares[1], raw, float((about_zero**2).sum()))
 

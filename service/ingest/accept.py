@@ -16,7 +16,7 @@ from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, instrument_templates, skins
 from underskin.errors import FileError, InvalidInput, conflicting, required
-from underskin.findings.alike import recordings_called, told_together, why_refused
+from underskin.findings.alike import grouped_by_reason, recordings_called, why_refused
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.frf.estimators import Estimator
@@ -167,7 +167,7 @@ def _in_words(arrived: Sequence[CheckedCampaign]) -> str:
 
 def _lines(campaign: CheckedCampaign) -> list[str]:
     file = f"{campaign.file}: " if campaign.file else ""
-    alike = told_together(
+    alike = grouped_by_reason(
         (refused["id"], why_refused(error)) for refused in campaign.refused for error in refused["errors"]
     )
     lines = [f"{file}{recordings_called(names)}: {why}" for names, why in alike]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, InstanceOf, Tag, WithJsonSchema
 
 from underskin.findings.codes import FindingCode
-from underskin.prediction.columns import statuses, to_csv, told
+from underskin.prediction.columns import limits_and_statuses, statuses, to_csv
 from underskin.prediction.pressed_skin import Words
 from underskin.units import Floats
 
@@ -165,7 +165,7 @@ class Columns:
                 columns |= {
                     f"{name}[{frequency!r} Hz]": line for frequency, line in zip(frequencies, values.T, strict=True)
                 }
-        return to_csv({**columns, **told(self.inside, self.limits, self.rows)}, "\r\n").encode()
+        return to_csv({**columns, **limits_and_statuses(self.inside, self.limits, self.rows)}, "\r\n").encode()
 
     def npz(self) -> bytes:
         """The answer as arrays in NumPy's .npz, uncompressed, by the names of the JSON; what is null there is left out.

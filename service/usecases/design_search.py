@@ -20,7 +20,7 @@ from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import resolution
 from underskin.surrogate.contact_model import ContactModel, ContactName
-from underskin.surrogate.off_centre_sigma import sigma_beside
+from underskin.surrogate.off_centre_sigma import sigma_off_centre
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
@@ -96,7 +96,7 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     apart = (2 * contact <= demand.resolution_mm) & (4 * radii[:, None] <= demand.resolution_mm)
     pitch = np.full(h.shape, np.nan)
     for index in zip(*np.nonzero(reached.inside & apart), strict=True):
-        offset, response = sigma_beside(contact_model, *(float(part[index]) for part in numbers))
+        offset, response = sigma_off_centre(contact_model, *(float(part[index]) for part in numbers))
         if np.isfinite(response).all():
             finest, touching = 2 * float(radii[index[0]]), float(contact[index[1]])
             pitch[index] = _largest_pitch_mm(offset * float(h[index]), response, finest, touching, demand)

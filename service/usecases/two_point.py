@@ -11,7 +11,7 @@ these is nearer to its contact than the sensor beyond it and reads more, so that
 
 import numpy as np
 
-from underskin.prediction.skin_design import told_apart
+from underskin.prediction.skin_design import are_resolved
 from underskin.units import Floats
 
 _PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
@@ -47,4 +47,4 @@ def _are_resolved(offset: Floats, response: Floats, pitch: float, distance: floa
     width = 2 * float(offset[int(np.argmax(response < response[0] / 2))])
     farthest = distance + 2 * pitch + 2 * width  # beyond it each contact is seen on its own, again and again
     distances = np.linspace(distance, farthest, _DISTANCES)
-    return bool(told_apart(offset, response, pitch, distances, _PLACEMENTS, dip).all())
+    return bool(are_resolved(offset, response, pitch, distances, _PLACEMENTS, dip).all())

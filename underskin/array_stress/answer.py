@@ -9,7 +9,7 @@ from underskin.array_stress import load_integration as integration
 from underskin.array_stress.finite_strain import finite_strain
 from underskin.array_stress.load_integration import Load, charge
 from underskin.array_stress.request import LoadCase
-from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
+from underskin.array_stress.validation import findings, refuse_coarse, refuse_many, refuse_off_skin, refuse_overlap
 from underskin.errors import Mention, Requirement, out_of_range
 from underskin.findings.finding import Finding
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
@@ -43,7 +43,7 @@ class ArrayStress:
 
     @property
     def limits(self) -> list[str | None] | None:
-        """Of each sensor that is not inside that no load is near enough; None where all are."""
+        """For each sensor outside, that no load is near enough; None where all are inside."""
         far = f"no load within {self.reach_mm:g} mm"
         return None if self.inside.all() else [None if inside else far for inside in self.inside.tolist()]
 
@@ -54,7 +54,7 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     Raises
     ------
     InvalidInput
-        For a skin outside the table, for loads beside the skin, overlapping or too wide, and for too large a request.
+        For a skin outside the table, for loads off the skin, overlapping or too wide, and for too large a request.
     """
     thickness, radius, d33 = (
         float(checked(name, getattr(request, name), units_checked=True))
@@ -116,7 +116,7 @@ def base_stress(table: InfluenceTable, request: LoadCase, x_mm: Floats, y_mm: Fl
     thickness = float(checked("thickness_mm", request.thickness_mm, units_checked=True))
     influence = _influence(table, request, 0.0)
     pressures = _pressures(request, thickness)
-    _contacts_load(request, pressures, thickness)  # raises where contacts overlap or lie beside the skin
+    _contacts_load(request, pressures, thickness)  # raises where contacts overlap or lie off the skin
     x, y = np.meshgrid(to_si("x_mm", x_mm), to_si("x_mm", y_mm))
     stress = np.zeros(x.shape)
     for contact, pressure in zip(request.contacts, pressures, strict=True):
@@ -171,12 +171,12 @@ def _pressures(request: LoadCase, thickness: float) -> list[SpherePressure]:
 def _contacts_load(request: LoadCase, pressures: list[SpherePressure], thickness: float) -> Load:
     positions = to_si("x_mm", [[contact.x_mm, contact.y_mm] for contact in request.contacts])
     radii = np.array([pressure.radius for pressure in pressures])
-    refuse_beside_skin(request, positions, radii[:, None], "contacts[{}]".format)
+    refuse_off_skin(request, positions, radii[:, None], "contacts[{}]".format)
     refuse_overlap(positions, radii)
     load = integration.combined(
         [
-            integration.contact_load(place, (*contact.tangential_force_n, contact.normal_force_n), pressure, thickness)
-            for place, contact, pressure in zip(positions, request.contacts, pressures, strict=True)
+            integration.contact_load(centre, (*contact.tangential_force_n, contact.normal_force_n), pressure, thickness)
+            for centre, contact, pressure in zip(positions, request.contacts, pressures, strict=True)
         ]
     )
     refuse_many(request, len(load.positions))
@@ -191,7 +191,7 @@ def _map_loads(request: LoadCase, thickness: float) -> Iterable[Load]:
     refuse_coarse(x, y, thickness)
     row, column = np.nonzero(pressure)
     half = np.array([x[1] - x[0], y[1] - y[0]]) / 2
-    refuse_beside_skin(
+    refuse_off_skin(
         request,
         np.stack([x[column], y[row]], axis=-1),
         half,

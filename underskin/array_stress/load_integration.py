@@ -14,11 +14,11 @@ from underskin.physics.contact_pressure import SpherePressure
 from underskin.surrogate.influence_table import Influence, SensorStress
 from underskin.units import Floats
 
-_FINE_CELL = 0.02  # of the thickness: below, one point a cell; γ turns over lengths of about 0.3
+_FINE_CELL = 0.02  # of the thickness: below, one point a cell; γ varies over lengths of about 0.3
 _MIDDLING_CELL = 0.1  # two points each way; above, three in every _SUBCELL
 _SUBCELL = 0.4
-_RAY = 97  # places along a ray: the stress turns over lengths of 0.3 h and more
-_POINTS_AT_ONCE = 1 << 16  # of a map, which may make more than memory holds
+_RAY = 97  # positions along a ray: the stress varies over lengths of 0.3 h and more
+_POINTS_AT_ONCE = 1 << 16  # points of a map, of which all may exceed the memory
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Load:
     forces: Floats
 
 
-def contact_load(place: Floats, force: Sequence[float], pressure: SpherePressure, thickness: float) -> Load:
+def contact_load(centre: Floats, force: Sequence[float], pressure: SpherePressure, thickness: float) -> Load:
     """A contact as point forces.
 
     The pressure's share of a ring is smooth in t = √(1 − r²/a²), so that Gauss' rule in t and equal angles integrate
@@ -61,7 +61,7 @@ def contact_load(place: Floats, force: Sequence[float], pressure: SpherePressure
     r = pressure.radius * np.sqrt(1 - t**2)
     positions = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))], axis=-1).reshape(-1, 2)
     share = np.repeat(pressure.ring_share(t) * weight / count, count)
-    return Load(positions + place, np.outer(share, force))
+    return Load(positions + centre, np.outer(share, force))
 
 
 def pressure_map_loads(x: Floats, y: Floats, pressure: Floats, thickness: float) -> Iterator[Load]:
@@ -135,7 +135,7 @@ def stress_around(
     force: Sequence[float],
     away: tuple[Floats, Floats],
 ) -> Floats:
-    """Stress of one contact at many places, from its course along a ray: T(r) + S(r) (F1 cos φ + F2 sin φ).
+    """Stress of one contact at many positions, from profiles along a ray: T(r) + S(r) (F1 cos φ + F2 sin φ).
 
     Parameters
     ----------
@@ -164,8 +164,8 @@ def stress_around(
     ):
         if strength.any():
             load = contact_load(np.zeros(2), unit, pressure, thickness)
-            course = CubicSpline(ray, influence.stress(thickness, points, load.positions, load.forces).stress)
-            stress += strength * np.where(r <= ray[-1], course(r), 0.0)
+            along_ray = CubicSpline(ray, influence.stress(thickness, points, load.positions, load.forces).stress)
+            stress += strength * np.where(r <= ray[-1], along_ray(r), 0.0)
     return stress
 
 

@@ -1,5 +1,5 @@
-"""A pressure map as CSV: x_mm in the first line, from its second cell on; then a line for each y_mm, which comes first,
-with its pressure_mpa.
+"""A pressure map as CSV: x_mm in the first line, from its second cell on; then a line for each y_mm, its first cell,
+with pressure_mpa in the others.
 
 Separated by commas, or by tabs or semicolons, as spreadsheets copy and save it, then with decimal points or commas.
 """

@@ -22,8 +22,8 @@ from underskin.surrogate.contact_model import ContactName
 from underskin.units import Floats
 
 MOST_CONTACTS = 1000
-_EVEN = 1e-6  # of a cell, how evenly the map's places must be spaced
-_MOST_NAMED = 5  # cells of a map that are refused
+_EVEN = 1e-6  # of a cell: largest deviation of the map's positions from even spacing
+_MOST_NAMED = 5  # rejected cells of a map that are listed
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class LabContact:
 
 @dataclass(frozen=True, eq=False)
 class PressureMap:
-    """Pressure into the skin, a row for each y and a column for each x, constant around each place."""
+    """Pressure into the skin, a row for each y and a column for each x, constant in the cell around each position."""
 
     x_mm: field.Increasing
     y_mm: field.Increasing
@@ -50,7 +50,7 @@ def _contacts(name: str, value: Any, units_checked: bool) -> tuple[LabContact, .
     if not isinstance(value, list | tuple) or not 0 < len(value) <= MOST_CONTACTS:
         allowed = Requirement(f"must be a list of 1 to {MOST_CONTACTS} ", Mention("contacts"))
         raise errors.wrong_type(name, shown(value), allowed)
-    return tuple(field.build(LabContact, f"{name}[{i}]", entry, units_checked) for i, entry in enumerate(value))
+    return tuple(field.build(LabContact, f"{name}[{i}]", document, units_checked) for i, document in enumerate(value))
 
 
 def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
@@ -76,7 +76,7 @@ def _contact(name: str, value: Any, _: bool) -> ContactName:
 
 
 def _refuse_pull(name: str, pressure: Floats) -> None:
-    """Refuse negative cells, and name the first ones."""
+    """Reject negative cells, and list the first ones."""
     cells = np.argwhere(pressure < 0)
     if cells.size:
         first, *others = [f"[{row}][{column}]" for row, column in cells[:_MOST_NAMED]]
@@ -90,8 +90,8 @@ def _refuse_pull(name: str, pressure: Floats) -> None:
 class LoadCase:
     """A skin, its sensors, and either `contacts` or a `pressure_map`.
 
-    `glue_stiffness` κ [-]: shear stress at the base over (G/h) times the slip there; left out: bonded. `contact`:
-    `paper`: small strain; `solved`: with what finite strain adds beneath contacts on a bonded incompressible layer.
+    `glue_stiffness` κ [-]: shear stress at the base over (G/h) times the slip there; None: bonded. `contact`: `paper`
+    for small strain; `solved` with the effect of finite strain beneath contacts on a bonded incompressible layer.
     """
 
     thickness_mm: field.Declared
@@ -134,7 +134,7 @@ def _map_in_file(path: str) -> dict[str, Any]:
 
 
 def read_request(document: Any) -> LoadCase:
-    """The request that a JSON document makes; raises InvalidInput at the first field that cannot be used."""
+    """The request of a JSON document; raises InvalidInput for the first invalid field."""
     fields = dict(field.mapping("body", document))
     units_checked = field.flag("units_checked", fields.pop("units_checked", False), False)
     values, refused = field.check_fields(LoadCase, fields, units_checked=units_checked)
@@ -157,7 +157,7 @@ def read_request(document: Any) -> LoadCase:
 
 
 def _require_solvable(request: LoadCase) -> None:
-    """Raises InvalidInput where the solved contact does not know such loads or such a layer."""
+    """Raise InvalidInput for loads or layers that the solved contact does not support."""
     if request.pressure_map is not None:
         raise errors.conflicting("contact", request.contact, "must be 'paper' with a pressure_map: it has no contact")
     if request.poisson_ratio != INCOMPRESSIBLE:

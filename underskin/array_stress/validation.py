@@ -1,6 +1,6 @@
-"""Checks of the loads on an array: errors for loads that cannot be used, findings for unusual ones.
+"""Checks of the loads on an array: errors for invalid loads, findings for unusual ones.
 
-Where the skin's length and width are given, it is taken to be centred on the middle of the sensors' extent.
+If the skin's length and width are given, it is assumed to be centred on the middle of the sensors' extent.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -42,7 +42,7 @@ def refuse_coarse(x: Floats, y: Floats, thickness: float) -> None:
             raise out_of_range(f"pressure_map.{name}", f"steps of {to_lab('x_mm', step):g} mm", allowed)
 
 
-def refuse_beside_skin(request: LoadCase, positions: Floats, half: Floats, name: Callable[[int], str]) -> None:
+def refuse_off_skin(request: LoadCase, positions: Floats, half: Floats, name: Callable[[int], str]) -> None:
     """Reject loads at `positions` (loads, 2) [m], of half width `half` (…, 2) [m], beyond the edge of the skin.
 
     The centres of the sensors must lie on the skin too. `name` gives the field of a load.
@@ -59,14 +59,14 @@ def refuse_beside_skin(request: LoadCase, positions: Floats, half: Floats, name:
         over = to_lab("x_mm", outermost[:, axis]) > size / 2 * (1 + _ROUNDING)
         if over.any():
             first = int(np.argmax(over))
-            place, reach = (
+            centre, reach = (
                 float(to_lab("x_mm", np.broadcast_to(v, positions.shape)[first, axis])) for v in (positions, half)
             )
             allowed = (
                 f"must lie on the skin, {'xy'[axis]} from {middle - size / 2:g} to {middle + size / 2:g} mm "
                 f"({extent} {size:g}, about the middle of the sensors)"
             )
-            value = f"{'xy'[axis]} from {place - reach:.4g} to {place + reach:.4g} mm"
+            value = f"{'xy'[axis]} from {centre - reach:.4g} to {centre + reach:.4g} mm"
             raise out_of_range(name(first), value, allowed)
 
 
@@ -115,7 +115,7 @@ def _about_sensors(request: LoadCase) -> Iterator[Finding]:
 
 
 def _worst(reason: Reason, name: str, contacts: Iterable[tuple[float, int]]) -> Iterator[Finding]:
-    """One finding for all contacts alike, about the worst of them; `name` is the argument that holds its value."""
+    """One finding for all these contacts, about the worst of them; `name` is the argument that holds its value."""
     ranked = sorted(contacts, reverse=True)
     if ranked:
         value, index = ranked[0]
@@ -133,13 +133,13 @@ def _about_places(given: PressureMap, sensor_radius_mm: float) -> Iterator[Findi
 def _about_map(given: PressureMap, modulus: float | None) -> Iterator[Finding]:
     row, column = np.unravel_index(int(np.argmax(given.pressure_mpa)), given.pressure_mpa.shape)
     highest = float(given.pressure_mpa[row, column])
-    place = f"pressure_map.pressure_mpa[{row}][{column}]"
+    field = f"pressure_map.pressure_mpa[{row}][{column}]"
     if highest == 0:
         return
     if modulus is not None and highest > modulus:
-        yield Finding(Reason.PRESSURE_NOT_LINEAR, "", place, {"pressure_mpa": highest, "modulus_mpa": modulus})
+        yield Finding(Reason.PRESSURE_NOT_LINEAR, "", field, {"pressure_mpa": highest, "modulus_mpa": modulus})
     for finding in unusual("pressure_mpa", highest):
-        yield replace(finding, field=place)
+        yield replace(finding, field=field)
 
 
 def _load_parameter(contact: LabContact, modulus: float) -> float:

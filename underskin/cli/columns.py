@@ -21,7 +21,7 @@ from underskin.errors import (
 )
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
-from underskin.prediction.columns import statuses, to_csv, told
+from underskin.prediction.columns import limits_and_statuses, statuses, to_csv
 from underskin.prediction.csv_columns import CsvError, from_csv
 from underskin.prediction.pressed_skin import Words
 from underskin.recordings.readers.formats import ZIP
@@ -141,7 +141,7 @@ def write_csv(
     exceeds.
     """
     full = {name: np.broadcast_to(values, (count,)) for name, values in columns.items()}
-    sys.stdout.write(to_csv({**names, **full, **told(inside, limits, count)}, "\n"))
+    sys.stdout.write(to_csv({**names, **full, **limits_and_statuses(inside, limits, count)}, "\n"))
 
 
 def write_table(

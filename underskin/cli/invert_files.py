@@ -20,7 +20,7 @@ from rich.text import Text
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
-from underskin.findings.alike import recordings_called, told_together
+from underskin.findings.alike import grouped_by_reason, recordings_called
 from underskin.findings.formatting import significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
@@ -82,7 +82,7 @@ class InvertedFile:
         refused += [
             (modulus.recording, modulus.result) for modulus in self.moduli if isinstance(modulus.result, InvalidInput)
         ]
-        for names, why in told_together((recording, str(why)) for recording, why in refused):
+        for names, why in grouped_by_reason((recording, str(why)) for recording, why in refused):
             notes.append(f"left out: {recordings_called(names)}: {why}")
         if isinstance(self.inversion, Inversion):
             notes += [f"left out: {omission.sentence}" for omission in self.inversion.left_out]

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from underskin.errors import UnderskinError
-from underskin.findings.alike import told_together, why_refused
+from underskin.findings.alike import grouped_by_reason, why_refused
 from underskin.findings.formatting import significant
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def outcome(client: "Client", result: Mapping[str, Any]) -> list[Line]:
     refusals = (
         (recording["id"], why_refused(error)) for recording in result["recordings"] for error in recording["errors"]
     )
-    lines += [(False, f"{names} {reason}") for names, reason in told_together(refusals)]
+    lines += [(False, f"{names} {reason}") for names, reason in grouped_by_reason(refusals)]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
         count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"

@@ -1,7 +1,7 @@
-"""The codes of findings, and below each code the reasons for it.
+"""The codes of findings, and the reasons of each code.
 
-A code is what users filter by; docs/findings.md explains each. A reason is one sentence, of which `english` has the
-words; its value is its code, and where the code has several reasons a point and what tells them apart.
+Users filter by codes, which docs/findings.md explains. A reason is one sentence of `english`; its value is its code,
+followed by a point and a suffix where the code has several reasons.
 """
 
 from enum import StrEnum
@@ -66,7 +66,7 @@ class FindingCode(StrEnum):
 
 
 class Reason(StrEnum):
-    """What exactly a finding says."""
+    """The statement of a finding."""
 
     REFUSED = "refused"
     NO_FRF = "refused.no_frf"

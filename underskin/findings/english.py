@@ -1,6 +1,6 @@
 """The sentences of findings in English: for each reason a template, or a function where words depend on the arguments.
 
-This table and `sentences` are the one place that knows them; another language is another such pair.
+Only this table and `sentences` hold the words; another language is another such pair.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +21,7 @@ def statement(reason: Reason, arguments: Mapping[str, Any]) -> str:
 
 
 def lacking(what: Lacking) -> str:
-    """What is lacking, as the end of a sentence."""
+    """A lack in words, as the end of a sentence."""
     words = LACKING[what.lack]
     text = words.format(**what.arguments) if isinstance(words, str) else words(**what.arguments)
     if not what.refused_recordings:

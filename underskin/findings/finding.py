@@ -1,4 +1,4 @@
-"""A finding: something that looks wrong in data, or limits an answer, as a reason with arguments."""
+"""A finding: something suspicious in data, or a limit of an answer, as a reason with arguments."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -11,10 +11,10 @@ from underskin.findings.codes import FindingCode, Reason
 
 @dataclass(frozen=True)
 class Finding:
-    """A reason, what it is about, and the values that its sentence states.
+    """A reason, its subject, and the values of its sentence.
 
-    `recording` is an id, empty for the whole campaign; `field` is the name that the user knows; `index` is the row of
-    a column, from 0. The words of `english` fix the names of the `arguments`.
+    `recording` is an id, empty for the whole campaign; `field` is the name in the user's document; `index` is the row
+    of a column, from 0. The sentences of `english` define the names of the `arguments`.
     """
 
     reason: Reason
@@ -43,5 +43,5 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """The finding in words, led by the recording where it is about one."""
+        """The finding in words, preceded by the recording where it is about one."""
         return f"recording {self.recording}: {self.statement}" if self.recording else self.statement

@@ -1,4 +1,4 @@
-"""What data lack from which nothing can be concluded."""
+"""What data lack for a conclusion."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ class Lack(StrEnum):
 
 @dataclass(frozen=True)
 class Lacking:
-    """A lack with the values that its sentence states, and how many recordings were refused for which fields."""
+    """A lack with the values of its sentence, and the number of rejected recordings with their fields."""
 
     lack: Lack
     arguments: Mapping[str, Any] = dataclasses.field(default_factory=dict, hash=False)

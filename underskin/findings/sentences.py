@@ -1,8 +1,6 @@
-"""Sentences of findings.
+"""English sentences of findings whose words depend on their arguments, for the table in `english`.
 
-Arguments of findings that are more than a number or a name. English sentences of findings whose words depend on their
-arguments, for the table in `english`. Sentences of findings on sensors: one that stands alone, exchanged labels and
-cables, two that fail together.
+Also the types of arguments that are more than a number or a name.
 """
 
 import math
@@ -16,11 +14,11 @@ from underskin.findings.formatting import in_digits, significant
 
 @dataclass(frozen=True)
 class UnitGuess:
-    """The slip of units that brings an unusual magnitude back to what is usual.
+    """The slip of units that explains an unusual magnitude.
 
-    `size` in the field's `unit` becomes each of `meant`, a value in that unit, if it was given in the unit beside the
-    value; or the only one, without a unit, if it is off by ten to the power of `off_by`. Without any no slip explains
-    it; a size of 0 is a measured value of 0.
+    `size` in the field's `unit` is corrected to each value of `meant`, in that unit, if it was given in the paired
+    unit; or to the only value, paired with an empty unit, if it is off by ten to the power of `off_by`. If empty, no
+    slip explains it; a size of 0 is a measured value of 0.
     """
 
     size: float
@@ -39,7 +37,7 @@ class ImplausibleD33(StrEnum):
 
 
 class DefectKind(StrEnum):
-    """What is wrong with a run of samples."""
+    """The kind of damage of a run of samples."""
 
     OVERLOAD = "overload"
     HELD_SAMPLES = "held_samples"
@@ -63,7 +61,7 @@ DEFECTS: Mapping[DefectKind, str] = {
 
 
 def unit_guess(guess: UnitGuess) -> str:
-    """The slip that would explain an unusual magnitude."""
+    """The slip that would explain an unusual magnitude, in words."""
     if guess.size == 0:
         return "a dead sensor?"
     if not guess.meant:
@@ -80,13 +78,13 @@ def defect(kind: DefectKind, channel: str, samples: int, first_sample: int) -> s
 
 
 def defects_left_out(kind: DefectKind, channel: str, samples: int, first_sample: int, more: int) -> str:
-    """The first of some runs of damaged samples, and how many more there are."""
+    """The first of several runs of damaged samples, and the number of further ones."""
     others = f"; {more} more like it" if more else ""
     return f"{defect(kind, channel, samples, first_sample)}{others}: those parts were left out"
 
 
 def counted_negative(fields: Sequence[str], more: int, may_be_pulled: bool) -> str:
-    """Force, displacement or both fall while a curve is pressed."""
+    """Force, displacement or both fall during loading."""
     named = " and ".join({"force_n": "force", "displacement_mm": "displacement"}[name] for name in fields)
     are, channel = ("are", "those channels") if len(fields) > 1 else ("is", "that channel")
     negative = f"{named} {are} counted negative as it is pressed, where compression and depth count positive"
@@ -99,13 +97,13 @@ def counted_negative(fields: Sequence[str], more: int, may_be_pulled: bool) -> s
 
 
 def rows_reversed(is_timed: bool) -> str:
-    """A curve whose rows begin at its deep end."""
+    """A curve whose rows start at its deep end."""
     times = ", without its times, since a way out alone does not tell what relaxes" if is_timed else ""
     return f"its rows begin where it is deepest and end in the air: it was read from the last row to the first{times}"
 
 
 def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> str:
-    """Where a force channel is at the end of its range."""
+    """A force channel at the end of its range."""
     limits = " or ".join(f"{limit:.4g} N" for limit in limits_n)
     return (
         f"the force channel saturates: {samples} samples, {percent:.2g} % of all, read {limits} while the travel goes "
@@ -114,7 +112,7 @@ def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> 
 
 
 def thickness_unknown(answer: str, is_tried: bool) -> str:
-    """What a thickness that nobody declared leaves open."""
+    """An undeclared thickness, and what it leaves open."""
     layer = "a thin layer on a stiff base (layered contact)"
     undeclared = "the thickness of the sample is not declared"
     if answer == "layered contact":
@@ -130,12 +128,12 @@ def size(too_large: bool) -> str:
 
 
 def more_alike(count: int, noun: str) -> str:
-    """How many more are alike, in brackets."""
+    """The number of further cases, in brackets; empty for 0."""
     return f" ({count} more {noun}{'s' if count > 1 else ''} like it)" if count else ""
 
 
 def more_rows(count: int, noun: str = "rows") -> str:
-    """How many more rows are alike, in brackets."""
+    """The number of further rows, in brackets; empty for 0."""
     return f" ({count} more {noun} like it)" if count else ""
 
 
@@ -147,7 +145,7 @@ def listed_sensors(ids: Sequence[str]) -> str:
 
 
 def listed(ids: Sequence[str], noun: str) -> str:
-    """Some things by their ids, the first ones and how many more."""
+    """The first ids of a list, and the number of further ones."""
     if len(ids) > _MOST_LISTED:
         return f"{noun} {', '.join(ids[:_MOST_LISTED])} and {len(ids) - _MOST_LISTED} more"
     return f"{noun if len(ids) > 1 else noun.removesuffix('s')} {', '.join(ids)}"
@@ -168,7 +166,7 @@ def all_conjugated(lag_us: float | None) -> str:
 
 
 def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: int, left_out: int) -> str:
-    """Some recordings a fixed factor beside the others."""
+    """Some recordings that differ from the others by a fixed factor."""
     untold = f"; {left_out} that do not tell were left out" if left_out else ""
     return (
         f"the response of {len(of)} of {recordings} recordings is {factor:.3g} times the others': is their dynamic "
@@ -190,7 +188,7 @@ def elastomer(modulus_mpa: float, low_mpa: float, high_mpa: float, guess: UnitGu
 
 
 def needed_modulus(against: str) -> Callable[..., str]:
-    """Words for curves whose modulus is far from what is known."""
+    """Words for curves whose apparent modulus is far from `against`."""
 
     def words(modulus_mpa: float, slips: Sequence[str], **bounds: float) -> str:
         guess = f"{', or '.join(slips)}?" if slips else "are force, displacement and size in the units that were said?"
@@ -201,7 +199,7 @@ def needed_modulus(against: str) -> Callable[..., str]:
 
 
 def periodic_error(period_mm: float, amplitude_n: float, percent: float, frequency_hz: float | None = None) -> str:
-    """A sine over the travel in the force; on one way, `frequency_hz` is that of a sine over the time."""
+    """A sine over the travel in the force; for a monotonic curve, `frequency_hz` is its frequency in time."""
     or_hum = "" if frequency_hz is None else f"; or hum, or a vibration of {frequency_hz:.3g} Hz"
     return (
         "the force carries an error that is periodic in the travel, in the air as well: period "
@@ -211,7 +209,7 @@ def periodic_error(period_mm: float, amplitude_n: float, percent: float, frequen
 
 
 def preload_and_radius_exchanged(beyond: int, recordings: int) -> str:
-    """Loads beyond the tables that come within once preload and sphere are exchanged."""
+    """Loads beyond the tables that would lie within them with preload and sphere exchanged."""
     return (
         "the spheres are pressed harder than the tables hold, or preload_n and indenter_radius_mm are exchanged: "
         f"L = F/(R²E) of {beyond} of {recordings} contacts is beyond the tables, and within if they are exchanged"
@@ -231,8 +229,8 @@ def response_slip(too_large: bool) -> str:
 
 def d33_needed(d33_pc_per_n: float, declared_pc_per_n: float | None, too_large: bool) -> str:
     """A d33 that the response would need."""
-    known = f", where {declared_pc_per_n:g} is declared" if declared_pc_per_n else ""
-    needed = f"charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N{known}"
+    declared = f", where {declared_pc_per_n:g} is declared" if declared_pc_per_n else ""
+    needed = f"charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N{declared}"
     return f"{needed}; it looks {response_slip(too_large)}"
 
 
@@ -253,7 +251,8 @@ def beside_others(value: float, too_large: bool, given_in: str) -> str:
 
 
 def of_series(words: Callable[..., str]) -> Callable[..., str]:
-    """A contradiction within a time series: of a recording left out, of one used, or of all as in an `example`."""
+    """Words for a contradiction within a time series: of a rejected recording, of a used one, or of all as in an
+    `example`."""
 
     def in_scope(*, left_out: bool = False, example: str = "", **arguments: Any) -> str:
         text = words(**arguments)
@@ -284,14 +283,14 @@ def series_dynamic_force(dynamic_force_n: float, too_large: bool, given_in: str)
 
 def series_preload(preload_n: float, mean_n: float, too_large: bool, given_in: str) -> str:
     """A preload that contradicts the recorded force."""
-    beside = f"beside the recorded force's mean of {mean_n:.3g} N"
-    return f"{preload_n:g} N looks 1000 × too {size(too_large)} {beside}: was it given in {given_in}?"
+    reference = f"beside the recorded force's mean of {mean_n:.3g} N"
+    return f"{preload_n:g} N looks 1000 × too {size(too_large)} {reference}: was it given in {given_in}?"
 
 
 def one_place(sensors: Sequence[str], x_mm: float, y_mm: float, more: int) -> str:
     """Sensors at one place."""
-    place = f"x {x_mm:g} mm, y {y_mm:g} mm"
-    return f"{listed_sensors(sensors)} lie at one place, {place}: is it a slip?{more_alike(more, 'place')}"
+    position = f"x {x_mm:g} mm, y {y_mm:g} mm"
+    return f"{listed_sensors(sensors)} lie at one place, {position}: is it a slip?{more_alike(more, 'place')}"
 
 
 def too_near(sensors: Sequence[str], radius_mm: float, pitch_mm: float, in_metres: bool) -> str:
@@ -352,10 +351,10 @@ def line_noise(level: float) -> str:
 
 def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float) -> str:
     """Mechanisms that predict held-out groups no better."""
-    left_out = " and ".join(groups) if len(groups) <= 2 else f"each of {len(groups)} parts in turn"
+    omitted = " and ".join(groups) if len(groups) <= 2 else f"each of {len(groups)} parts in turn"
     before, after = (float(f"{percent:.4g}") for percent in (before_percent, after_percent))  # as the report has them
     return (
-        f"what was left out ({left_out}) is predicted no better with {' and '.join(mechanisms)}: "
+        f"what was left out ({omitted}) is predicted no better with {' and '.join(mechanisms)}: "
         f"{before:.3g} % before, {after:.3g} % after; do not extrapolate with it"
     )
 
@@ -363,7 +362,7 @@ def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: f
 def no_simple_law(
     tried: int, law: str = "", part: str = "", after_percent: float = 0.0, before_percent: float = 0.0
 ) -> str:
-    """How well the nearest of the laws of one form over one axis predicts what was held out."""
+    """The held-out prediction by the best of the laws of one form over one axis."""
     if not law:
         return f"none of {tried} simple laws of one quantity over one axis gains anything"
     if after_percent >= before_percent:
@@ -392,18 +391,18 @@ def contact_slips(ratio: float, more: int) -> str:
 
 
 def contacts_kept(contacts: int, recordings: int, declared_mpa: float, found_mpa: float | None, answer: str) -> str:
-    """Contacts that are within the tables by the values found, and not by the declared ones; `found_mpa` is None where
-    no other modulus is among these."""
-    found = f"with the values found for {answer}" if found_mpa is None else f"at the {found_mpa:.3g} MPa found"
+    """Contacts within the tables by the fitted values and not by the declared ones; `found_mpa` is None where no
+    modulus was fitted."""
+    condition = f"with the values found for {answer}" if found_mpa is None else f"at the {found_mpa:.3g} MPa found"
     number = f"{contacts} of {recordings} contacts"
-    return f"by the declared {declared_mpa:g} MPa {number} lie beyond the tables, {found} they lie within: kept"
+    return f"by the declared {declared_mpa:g} MPa {number} lie beyond the tables, {condition} they lie within: kept"
 
 
-_AS_A_SLIP = 0.05  # of the logarithm of a factor beside that of 2 or of a half
+_AS_A_SLIP = 0.05  # largest difference of the logarithm of a factor from that of 2 or 1/2
 
 
 def sensor_alone(sensor: str, share: float, recordings: int) -> str:
-    """A sensor at another level than all others, which are alike."""
+    """A sensor whose level differs from the common one of the others."""
     doubled = min(abs(math.log(share / 2)), abs(math.log(2 * share))) < _AS_A_SLIP
     causes = "its own d33, its cable, or peak-to-peak beside amplitudes" if doubled else "its own d33 or its cable"
     return (
@@ -420,16 +419,16 @@ def cables_exchanged(first: str, second: str, since: str, recordings: int) -> st
 
 def labels_permuted(sensors: Sequence[str], places: Sequence[str], since: str | None, recordings: int) -> str:
     """More than two sensors, each of which answers where another one was pressed."""
-    begins = f"from recording {since!r} on, in the order of time, " if since else ""
+    start = f"from recording {since!r} on, in the order of time, " if since else ""
     moved = ", ".join(f"{sensor!r} where {place!r} was pressed" for sensor, place in zip(sensors, places, strict=True))
     return (
-        f"{begins}{len(sensors)} sensors answer where another one of them was pressed ({moved}): their labels or "
+        f"{start}{len(sensors)} sensors answer where another one of them was pressed ({moved}): their labels or "
         f"cables look rotated, as by a plug that is off by one; put right ({recordings} recordings)"
     )
 
 
 def labels_contradict_places(sensors: Sequence[str], recordings: int) -> str:
-    """Sensors that answer where others were pressed, and no exchange explains all of it."""
+    """Sensors that respond where others were pressed, without an exchange that explains all of it."""
     answer = f"{listed(sensors, 'sensors')} answer{'s' if len(sensors) == 1 else ''} where others were pressed"
     return f"{answer}, and no exchange explains it: labels or places are wrong; left out ({recordings} recordings)"
 

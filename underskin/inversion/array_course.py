@@ -1,20 +1,15 @@
-"""Courses of an array's sensors over dates.
+"""d33 of an array over several dates: the level common to all sensors, their departures, and the changes of both.
 
-Which of several values differ beyond chance: from the others, or from zero.
+ln |d33| of sensor s on date c is y_cs = a_c + μ_s + e_cs, e_cs ~ N(0, (f u_cs)²): a is the common level, u the standard
+uncertainty, f the scatter of sensors from date to date relative to it. Departing sensors do not contribute to a.
 
-d33 of an array over several dates: what all sensors share, what each has besides, and how much either changed.
-
-ln |d33| of sensor s on date c is y_cs = a_c + μ_s + e_cs, e_cs ~ N(0, (f u_cs)²): a is the level that all sensors
-share, u the standard uncertainty, f by how much sensors scatter beyond it from date to date. Sensors that depart from
-the others take no part in a.
-
-The change between the first and the last date is that of a course with a gain error on each date,
+The change between the first and the last date is that of a series with a gain error on each date,
     a_c = m + b t_c + w(t_c) + ε_c,    w a random walk, Var w(t) = q² t, ε_c ~ N(0, g²),
-with t from 0 to 1, flat priors of m and b, and w for what the course is beside a straight line: g, the scatter of
-mounting and amplifier that all sensors of a date share, is no change, and widens the interval. (q, g) are marginalised
-on a grid: each is zero, or q half-Cauchy (Gelman 2006) and g half-normal. Of two dates no scatter can be estimated:
-q = g = 0. Of few dates the change is a at the last less a at the first, ± √2 g, as the values beside it have it; of
-many, which smoothing makes surer, b + w(1).
+with t from 0 to 1 and flat priors of m and b; w is the departure from a straight line. g, the scatter of mounting and
+amplifier common to all sensors of a date, is no change, and widens the interval. (q, g) are marginalised on a grid:
+each is zero, or q half-Cauchy (Gelman 2006) and g half-normal. From two dates no scatter can be estimated: q = g = 0.
+For few dates the change is a at the last less a at the first, ± √2 g, consistent with the stated values; for many,
+where smoothing is more precise, b + w(1).
 """
 
 from dataclasses import dataclass
@@ -24,41 +19,41 @@ from scipy.special import chdtrc, chdtri, ndtr, ndtri
 
 from underskin.units import Floats, Mask
 
-BY_CHANCE = 0.05  # probability that of values that are all alike any one is said to differ
+BY_CHANCE = 0.05  # family-wise false-alarm probability
 _OF_MEDIAN = np.pi / 2  # variance of a median of many over that of their mean
 
 
 def threshold(count: int) -> float:
-    """In standard deviations, for each of `count` values: all together exceed it by chance with 5 % at most."""
+    """The threshold in standard deviations for each of `count` values: any exceeds it by chance with at most 5 %."""
     return float(ndtri(1 - BY_CHANCE / (2 * max(count, 1))))
 
 
 def differ_from_zero(values: Floats, uncertainties: Floats) -> Mask:
-    """Of values (n,) with standard uncertainties (n,), in the same unit; False where either is not known."""
+    """Which values (n,) with standard uncertainties (n,), in the same unit, differ from 0; False for unknown ones."""
     with np.errstate(invalid="ignore"):
         return np.abs(values) > threshold(int(np.isfinite(values).sum())) * uncertainties
 
 
 def differ_from_others(values: Floats, uncertainties: Floats) -> Mask:
-    """Each from the median of all, of two from the other: of values (n,) with standard uncertainties (n,), in the same
-    unit; False where either is not known, or where there is no other."""
-    known = np.isfinite(values) & np.isfinite(uncertainties)
-    count = int(known.sum())
+    """Which values (n,) with standard uncertainties (n,), in the same unit, differ from the median of all, or of two
+    from each other; False for unknown ones, and without another value."""
+    valid = np.isfinite(values) & np.isfinite(uncertainties)
+    count = int(valid.sum())
     differs = np.zeros(len(values), dtype=bool)
     if count == 2:
-        differs[known] = abs(np.diff(values[known])) > threshold(1) * np.linalg.norm(uncertainties[known])
+        differs[valid] = abs(np.diff(values[valid])) > threshold(1) * np.linalg.norm(uncertainties[valid])
     elif count > 2:
-        variance = uncertainties[known] ** 2
+        variance = uncertainties[valid] ** 2
         of_median = _OF_MEDIAN * np.mean(variance) / count
-        gap = np.abs(values[known] - np.median(values[known]))
-        differs[known] = gap > threshold(count) * np.sqrt(variance + of_median)
+        gap = np.abs(values[valid] - np.median(values[valid]))
+        differs[valid] = gap > threshold(count) * np.sqrt(variance + of_median)
     return differs
 
 
-FEWEST_DATES = 3  # that tell scatter from change
-_SMOOTHED = 6  # dates: of five the smoothed change is no more than a fourth surer than the difference of the two ends
-FEWEST_SENSORS = 3  # of which one can be told from the others
-_PRIOR_SENSORS = 4.0  # sensors that the stated uncertainties are worth beside the scatter that is seen
+FEWEST_DATES = 3  # needed to separate scatter from change
+_SMOOTHED = 6  # dates: with five the smoothed change is at most a fourth more precise than the difference of the ends
+FEWEST_SENSORS = 3  # needed to distinguish one from the others
+_PRIOR_SENSORS = 4.0  # weight of the stated uncertainties against the observed scatter, in sensors
 # Priors: the probability of none, and the scale. g: gains of single recordings scatter by 1 to 5 %, of which mounting
 # and amplifier are a part (PHYSICS.md, section 8); a chain that stays as it was differs by a percent from date to date,
 # seldom by three, so half-normal. q: as wide as the sensors of an array are spread (mixed_model), half-Cauchy.
@@ -72,11 +67,11 @@ _POLISHES, _HALVINGS = 60, 60
 
 @dataclass(frozen=True, eq=False)
 class ArrayLevels:
-    """Logarithms of d33 [C/N or pC/N, as given], of sensors over dates; NaN where nothing is known.
+    """Logarithms of d33 [C/N or pC/N, as given] of sensors over dates; NaN for unknown values.
 
-    `level` and `deviation` (dates,) are the array's, of the sensors `pooled` (sensors,), whose mean it is;
-    `departure` (sensors, dates) is each sensor's beside the array and its own mean, `departure_deviation` its standard
-    deviation, scatter between dates included.
+    `level` and `deviation` (dates,): mean of the sensors `pooled` (sensors,) and its standard deviation; `departure`
+    (sensors, dates): each sensor less the array and its own mean, `departure_deviation`: its standard deviation,
+    scatter between dates included.
     """
 
     level: Floats
@@ -88,8 +83,8 @@ class ArrayLevels:
 
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """Of some courses (series,) between the first and the last date of each, as logarithms: mean, standard deviation,
-    95 % interval, and the two-sided p-value of none; NaN of a course with fewer than two dates."""
+    """Changes (series,) between the first and the last date of each, as logarithms: mean, standard deviation, 95 %
+    interval, and the two-sided p-value of no change; NaN for fewer than two dates."""
 
     value: Floats
     deviation: Floats
@@ -101,17 +96,17 @@ class Changes:
 def array_levels(value: Floats, deviation: Floats) -> ArrayLevels:
     """The two-way decomposition of ln |d33| with its standard deviations, both (sensors, dates).
 
-    Levels start from medians, to which a few sensors that changed do nothing; sensors that depart beyond chance are
-    left out, and the weighted mean of the others is the array's. Dates that share no sensor with the others, directly
-    or through other dates, have no level.
+    Levels start from medians, which are robust to a few changed sensors; significantly departing sensors are left out,
+    and the weighted mean of the others is the array's. Dates that share no sensor with the others, directly or through
+    other dates, have no level.
     """
-    known = np.isfinite(value) & np.isfinite(deviation)
-    joined = _joined_dates(known)
-    known &= joined & ((known & joined).sum(axis=1) > 1)[:, None]
-    u = np.where(known, np.maximum(deviation, _LEAST_DEVIATION), 1.0)
-    y = np.where(known, value, 0.0)
-    rest = _polished(y, known, known / u**2)
-    score, freedom = (rest**2 * known / u**2).sum(axis=1), known.sum(axis=1) - 1
+    valid = np.isfinite(value) & np.isfinite(deviation)
+    connected = _connected_dates(valid)
+    valid &= connected & ((valid & connected).sum(axis=1) > 1)[:, None]
+    u = np.where(valid, np.maximum(deviation, _LEAST_DEVIATION), 1.0)
+    y = np.where(valid, value, 0.0)
+    residual = _median_polished(y, valid, valid / u**2)
+    score, freedom = (residual**2 * valid / u**2).sum(axis=1), valid.sum(axis=1) - 1
     scatter = _scatter_of_others(score, freedom)
     counted = freedom > 0
     departs = np.zeros(len(value), dtype=bool)
@@ -119,48 +114,48 @@ def array_levels(value: Floats, deviation: Floats) -> ArrayLevels:
         chance = chdtrc(np.maximum(freedom, 1), score / scatter**2)
         departs = counted & (chance < BY_CHANCE / counted.sum())
     pooled = counted & ~departs
-    level, of_level = _weighted(y, known & pooled[:, None], u * scatter[:, None])
-    has = known & np.isfinite(level)
-    off = np.where(has, y - np.where(has, level, 0.0), 0.0)
-    weight = has / u**2
+    level, of_level = _weighted(y, valid & pooled[:, None], u * scatter[:, None])
+    levelled = valid & np.isfinite(level)
+    off = np.where(levelled, y - np.where(levelled, level, 0.0), 0.0)
+    weight = levelled / u**2
     mean = (weight * off).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300)
-    own = np.hypot(u * scatter[:, None], np.where(has, of_level, 0.0))
+    total_deviation = np.hypot(u * scatter[:, None], np.where(levelled, of_level, 0.0))
     anchor = float(mean[pooled].mean()) if pooled.any() else 0.0
     return ArrayLevels(
         level + anchor,
         of_level,
         pooled,
-        np.where(has, off - mean[:, None], np.nan),
-        np.where(has, own, np.nan),
+        np.where(levelled, off - mean[:, None], np.nan),
+        np.where(levelled, total_deviation, np.nan),
     )
 
 
 def changes(time: Floats, value: Floats, deviation: Floats, *, gain_scatters: bool) -> Changes:
-    """Those of courses (series, dates), NaN where a course has no value, with standard deviations; `time` (dates,)
-    rises, in any unit. `gain_scatters`: whether dates have a gain error that the deviations do not hold, as those of
-    an array do; what a sensor has besides the array has none.
+    """The changes of series (series, dates), NaN for missing values, with standard deviations; `time` (dates,) rises,
+    in any unit. `gain_scatters`: whether dates have a gain error not in the deviations, as for an array; departures of
+    sensors from the array have none.
 
     The random walk is a Kalman filter over y and the columns of m and b; the rest is generalised least squares.
     """
-    known = np.isfinite(value) & np.isfinite(deviation)
-    begin, end = np.argmax(known, axis=1), known.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
-    enough = (known.sum(axis=1) > 1) & (time[end] > time[begin])
-    span = np.where(enough, time[end] - time[begin], 1.0)
-    t = np.clip((time - time[begin][:, None]) / span[:, None], 0.0, 1.0)
-    y, u = np.where(known, value, 0.0), np.where(known, deviation, 1.0)
+    valid = np.isfinite(value) & np.isfinite(deviation)
+    first, last = np.argmax(valid, axis=1), valid.shape[1] - 1 - np.argmax(valid[:, ::-1], axis=1)
+    determined = (valid.sum(axis=1) > 1) & (time[last] > time[first])
+    span = np.where(determined, time[last] - time[first], 1.0)
+    t = np.clip((time - time[first][:, None]) / span[:, None], 0.0, 1.0)
+    y, u = np.where(valid, value, 0.0), np.where(valid, deviation, 1.0)
     gains = _NODES if gain_scatters else _NODES[:1]
     walk, gain = (grid.ravel() for grid in np.meshgrid(_NODES, gains, indexing="ij"))
-    weights, *of_course = _posterior(t, y, u, known, walk, gain)
+    weights, *smoothed = _posterior(t, y, u, valid, walk, gain)
     rows = np.arange(len(value))
-    apart = (y[rows, end] - y[rows, begin])[:, None] + np.zeros(len(gain))
-    of_ends = apart, np.sqrt((u[rows, end] ** 2 + u[rows, begin] ** 2)[:, None] + 2 * gain**2)
-    few = known.sum(axis=1) < _SMOOTHED
-    stated = np.where(few, *(_summary(weights, mean, spread) for mean, spread in (of_ends, of_course)))
-    return Changes(*(np.where(enough, column, np.nan) for column in stated))
+    difference = (y[rows, last] - y[rows, first])[:, None] + np.zeros(len(gain))
+    differences = difference, np.sqrt((u[rows, last] ** 2 + u[rows, first] ** 2)[:, None] + 2 * gain**2)
+    few = valid.sum(axis=1) < _SMOOTHED
+    stated = np.where(few, *(_summary(weights, mean, spread) for mean, spread in (differences, smoothed)))
+    return Changes(*(np.where(determined, column, np.nan) for column in stated))
 
 
 def _summary(weights: Floats, mean: Floats, spread: Floats) -> Floats:
-    """Of mixtures of normals (series, nodes): mean, standard deviation, interval, p-value (5, series)."""
+    """Mean, standard deviation, interval and p-value (5, series) of mixtures of normals (series, nodes)."""
     centre = (weights * mean).sum(axis=1)
     variance = (weights * (spread**2 + (mean - centre[:, None]) ** 2)).sum(axis=1)
     low, high = (_quantile(weights, mean, spread, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
@@ -168,35 +163,37 @@ def _summary(weights: Floats, mean: Floats, spread: Floats) -> Floats:
     return np.array([centre, np.sqrt(variance), low, high, 2 * np.minimum(below, 1 - below)])
 
 
-def _joined_dates(known: Mask) -> Mask:
-    """Of the dates that are joined to one another by common sensors the largest group (dates,)."""
-    shared = (known.astype(float).T @ known.astype(float)) > 0
-    left, best = set(range(known.shape[1])), np.zeros(known.shape[1], dtype=bool)
-    while left:
-        group = np.zeros(known.shape[1], dtype=bool)
-        group[left.pop()] = True
+def _connected_dates(valid: Mask) -> Mask:
+    """The largest group of dates (dates,) connected by common sensors."""
+    shared = (valid.astype(float).T @ valid.astype(float)) > 0
+    remaining, largest = set(range(valid.shape[1])), np.zeros(valid.shape[1], dtype=bool)
+    while remaining:
+        group = np.zeros(valid.shape[1], dtype=bool)
+        group[remaining.pop()] = True
         while (wider := group | shared[group].any(axis=0)).sum() > group.sum():
             group = wider
-        left -= set(np.flatnonzero(group).tolist())
-        best = group if group.sum() > best.sum() else best
-    return best
+        remaining -= set(np.flatnonzero(group).tolist())
+        largest = group if group.sum() > largest.sum() else largest
+    return largest
 
 
-def _polished(y: Floats, known: Mask, weight: Floats) -> Floats:
-    """What is left of y beside each date's weighted median and each sensor's weighted mean (sensors, dates)."""
-    rest = np.where(known, y, 0.0)
+def _median_polished(y: Floats, valid: Mask, weight: Floats) -> Floats:
+    """The residual of y after each date's weighted median and each sensor's weighted mean (sensors, dates)."""
+    residual = np.where(valid, y, 0.0)
     total = np.maximum(weight.sum(axis=1), 1e-300)
     for _ in range(_POLISHES):
-        rest = np.where(known, rest - ((weight * rest).sum(axis=1) / total)[:, None], 0.0)
-        medians = np.array([_median(rest[own, date], weight[own, date]) for date, own in enumerate(known.T)])
-        rest = np.where(known, rest - medians, 0.0)
+        residual = np.where(valid, residual - ((weight * residual).sum(axis=1) / total)[:, None], 0.0)
+        medians = np.array(
+            [_median(residual[recorded, date], weight[recorded, date]) for date, recorded in enumerate(valid.T)]
+        )
+        residual = np.where(valid, residual - medians, 0.0)
         if np.abs(medians).max(initial=0.0) < _LEAST_DEVIATION:
             break
-    return np.where(known, rest - ((weight * rest).sum(axis=1) / total)[:, None], 0.0)
+    return np.where(valid, residual - ((weight * residual).sum(axis=1) / total)[:, None], 0.0)
 
 
 def _median(values: Floats, weights: Floats) -> float:
-    """That by weights: between values, at half of the weight; 0 of none."""
+    """The weighted median, interpolated at half of the weight; 0 for no values."""
     if not len(values):
         return 0.0
     order = np.argsort(values)
@@ -205,40 +202,39 @@ def _median(values: Floats, weights: Floats) -> float:
 
 
 def _scatter_of_others(score: Floats, freedom: Floats) -> Floats:
-    """By how much the other sensors scatter from date to date over their uncertainties (sensors,): these allow for a
-    gain that scatters as rigs' may, and sensors tell how much it does here. The median of squares, so that a second
-    sensor that departs tells nothing of the scatter."""
+    """The scatter of the other sensors from date to date relative to their uncertainties (sensors,), which assume the
+    gain scatter of a usual rig. The median of squares is used, so that a second departing sensor has no effect."""
     counted = freedom > 0
     if counted.sum() < FEWEST_SENSORS:
         return np.ones(len(score))
     usual = np.where(counted, score / np.where(counted, chdtri(np.maximum(freedom, 1), 0.5), 1.0), np.nan)
-    typical = np.array([np.nanmedian(np.delete(usual, place)) for place in range(len(score))])
+    typical = np.array([np.nanmedian(np.delete(usual, sensor)) for sensor in range(len(score))])
     others = counted.sum() - 1
     return np.sqrt((_PRIOR_SENSORS + others * typical) / (_PRIOR_SENSORS + others))
 
 
-def _weighted(y: Floats, known: Mask, deviation: Floats) -> tuple[Floats, Floats]:
+def _weighted(y: Floats, valid: Mask, deviation: Floats) -> tuple[Floats, Floats]:
     """Each date's level, of mean 0 over dates, and its standard deviation by weighted least squares; NaN without a
     sensor."""
-    weight = known / deviation**2
+    weight = valid / deviation**2
     of_sensor = np.maximum(weight.sum(axis=1), 1e-300)
     information = np.diag(weight.sum(axis=0)) - weight.T @ (weight / of_sensor[:, None])
     mean = (weight * y).sum(axis=1) / of_sensor
     inverse = np.linalg.pinv(information, hermitian=True)
     level = inverse @ (weight * (y - mean[:, None])).sum(axis=0)
     total = weight.sum(axis=0)
-    seen = np.flatnonzero(total > 0)
+    recorded_dates = np.flatnonzero(total > 0)
     with np.errstate(divide="ignore"):
-        apart = np.where(total > 0, total**-0.5, np.nan)
-    if len(seen) > 1:  # as if dates were independent, with the contrast of the two ends as it is
-        ends = seen[[0, -1]]
+        deviation_of_level = np.where(total > 0, total**-0.5, np.nan)
+    if len(recorded_dates) > 1:  # as if dates were independent, with the contrast of the two ends as it is
+        ends = recorded_dates[[0, -1]]
         contrast = float(np.array([-1.0, 1.0]) @ inverse[np.ix_(ends, ends)] @ np.array([-1.0, 1.0]))
-        apart *= np.sqrt(contrast / float((apart[ends] ** 2).sum()))
-    return np.where(total > 0, level, np.nan), apart
+        deviation_of_level *= np.sqrt(contrast / float((deviation_of_level[ends] ** 2).sum()))
+    return np.where(total > 0, level, np.nan), deviation_of_level
 
 
 def _posterior(
-    t: Floats, value: Floats, deviation: Floats, known: Mask, walk: Floats, gain: Floats
+    t: Floats, value: Floats, deviation: Floats, valid: Mask, walk: Floats, gain: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Weight, mean and standard deviation of b + w(1) at each node of (q, g), (series, nodes) each."""
     columns = np.stack([value, np.ones_like(value), t], axis=2)
@@ -250,10 +246,10 @@ def _posterior(
         if date:
             variance = variance + walk**2 * (t[:, date] - t[:, date - 1])[:, None]
         total = variance + gain**2 + np.maximum(deviation[:, [date]], _LEAST_DEVIATION) ** 2
-        weight = known[:, [date]] / total
+        weight = valid[:, [date]] / total
         innovation = columns[:, date, None, :] - at
         products += (weight[..., None] * innovation)[..., None] * innovation[..., None, :]
-        log_volume += known[:, [date]] * np.log(total)
+        log_volume += valid[:, [date]] * np.log(total)
         towards = variance * weight
         at = at + towards[..., None] * innovation
         variance = variance * (1 - towards)
@@ -264,7 +260,7 @@ def _posterior(
     squares = products[..., 0, 0] - (moment * line).sum(axis=2)
     density = -0.5 * (log_volume + np.linalg.slogdet(information)[1] + squares) + _log_prior(walk, gain)
     plain = (walk == 0) & (gain == 0)
-    density = np.where((known.sum(axis=1) < FEWEST_DATES)[:, None] & ~plain, -np.inf, density)
+    density = np.where((valid.sum(axis=1) < FEWEST_DATES)[:, None] & ~plain, -np.inf, density)
     weights = np.exp(density - density.max(axis=1, keepdims=True))
     spread = variance + np.einsum("sni,snij,snj->sn", contrast, inverse, contrast)
     mean = at[..., 0] + (line * contrast).sum(axis=2)
@@ -284,7 +280,7 @@ def _log_prior(walk: Floats, gain: Floats) -> Floats:
 
 
 def _quantile(weights: Floats, mean: Floats, deviation: Floats, probability: float) -> Floats:
-    """That of each mixture of normals (series, nodes), by bisection."""
+    """The quantile of each mixture of normals (series, nodes), by bisection."""
     reach = float(ndtri(1 - 1e-9)) * deviation
     low, high = (mean - reach).min(axis=1), (mean + reach).max(axis=1)
     for _ in range(_HALVINGS):

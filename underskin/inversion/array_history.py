@@ -1,8 +1,5 @@
-"""The history of an array, in numbers and in words.
-
-What d33 of an array did over some dates, as a clause. d33 of the sensors of a skin over its campaigns: what the array
-did, and which sensors depart from it or died.
-"""
+"""The history of an array's d33 over campaigns: its change, and the sensors that depart from it or died, with
+sentences."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -28,10 +25,10 @@ def array_change_in_words(
 ) -> str:
     """ "d33 of the array fell by 7.8 % (95 %: 7.1 to 8.5) in 182 days, between 2017-05-02 and … (14.29, … pC/N)".
 
-    `value`, `low` and `high` are relative, with the 95 % interval; `d33` [pC/N] is that of each date.
+    `value` with the 95 % interval `low` to `high` is relative; `d33` [pC/N] is that of each date.
     """
     span = between if days is None else f"in {days} day{'' if days == 1 else 's'}, {between}"
-    values = f"{', '.join(f'{one:.4g}' for one in d33)} pC/N"
+    values = f"{', '.join(f'{level:.4g}' for level in d33)} pC/N"
     if low * high <= 0:
         sizes = f"{100 * value:+.1f} % (95 %: {100 * low:+.1f} to {100 * high:+.1f})"
         return f"d33 of the array did not change beyond chance {span}: by {sizes}, {values}"
@@ -47,10 +44,9 @@ def departures_in_words(
     *,
     few_dates: bool,
 ) -> str:
-    """The clause on the array, then the sensors that depart from it (relative change, low, high), and those that are
-    dead since a date."""
-    left_out = [sensor for sensor, *_ in departures]
-    without = f" without {', '.join(left_out[:_MOST_NAMED])}" if 0 < len(left_out) <= _MOST_NAMED else ""
+    """The clause on the array, then the departing sensors (relative change, low, high), and those dead since a date."""
+    departing = [sensor for sensor, *_ in departures]
+    without = f" without {', '.join(departing[:_MOST_NAMED])}" if 0 < len(departing) <= _MOST_NAMED else ""
     parts = [of_array.replace("d33 of the array", f"d33 of the array{without}", 1)]
     if few_dates:
         parts.append(TWO_DATES)
@@ -59,7 +55,7 @@ def departures_in_words(
         for sensor, value, low, high in departures[:_MOST_NAMED]
     ]
     parts += [f"{sensor} is dead since {date}" for sensor, date in list(dead.items())[:_MOST_NAMED]]
-    more = sum(max(len(each) - _MOST_NAMED, 0) for each in (departures, dead))
+    more = sum(max(len(sensors) - _MOST_NAMED, 0) for sensors in (departures, dead))
     return "; ".join([*parts, *([f"and {more} more sensors"] if more else [])])
 
 
@@ -68,8 +64,8 @@ _DAY_S = 86400.0
 
 @dataclass(frozen=True)
 class Departure:
-    """The relative change of a sensor's d33 beside the array's between its first and last campaign, with its 95 %
-    interval; whether it is beyond chance over all sensors (Holm)."""
+    """The change of a sensor's d33 relative to the array's between its first and last campaign, with its 95 % interval;
+    whether it is significant over all sensors (Holm)."""
 
     sensor: str
     value: float
@@ -97,17 +93,17 @@ class ArrayHistory:
 
     @property
     def significant(self) -> bool:
-        """Whether the interval of the change leaves out that there is none."""
+        """Whether the interval of the change excludes 0."""
         return self.low * self.high > 0
 
 
 def array_history(
     sensors: Sequence[str], moments: Sequence[datetime], d33: Floats, uncertainty: Floats
 ) -> ArrayHistory | None:
-    """Of campaigns in the order of their times, d33 with its standard uncertainty [pC/N] (sensors, campaigns), NaN
-    where there is none; None where fewer than two campaigns, a day apart at least, share a sensor that answers.
+    """The history from d33 with its standard uncertainty [pC/N] (sensors, campaigns), campaigns in order of time, NaN
+    for missing values; None where fewer than two campaigns, at least a day apart, share a responding sensor.
 
-    A sensor that shows no charge beyond noise is left out of what is said of the array from then on.
+    A sensor without charge beyond noise is excluded from the array from then on.
     """
     if len(moments) < 2:
         return None
@@ -116,24 +112,28 @@ def array_history(
         value = np.where(alive, np.log(np.abs(d33)), np.nan)
         deviation = np.where(alive, uncertainty / np.abs(d33), np.nan)
     levels = array_levels(value, deviation)
-    has = np.flatnonzero(np.isfinite(levels.level))
+    dated = np.flatnonzero(np.isfinite(levels.level))
     times = np.array([moment.timestamp() for moment in moments]) / _DAY_S
-    if len(has) < 2 or times[has[-1]] - times[has[0]] < 1:
+    if len(dated) < 2 or times[dated[-1]] - times[dated[0]] < 1:
         return None
-    change = changes(times[has], levels.level[None, has], levels.deviation[None, has], gain_scatters=True)
+    change = changes(times[dated], levels.level[None, dated], levels.deviation[None, dated], gain_scatters=True)
     size, low, high = (float(np.expm1(part[0])) for part in (change.value, change.low, change.high))
     departures = _departures(sensors, times, levels.departure, levels.departure_deviation)
     dead = _dead_since(sensors, alive, np.isfinite(d33))
-    of_array = np.exp(levels.level[has])
-    days = round(float(times[has[-1]] - times[has[0]]))
-    first, last = (moments[place].strftime("%Y-%m-%d") for place in has[[0, -1]])
-    said = array_change_in_words(size, low, high, of_array.tolist(), f"between {first} and {last}", days)
-    told = [(one.sensor, one.value, one.low, one.high) for one in departures if one.significant]
+    of_array = np.exp(levels.level[dated])
+    days = round(float(times[dated[-1]] - times[dated[0]]))
+    first, last = (moments[date].strftime("%Y-%m-%d") for date in dated[[0, -1]])
+    array_clause = array_change_in_words(size, low, high, of_array.tolist(), f"between {first} and {last}", days)
+    significant = [
+        (departure.sensor, departure.value, departure.low, departure.high)
+        for departure in departures
+        if departure.significant
+    ]
     died = {sensor: moments[number].strftime("%Y-%m-%d") for sensor, number in dead.items()}
     return ArrayHistory(
-        tuple(has.tolist()),
+        tuple(dated.tolist()),
         of_array,
-        of_array * levels.deviation[has],
+        of_array * levels.deviation[dated],
         tuple(name for name, counts in zip(sensors, levels.pooled, strict=True) if counts),
         days,
         size,
@@ -141,36 +141,36 @@ def array_history(
         high,
         departures,
         dead,
-        departures_in_words(said, told, died, few_dates=len(has) < FEWEST_DATES and low * high > 0),
+        departures_in_words(array_clause, significant, died, few_dates=len(dated) < FEWEST_DATES and low * high > 0),
     )
 
 
 def _alive(d33: Floats, uncertainty: Floats) -> Mask:
-    """Which sensors answer (sensors, campaigns), beside those of the same campaign."""
+    """Which sensors respond (sensors, campaigns), compared with those of the same campaign."""
     columns = [is_alive(value, of_value) for value, of_value in zip(d33.T, uncertainty.T, strict=True)]
     return np.array(columns, dtype=bool).T.reshape(d33.shape)
 
 
-def _dead_since(sensors: Sequence[str], alive: Mask, told: Mask) -> dict[str, int]:
-    """The sensors that are dead in the last campaign that has them, with the first one since they are."""
-    found: dict[str, int] = {}
-    for name, own, has in zip(sensors, alive, told, strict=True):
-        recorded: Indices = np.flatnonzero(has)
-        answered = np.flatnonzero(own & has)
-        if len(recorded) and not own[recorded[-1]]:
-            after = recorded if not len(answered) else recorded[recorded > answered[-1]]
-            found[name] = int(after[0])
-    return found
+def _dead_since(sensors: Sequence[str], alive: Mask, recorded: Mask) -> dict[str, int]:
+    """The sensors that are dead in their last campaign, with the first campaign of that state."""
+    dead_since: dict[str, int] = {}
+    for name, alive_dates, recorded_dates in zip(sensors, alive, recorded, strict=True):
+        present: Indices = np.flatnonzero(recorded_dates)
+        responded = np.flatnonzero(alive_dates & recorded_dates)
+        if len(present) and not alive_dates[present[-1]]:
+            after = present if not len(responded) else present[present > responded[-1]]
+            dead_since[name] = int(after[0])
+    return dead_since
 
 
 def _departures(sensors: Sequence[str], times: Floats, value: Floats, deviation: Floats) -> tuple[Departure, ...]:
-    """Of the sensors with two campaigns at least, where there are enough to tell one from the others."""
-    found = changes(times, value, deviation, gain_scatters=False)
-    rows = np.flatnonzero(np.isfinite(found.value)).tolist()
+    """The departures of sensors with at least two campaigns; empty with fewer than FEWEST_SENSORS of them."""
+    estimates = changes(times, value, deviation, gain_scatters=False)
+    rows = np.flatnonzero(np.isfinite(estimates.value)).tolist()
     if len(rows) < FEWEST_SENSORS:
         return ()
-    adjusted = holm(found.p_value[rows].tolist())
-    ends = np.expm1(np.column_stack([found.value, found.low, found.high])[rows]).tolist()
+    adjusted = holm(estimates.p_value[rows].tolist())
+    ends = np.expm1(np.column_stack([estimates.value, estimates.low, estimates.high])[rows]).tolist()
     return tuple(
         Departure(sensors[row], value, low, high, chance < SIGNIFICANT)
         for row, (value, low, high), chance in zip(rows, ends, adjusted, strict=True)

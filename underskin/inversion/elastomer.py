@@ -1,5 +1,6 @@
-"""The elastomer's modulus from the same bench, of each recording: a compressed or pulled sample, or a sphere pressed in
-(recordings/modulus.py). Curves are read as curve_preparation leaves them."""
+"""The elastomer's modulus from curves of the same bench: a compressed or pulled sample, or an indented one, each
+recording separately (recordings/modulus.py). Curves are prepared by curve_preparation.
+"""
 
 from dataclasses import dataclass
 
@@ -7,14 +8,14 @@ import numpy as np
 
 from underskin.errors import InvalidInput, unusable
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
-from underskin.recordings.curve_preparation import prepared, require_own_columns
+from underskin.recordings.curve_preparation import prepared, reject_exchanged_columns
 from underskin.recordings.modulus import CompressionModulus, IndentationModulus, of_compression, of_indentation
 from underskin.surrogate.contact_table import load_contact
 
 
 @dataclass(frozen=True)
 class RecordingModulus:
-    """What a recording says of the elastomer; `result` is the reason where it says nothing."""
+    """The modulus of a recording, or in `result` the reason why there is none."""
 
     recording: str
     kind: str
@@ -22,14 +23,14 @@ class RecordingModulus:
 
 
 def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
-    """What each recording of kind `compression` or `indentation` says of the elastomer."""
+    """The modulus by each recording of kind `compression` or `indentation`."""
     moduli = []
     skin = campaign.skin
     for recording in prepared(campaign).campaign.recordings:
         result: CompressionModulus | IndentationModulus | InvalidInput
         try:
             if isinstance(recording, CompressionRecording | IndentationRecording):
-                require_own_columns(recording)
+                reject_exchanged_columns(recording)
             if isinstance(recording, CompressionRecording):
                 _require_height(recording)
                 result = of_compression(recording)
@@ -48,7 +49,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
 
 
 def _require_height(recording: CompressionRecording) -> None:
-    """Raises InvalidInput where a block would be pressed by more than its height, from where its force is least."""
+    """Raise InvalidInput where the displacement of a block, from its least force on, exceeds its height."""
     if len(recording.displacement_mm) != len(recording.force_n):
         return
     rest = recording.displacement_mm[np.argmin(np.abs(recording.force_n))]

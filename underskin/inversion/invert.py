@@ -1,23 +1,16 @@
-"""d33 of the sensors of a campaign, with what stands out among them.
+"""d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and for
+the campaign (Seminara 2018, section 3.2 and equation 15).
 
-Sensors that stand out of their array, each with the reason: dead, inverted, weak, strong, noisy or bent.
+Each recording's Re FRF, corrected for the common delay and the bias by noise, is averaged over the flat zone and
+divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then estimates the scatter of recordings, and so the
+precision of each d33. These intervals are relative: they hold for the declared skin and the base model.
+`declared_percent` is the standard deviation of all d33 together by the tolerances of the declared thickness, sensor
+radius and modulus; `absolute_d33` includes it.
 
-Recordings that are far off the others of their sensor: a slip of units, or a wrong range of an instrument.
-
-One of them would dominate the array's d33, since the mixed model takes recordings to be log-normal about their sensor's
-d33. What a skin may really do is no outlier: an effect of a condition on all sensors, the scatter that the array shows,
-and the effect of a misplaced sphere on a recording beside the centre.
-
-Findings on a campaign's FRF recordings and their d33, which are used all the same.
-
-d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and
-for the campaign (Seminara 2018, section 3.2 and equation 15).
-
-Each recording's Re FRF, without the delay that all share and the bias by noise in its channels, is averaged over the
-flat zone and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then says how far the recordings
-scatter, and so how well each d33 is known. These intervals are relative: they hold for the skin as declared and the
-base model as it stands. `declared_percent` is the standard deviation of all d33 together by the tolerances of the
-declared thickness, sensor radius and modulus; `absolute_d33` includes it.
+Recordings far off the others of their sensor (a slip of units, a wrong range) are left out, since the mixed model
+assumes log-normal recordings about their sensor's d33. What a skin may show is no outlier: an effect of a condition on
+all sensors, the scatter of the array, and the effect of a misplaced sphere. Sensors that stand out of the array (dead,
+inverted, weak, strong, noisy or bent) are flagged with the reason. Findings are used all the same.
 """
 
 from collections.abc import Mapping, Sequence
@@ -55,13 +48,13 @@ _OUTLYING = 5.0  # robust deviations
 _WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
 _LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not distinguished
 _NOISY = 3.0  # times the array's
-_LEAST_BEND = 0.05  # of d33
+_LEAST_CURVATURE = 0.05  # of d33
 _FALSE_ALARMS = 1e-3  # per array
 
 
 @dataclass(frozen=True)
 class Flag:
-    """A sensor that stands out of its array, why, and the values that the sentence states."""
+    """A sensor that stands out of its array, the reason, and the values of its sentence."""
 
     sensor: str
     flagged_for: Reason
@@ -84,22 +77,22 @@ class Flag:
 
 
 def typical_size(d33: Floats) -> float:
-    """The median magnitude of recordings that show any charge: dead sensors may give exact zeros."""
+    """The median magnitude of recordings with any charge: dead sensors may give exact zeros."""
     size = np.abs(d33)
     return float(np.median(size[size >= 1e-9 * size.max()]))
 
 
 def is_alive(value: Floats, deviation: Floats) -> Mask:
-    """Which sensors (sensors,) answer beyond noise, and with more than a twentieth of the others' d33."""
+    """Which sensors (sensors,) respond beyond noise, and with more than a twentieth of the others' d33."""
     size = np.abs(value)
     return np.asarray(size > np.maximum(_DEAD * _typical(size, deviation), 3 * deviation))
 
 
 def _typical(size: Floats, deviation: Floats) -> float:
-    """The median of those beyond noise; of all where none is, NaN where nothing is known."""
+    """The median of values beyond noise; of all where none is, NaN without any."""
     beyond = size > 3 * deviation
-    known = size[beyond] if beyond.any() else size[np.isfinite(size)]
-    return float(np.median(known)) if len(known) else float("nan")
+    sizes = size[beyond] if beyond.any() else size[np.isfinite(size)]
+    return float(np.median(sizes)) if len(sizes) else float("nan")
 
 
 def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Floats) -> tuple[dict[int, Flag], Floats]:
@@ -134,19 +127,19 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
     sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
     spread = max(1.4826 * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
     flags: dict[int, Flag] = {}
-    for number in np.flatnonzero(np.isfinite(value)).tolist():
-        outlying = alive.sum() > 3 and abs(size[number] - array) > _OUTLYING * spread
-        if not alive[number]:
+    for index in np.flatnonzero(np.isfinite(value)).tolist():
+        outlying = alive.sum() > 3 and abs(size[index] - array) > _OUTLYING * spread
+        if not alive[index]:
             reason = Reason.DEAD
-        elif value[number] * sign < 0:
+        elif value[index] * sign < 0:
             reason = Reason.INVERTED
-        elif outlying and size[number] < _WEAK * array:
+        elif outlying and size[index] < _WEAK * array:
             reason = Reason.WEAK
-        elif outlying and size[number] > _STRONG * array:
+        elif outlying and size[index] > _STRONG * array:
             reason = Reason.STRONG
         else:
             continue
-        flags[number] = Flag(ids[number], reason, {"percent": float(100 * value[number] * sign / array)})
+        flags[index] = Flag(ids[index], reason, {"percent": float(100 * value[index] * sign / array)})
     pilot = np.full(count, array)
     pilot[list(flags)] = np.maximum(size[list(flags)], _LEAST_PILOT * array)
     return flags, pilot
@@ -155,24 +148,26 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
 def scatter_flags(
     ids: tuple[str, ...], sensor: Indices, rows: "RecordingD33", good: Indices, pilot: Floats, expected: Floats
 ) -> list[Flag]:
-    """Sensors whose lines or recordings scatter, or whose d33 bends with preload, beyond their array's.
+    """Sensors whose lines or recordings scatter, or whose d33 is non-linear in preload, beyond their array's.
 
-    `good` are the rows looked at; `sensor` and `expected`, the relative scatter that the mixed model gives each
-    recording, are theirs.
+    `good` are the rows considered; `sensor` and `expected`, the relative scatter of each recording by the mixed model,
+    are theirs.
     """
     numbers, member = np.unique(sensor, return_inverse=True)
     level = rows.d33[good] / pilot[sensor]
     lines = rows.line_scatter[good] * np.abs(level)
     line_of = np.array([np.median(lines[member == index]) for index in range(len(numbers))])
     usual = float(np.median(line_of))
-    rest = _beyond_common(level, member, rows.condition[good])
+    residual = _beyond_common(level, member, rows.condition[good])
     alarm = _FALSE_ALARMS / len(numbers)
     flags = []
-    for index, name in enumerate(ids[number] for number in numbers):
-        own = member == index
-        bend, chance, scatter, freedom = _bend(rest[own], rows.preload[good][own], expected[own])
-        if chance < alarm and abs(bend) > _LEAST_BEND:
-            flags.append(Flag(name, Reason.BENT, {"percent": 100 * bend}))
+    for index, name in enumerate(ids[sensor_index] for sensor_index in numbers):
+        of_sensor = member == index
+        curvature, chance, scatter, freedom = _curvature(
+            residual[of_sensor], rows.preload[good][of_sensor], expected[of_sensor]
+        )
+        if chance < alarm and abs(curvature) > _LEAST_CURVATURE:
+            flags.append(Flag(name, Reason.BENT, {"percent": 100 * curvature}))
         if len(numbers) > 2 and line_of[index] > _NOISY * usual:
             flags.append(Flag(name, Reason.NOISY_LINES, {"times": float(line_of[index] / usual)}))
         elif scatter > _NOISY and chdtrc(freedom, freedom * scatter**2) < alarm:
@@ -181,42 +176,42 @@ def scatter_flags(
 
 
 def _beyond_common(level: Floats, member: Indices, condition: Indices) -> Floats:
-    """Each recording over its sensor's median, less what its condition does to all sensors (three or more)."""
+    """Each recording over its sensor's median, less the effect of its condition common to three or more sensors."""
     median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
-    own = level / median[member]
-    rest = own - 1
-    for number in np.unique(condition):
-        alike = condition == number
-        if len(np.unique(member[alike])) > 2:
-            rest[alike] = own[alike] - np.median(own[alike])
-    return rest
+    relative = level / median[member]
+    residual = relative - 1
+    for index in np.unique(condition):
+        of_condition = condition == index
+        if len(np.unique(member[of_condition])) > 2:
+            residual[of_condition] = relative[of_condition] - np.median(relative[of_condition])
+    return residual
 
 
-def _bend(rest: Floats, preload: Floats, expected: Floats) -> tuple[float, float, float, int]:
-    """Curvature over the range of preloads, the chance of one as large, the scatter about the curve over the one
-    expected, and its degrees of freedom."""
-    if len(rest) < 6 or len(np.unique(preload)) < 3:
-        freedom = max(1, len(rest) - 1)
-        return 0.0, 1.0, float(np.sqrt(np.sum((rest / expected) ** 2) / freedom)), freedom
+def _curvature(residual: Floats, preload: Floats, expected: Floats) -> tuple[float, float, float, int]:
+    """Curvature over the range of preloads, its p-value, the scatter about the curve over the expected one, and its
+    degrees of freedom."""
+    if len(residual) < 6 or len(np.unique(preload)) < 3:
+        freedom = max(1, len(residual) - 1)
+        return 0.0, 1.0, float(np.sqrt(np.sum((residual / expected) ** 2) / freedom)), freedom
     x = (2 * preload - preload.min() - preload.max()) / (preload.max() - preload.min())
     basis = np.column_stack([np.ones_like(x), x, (3 * x**2 - 1) / 2]) / expected[:, None]
-    coefficients = np.linalg.lstsq(basis, rest / expected, rcond=None)[0]
-    freedom = len(rest) - 3
-    scatter = float(np.sqrt(np.sum((rest / expected - basis @ coefficients) ** 2) / freedom))
+    coefficients = np.linalg.lstsq(basis, residual / expected, rcond=None)[0]
+    freedom = len(residual) - 3
+    scatter = float(np.sqrt(np.sum((residual / expected - basis @ coefficients) ** 2) / freedom))
     deviation = max(scatter, 1.0) * float(np.sqrt(np.linalg.pinv(basis.T @ basis)[2, 2]))
     chance = 2 * stdtr(freedom, -abs(coefficients[2]) / deviation)
     return 1.5 * float(coefficients[2]), float(chance), scatter, freedom
 
 
 _FAR = 8.0  # deviations
-_LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are looked at
-_ENOUGH = 3  # recordings for a sensor, sensors for a condition, to have a median that one of them does not rule
+_LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are considered
+_ENOUGH = 3  # recordings of a sensor, or sensors of a condition, for a median robust to one of them
 
 
 def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, position: Floats) -> Mask:
     """Which recordings lie more than 8 robust deviations from their sensor's d33, less the effect of their condition.
 
-    Where all recordings of a sensor are, the sensor is off and none of its recordings is an outlier.
+    Where all recordings of a sensor do, the sensor is off and none of its recordings is an outlier.
 
     Parameters
     ----------
@@ -225,45 +220,46 @@ def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, po
     d33, noise : (recordings,) arrays
         d33 of each recording and its standard uncertainty by line noise [C/N].
     position : (recordings,) array
-        Relative deviation of each recording where the sphere is misplaced as far as spheres are.
+        Relative deviation of each recording for the largest usual misplacement of the sphere.
 
     Returns
     -------
     (recordings,) array of bool
     """
     array = typical_size(d33)
-    own = _over_usual(sensor, d33, array)
-    rest = own - _common(sensor, condition, own)
-    scatter = 1.4826 * float(np.median(np.abs(rest)))
+    relative = _over_usual(sensor, d33, array)
+    residual = relative - _common(sensor, condition, relative)
+    scatter = 1.4826 * float(np.median(np.abs(residual)))
     expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
-    far: Mask = np.abs(rest) > _FAR * np.maximum(scatter, expected)
-    for number in np.unique(sensor[far]):
-        if far[sensor == number].all():
-            far[sensor == number] = False
+    far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
+    for index in np.unique(sensor[far]):
+        if far[sensor == index].all():
+            far[sensor == index] = False
     return far
 
 
 def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
-    """Each recording over what is usual with its sensor, or with the array where the sensor has few recordings.
+    """Each recording over the median of its sensor, or of the array where the sensor has few recordings.
 
-    A dead sensor's recordings are 1 + their distance from its own, in units of the array's.
+    A dead sensor's recordings are 1 + their distance from its median, in units of the array's d33.
     """
     over = d33 / array
-    for number in np.unique(sensor):
-        same = sensor == number
+    for index in np.unique(sensor):
+        same = sensor == index
         if same.sum() >= _ENOUGH:
             middle = float(np.median(d33[same]))
             over[same] = 1 + (d33[same] - middle) / (middle if abs(middle) > _LEAST_DEVIATION * array else array)
     return over
 
 
-def _common(sensor: Indices, condition: Indices, own: Floats) -> Floats:
-    """What the condition of each recording makes of all sensors'; their overall median where few saw it."""
-    common = np.full(len(own), float(np.median(own)))
-    for number in np.unique(condition):
-        alike = condition == number
-        if len(np.unique(sensor[alike])) >= _ENOUGH:
-            common[alike] = np.median(own[alike])
+def _common(sensor: Indices, condition: Indices, relative: Floats) -> Floats:
+    """The median over sensors for the condition of each recording; the overall median for conditions with few
+    sensors."""
+    common = np.full(len(relative), float(np.median(relative)))
+    for index in np.unique(condition):
+        of_condition = condition == index
+        if len(np.unique(sensor[of_condition])) >= _ENOUGH:
+            common[of_condition] = np.median(relative[of_condition])
     return common
 
 
@@ -273,8 +269,8 @@ _CONTRADICTS = 3.0  # times
 def findings_of(
     recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats, array: Estimate | None
 ) -> tuple[Finding, ...]:
-    """Of time series: defects, noise that biases them, and a mean force that contradicts the preload; of the level
-    [C/N] and of the array's d33 errors of units and sign."""
+    """Findings on time series: defects, bias by noise, and a mean force that contradicts the preload; and on errors of
+    units and sign of the level [C/N] and of the array's d33."""
     defects = [
         Finding(Reason.DEFECT, item.id, defect.channel, asdict(defect))
         for item, frf in zip(recorded, measured, strict=True)
@@ -287,7 +283,7 @@ def findings_of(
 
 
 def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
-    """That the band of d33 lies behind a filter."""
+    """A finding where the band of d33 lies behind a filter."""
     if behind is None:
         return []
     arguments = {**asdict(behind), "percent": 100 * behind.share, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
@@ -306,7 +302,7 @@ def _preloads(recorded: Sequence[FrfRecording]) -> list[Finding]:
     return findings
 
 
-_LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
+_LEAST_CHARGE = 1e-24  # least FRF of a measurement [C/N]
 _MOST_REASONS = 3  # quoted where no recording can be used
 _SDS_OF_95 = float(ndtri(0.975))
 
@@ -320,7 +316,7 @@ class NoD33(InvalidInput):
 
 @dataclass(frozen=True)
 class RecordingD33:
-    """One entry a recording, SI: measured level, σ, d33 and its uncertainty by line noise; NaN where not `inside`."""
+    """Columns (recordings,) in SI: measured level, σ, d33 and its uncertainty by line noise; NaN where not `inside`."""
 
     ids: tuple[str, ...]
     sensor: Indices  # number of the sensor in Inversion.sensor_ids
@@ -337,7 +333,7 @@ class RecordingD33:
 
     @cached_property
     def condition(self) -> Indices:
-        """The number of each one's indenter and preload together."""
+        """The index of each recording's condition (indenter and preload)."""
         both = np.column_stack([self.indenter_radius, self.preload])
         return np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
 
@@ -370,12 +366,12 @@ class Inversion:
     gain: Estimate | None
     position: Estimate | None
     left_out: tuple[Finding | Flag, ...]  # each recording or sensor that the campaign's d33 does without
-    findings: tuple[Finding, ...]  # what looks wrong and is used all the same
+    findings: tuple[Finding, ...]  # suspicious data that are used all the same
     declared_percent: float  # standard deviation of all d33 together by the tolerances of the skin
 
     @property
     def absolute_d33(self) -> Estimate | None:
-        """`campaign_d33` with the tolerances of what is declared of the skin, independent of the scatter."""
+        """`campaign_d33` with the tolerances of the declared skin, independent of the scatter."""
         relative = self.campaign_d33
         if relative is None:
             return None
@@ -386,7 +382,7 @@ class Inversion:
         return Estimate(relative.value, np.hypot(relative.uncertainty, off), low, high)
 
     def wider(self, relative: float) -> "Inversion":
-        """With an uncertainty that all its d33 share, relative, besides."""
+        """With a further relative uncertainty common to all its d33."""
         array = None if self.campaign_d33 is None else self.campaign_d33.wider(relative)
         cells = replace(self.cells, d33=self.cells.d33.wider(relative))
         return replace(self, cells=cells, sensors=self.sensors.wider(relative), campaign_d33=array)
@@ -421,7 +417,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     for excess in excesses(campaign.skin):
         raise NoD33(f"skin.{excess.field}", excess.largest, f"skin.{excess.error}")
-    measured, recorded, left_out, doubted = _measured(recorded, units_checked=campaign.units_checked)
+    measured, recorded, left_out, exchange_findings = _measured(recorded, units_checked=campaign.units_checked)
     if not recorded:
         raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
@@ -440,8 +436,8 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         raise _none_usable(campaign, left_out)
     if np.abs(level[inside]).max() < _LEAST_CHARGE:
         raise NoD33("recordings", campaign.name, "there is no charge in any recording")
-    seen = gain(contact.positioned.sigma, contact.transmitted.rt_over_h)
-    d33, uncertainty = level / seen, noise / np.abs(seen)
+    response = gain(contact.positioned.sigma, contact.transmitted.rt_over_h)
+    d33, uncertainty = level / response, noise / np.abs(response)
     ids = tuple(dict.fromkeys(item.sensor for item in recorded))
     sensor = np.array([ids.index(item.sensor) for item in recorded])
     rows = RecordingD33(
@@ -458,16 +454,16 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         d33_uncertainty=np.where(inside, uncertainty, np.nan),
         inside=inside,
     )
-    unsure = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
-    inversion = _estimated(ids, rows, contact, zone).wider(unsure)
+    common_uncertainty = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
+    inversion = _estimated(ids, rows, contact, zone).wider(common_uncertainty)
     filtered = of_roll_off(roll_off(frfs, zone, level), zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33)
-    findings = (*at_reading(campaign), *doubted, *filtered, *others)
+    findings = (*at_reading(campaign), *exchange_findings, *filtered, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
 def _delayed(delay: float) -> str:
-    """In words, the delay [s] that was taken off, which phases do not tell from a filter; empty without one."""
+    """In words, the removed delay [s], which phases cannot distinguish from a filter; empty without one."""
     if delay == 0.0:
         return ""
     late = "charge" if delay > 0 else "force"
@@ -476,7 +472,7 @@ def _delayed(delay: float) -> str:
 
 
 def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
-    """Of a campaign whose recordings are all left out: the first reasons that differ."""
+    """The error for a campaign whose recordings are all left out, with the first distinct reasons."""
     by_reason = {finding.statement: finding.sentence for finding in reversed(left_out)}
     reasons = list(by_reason.values())[::-1][:_MOST_REASONS]
     more = f"; and {len(left_out) - len(reasons)} more" if len(left_out) > len(reasons) else ""
@@ -487,13 +483,13 @@ def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
 def _measured(
     recorded: Sequence[FrfRecording], *, units_checked: bool
 ) -> tuple[list[Frf], list[FrfRecording], list[Finding], list[Finding]]:
-    """The usable lines of each recording that has an FRF, those recordings, findings on the others, and findings on
-    those whose channels look exchanged and were checked."""
-    frfs, with_frf, left_out, doubted = [], [], [], []
+    """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on
+    recordings whose channels look exchanged although the units were checked."""
+    frfs, recordings, left_out, exchange_findings = [], [], [], []
     for recording in recorded:
         exchanged = exchanged_channels(recording)
         if exchanged is not None and units_checked:
-            doubted.append(exchanged)
+            exchange_findings.append(exchanged)
         elif exchanged is not None:
             left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
             continue
@@ -504,15 +500,15 @@ def _measured(
             continue
         try:
             frfs.append(lines_of(recording))
-            with_frf.append(recording)
+            recordings.append(recording)
         except InvalidInput as refusal:
             left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    return [one.frf for one in usable_lines(frfs)], with_frf, left_out, doubted
+    return [line_set.frf for line_set in usable_lines(frfs)], recordings, left_out, exchange_findings
 
 
 class _Contact:
-    """What the base model says of each recording's contact; `declared_percent`: standard deviation of its FRF by the
-    tolerances of the skin."""
+    """The base model's contact of each recording; `declared_percent`: standard deviation of its FRF by the tolerances
+    of the skin."""
 
     def __init__(self, campaign: Campaign, recorded: Sequence[FrfRecording], contact_model: ContactModel) -> None:
         described = campaign.skin
@@ -552,7 +548,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
     unfit, pilot = population_flags(ids, sensor, d33, noise)
     mean, variance = mean[:, good], variance[:, good]
     measured = LevelRows(d33, noise, pilot[sensor], mean, variance)
-    plain = np.array([number not in unfit for number in sensor])
+    plain = np.array([index not in unfit for index in sensor])
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]
@@ -584,7 +580,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
 
 
 def _outliers(rows: RecordingD33, position: Floats) -> Indices:
-    """The rows inside whose d33 is far off all others; `position` as for `outlying`."""
+    """The rows inside with outlying d33; `position` as for `outlying`."""
     good = np.flatnonzero(rows.inside)
     d33, noise = rows.d33[good], rows.d33_uncertainty[good]
     return good[outlying(rows.sensor[good], rows.condition[good], d33, noise, position[good])]
@@ -598,7 +594,7 @@ def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:
 
 
 def _cells(rows: RecordingD33, good: Indices) -> tuple[Indices, Indices, Indices]:
-    """Of each good row its cell; of each cell a row that shows what it is, and its number of recordings."""
+    """The cell of each good row; for each cell a representative row, and its number of recordings."""
     keys = np.column_stack([rows.sensor, rows.indenter_radius, rows.preload])[good]
     _, where, cell, count = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
     return cell.reshape(-1), good[where], count

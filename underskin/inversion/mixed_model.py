@@ -6,9 +6,9 @@ with μ the array's d33, t its relative spread over sensors, g the gain scatter 
 sphere's position (m_i the mean and v_i the variance of what it does to σ_i), u_i the known line noise. The covariance
 is built along the model, never along the data. Given (t, g, p), μ is normal by generalised least squares (flat prior,
 so the likelihood of (t, g, p) is the restricted one); (t, g, p) are marginalised on a grid under the priors below.
-The interval is that of the mixture: at few sensors or recordings it has the wide tails of Student's t.
-A large spread of few sensors is what it knows least: of intervals said to hold 95 %, with sensors that differ by 10 %
-(relative standard deviation) 90 % hold the d33 of the population with 4 of them, and 87 % with 2.
+The interval is that of the mixture: with few sensors or recordings it has the wide tails of Student's t. Coverage is
+lowest for a large spread of few sensors: with sensors that differ by 10 % (relative standard deviation), 90 % of the
+95 % intervals hold the d33 of the population with 4 of them, and 87 % with 2.
 
 Priors: g log-normal, 1–5 %; t zero, or half-Cauchy (Gelman 2006); p zero in most rigs, or 0.05–0.3 mm.
 """
@@ -40,7 +40,7 @@ class Estimate:
     high: Floats
 
     def wider(self, relative: float) -> "Estimate":
-        """With a further standard uncertainty, relative to the value."""
+        """The estimate with a further standard uncertainty, relative to the value."""
         further = relative * np.abs(self.value)
         low, high = (np.hypot(side, _HALF_WIDTH * further) for side in (self.value - self.low, self.high - self.value))
         return Estimate(self.value, np.hypot(self.uncertainty, further), self.value - low, self.value + high)
@@ -53,8 +53,8 @@ class Estimate:
 
 @dataclass(frozen=True)
 class LevelRows:
-    """Recordings: `z` and `line` (u) in one unit, `pilot` a first value of each one's d33, along which the gain's
-    variance is built, and m_i and v_i at each of POSITIONS (positions, rows)."""
+    """Recordings: `z` and `line` (u) in one unit, `pilot`, a first value of the d33 of each, to which the gain's
+    variance is proportional, and m_i and v_i at each of POSITIONS (positions, rows)."""
 
     z: Floats
     line: Floats
@@ -89,12 +89,12 @@ class LevelRows:
 
 @dataclass(frozen=True)
 class ScatterPosterior:
-    """What is known of gain and position scatter: `weights` (positions, gains) that sum to 1."""
+    """The posterior of gain and position scatter: `weights` (positions, gains) that sum to 1."""
 
     weights: Floats
 
     def d33(self, rows: LevelRows, group: Indices, count: int) -> Estimate:
-        """The d33 of each group of recordings, from the recordings of that group alone.
+        """The d33 of each group of recordings, from the recordings of that group only.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class ScatterPosterior:
             between = (posterior * (values - value) ** 2).sum(axis=(0, 1))
             variance = (posterior * variances).sum(axis=(0, 1))
             unsure = (posterior * (variances - variance) ** 2).sum(axis=(0, 1))
-            # A variance known only roughly: the Student t whose own variance has the same mean and spread.
+            # An uncertain variance: the Student t whose variance has the same mean and spread.
             freedom = 4 + 2 * variance**2 / np.maximum(unsure, 1e-12 * variance**2)
             scale = np.sqrt(variance * (freedom - 2) / freedom + between)
         half_width = stdtrit(freedom, (1 + _LEVEL) / 2) * scale
@@ -177,7 +177,7 @@ def fit(rows: LevelRows, sensor: Indices) -> MixedModel:
 
 
 def prior_scatter() -> ScatterPosterior:
-    """What is known of the scatters before any recording."""
+    """The prior of gain and position scatter."""
     weights = _prior(SPREADS[:1])[..., 0]
     return ScatterPosterior(weights / weights.sum())
 
@@ -197,8 +197,8 @@ def _prior(spreads: Floats) -> Floats:
 
 def _mixture(weights: Floats, means: Floats, deviations: Floats) -> Estimate:
     """Mean and central interval of a mixture of normals; its uncertainty is that of a normal with this interval."""
-    kept = weights > 1e-7 * weights.max()
-    weight, mean, deviation = weights[kept] / weights[kept].sum(), means[kept], deviations[kept]
+    relevant = weights > 1e-7 * weights.max()
+    weight, mean, deviation = weights[relevant] / weights[relevant].sum(), means[relevant], deviations[relevant]
     low, high = (_quantile(weight, mean, deviation, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
     uncertainty = (high - low) / (2 * _HALF_WIDTH)
     return Estimate(np.array(weight @ mean), np.array(uncertainty), np.array(low), np.array(high))

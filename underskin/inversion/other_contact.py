@@ -1,4 +1,4 @@
-"""The d33 of an array by the contact model that was not asked for, where the two say different things."""
+"""The d33 of an array by the other contact model, where both differ."""
 
 from underskin.errors import InvalidInput
 from underskin.inversion.invert import Inversion, invert
@@ -15,22 +15,22 @@ def array_d33_by_other(
     table: SigmaTable,
     band_hz: tuple[float, float] | None,
     inversion: Inversion,
-    asked_for: ContactName = "paper",
+    requested: ContactName = "paper",
 ) -> Estimate | None:
-    """`absolute_d33` by the other contact; None where there is none, or it differs by 1 % at most.
+    """`absolute_d33` by the other contact model; None where there is none, or it differs by at most 1 %.
 
     Parameters
     ----------
     campaign, band_hz
-        Of which `inversion` is, by the contact `asked_for`.
+        The data of `inversion`, which used the contact model `requested`.
     table
-        The σ table, with the contact table beside it; raises TableError where that cannot be read.
+        The σ table, with the contact table in the same folder; raises TableError where that cannot be read.
     """
-    found = inversion.absolute_d33
-    if found is None:
+    estimate = inversion.absolute_d33
+    if estimate is None:
         return None
     try:
-        other = invert(campaign, contact_model(table, OTHER[asked_for]), band_hz).absolute_d33
-    except InvalidInput:  # which lies outside its domain as a whole
+        other = invert(campaign, contact_model(table, OTHER[requested]), band_hz).absolute_d33
+    except InvalidInput:  # all recordings lie outside its domain
         return None
-    return other if other is not None and abs(other.value / found.value - 1) > STATED else None
+    return other if other is not None and abs(other.value / estimate.value - 1) > STATED else None

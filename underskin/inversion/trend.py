@@ -1,4 +1,4 @@
-"""Whether a quantity measured again and again drifts: slope over time, its uncertainty and its significance."""
+"""Drift of a repeatedly measured quantity: slope over time, its uncertainty and its significance."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Trend:
 def trend(time: ArrayLike, value: ArrayLike, uncertainty: ArrayLike) -> Trend | None:
     """A straight line by weighted least squares, weights 1/u².
 
-    Where the values scatter more than u says, the uncertainty grows by the Birge ratio √(χ²/(n−2)); it never shrinks.
+    Where the values scatter more than by u, the uncertainty grows by the Birge ratio √(χ²/(n−2)); it never shrinks.
     The slope is tested two-sided against Student's t with n−2 degrees of freedom.
 
     Parameters

@@ -5,7 +5,7 @@ import numpy as np
 from underskin.compiled import compiled
 from underskin.units import Floats
 
-_BEYOND = 30  # orders above the last from which the downward recurrence begins: what it begins with has died away there
+_BEYOND = 30  # orders above the last at which the downward recurrence starts, so that its start has decayed
 _BEGINNING = 1e-200
 _TERMS = 9  # of the series below s = 1: the next is below 1e-19 of the first
 
@@ -14,23 +14,23 @@ _TERMS = 9  # of the series below s = 1: the next is below 1e-19 of the first
 def _by_series(s: float, values: Floats) -> None:
     """jₙ(s) = sⁿ/(2n + 1)!! Σ (−s²/2)ᵐ/(m! (2n + 3) (2n + 5) …), for s < 1."""
     leading, half = 1.0, -0.5 * s * s
-    for place in range(len(values)):
-        order = 2 * place
-        if place:
+    for index in range(len(values)):
+        order = 2 * index
+        if index:
             leading *= s * s / ((2 * order - 1) * (2 * order + 1))
         term, total = 1.0, 1.0
         for m in range(1, _TERMS):
             term *= half / (m * (2 * (order + m) + 1))
             total += term
-        values[place] = leading * total
+        values[index] = leading * total
 
 
 @compiled("void(float64[::1], float64[:, ::1])")
 def even_orders(s: Floats, values: Floats) -> None:
     """j₀(s), j₂(s), … (rows, orders), to be filled, of s ≥ 0 (rows,).
 
-    By jₙ₋₁ + jₙ₊₁ = (2n + 1)/s jₙ: upwards from j₀ and j₁ where s exceeds all orders, else downwards from far above,
-    scaled such that j₀ or j₁, whichever is larger, comes out.
+    By jₙ₋₁ + jₙ₊₁ = (2n + 1)/s jₙ: upwards from j₀ and j₁ where s exceeds all orders, else downwards from a higher
+    order, scaled to j₀ or j₁, whichever is larger.
     """
     last = 2 * (values.shape[1] - 1)
     for row in range(len(s)):

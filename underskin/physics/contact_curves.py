@@ -6,7 +6,7 @@ sphere without adhesion and a flat punch whose φ at the edge is that of adhesio
     P = F R/(E' h³),   Δ = δ R/h²,   U = √(w/(E' h³)) R
     P = (4/3) α³ A(α) − U √(8π α³) G(α),   Δ = α² B(α) − U √(2πα) V(α),   dF/dδ = 2 E' a S(α)  (edge held)
 
-A, B, G, V, S are 1 at α = 0 and depend on α, the Poisson ratio and the glue line alone: they are solved once for each
+A, B, G, V, S are 1 at α = 0 and depend only on α, the Poisson ratio and the glue line: they are solved once for each
 layer at Chebyshev points in α (`contact_integral_equation`), which takes about a millisecond.
 
 The stress follows in the same way: at the same points in α, the transforms of both pressures at given wave numbers are
@@ -32,7 +32,7 @@ _TABLE: Floats = LARGEST_A_OVER_H / 128 * np.arange(1.0, 129.0)  # of a/h, for f
 _SMALLEST = 1e-12
 _TOLERANCE = 1e-7  # of the last step; the remaining error is about its square
 
-# Sums of terms: factor, exponent of α, the curve among A, G, B, V, S, and whether U multiplies it.
+# Sums of terms: factor, exponent of α, the curve among A, G, B, V, S, and whether it is multiplied by U.
 _Law = tuple[tuple[float, float, int, bool], ...]
 _SPHERE_LOAD: _Law = ((4 / 3, 3.0, 0, False),)
 _LOAD: _Law = (*_SPHERE_LOAD, (-np.sqrt(8 * np.pi), 1.5, 1, True))
@@ -66,7 +66,7 @@ class ContactRows:
 
 
 class CurveGrid:
-    """What is common to all layers: the Chebyshev points in α and the modes' transforms at given wave numbers.
+    """The part common to all layers: the Chebyshev points in α and the modes' transforms at given wave numbers.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class CurveGrid:
 
 @cache
 def _at_nodes() -> tuple[ChebyshevInterval, ContactEquation]:
-    """What does not depend on the wave numbers either."""
+    """The part that is also independent of the wave numbers."""
     interval = ChebyshevInterval(LARGEST_A_OVER_H, _NODES)
     return interval, ContactEquation(interval.nodes)
 
@@ -109,7 +109,7 @@ class ContactCurves:
         coefficients = self.interval.coefficients(at_nodes)  # (count, 3, 5)
         slopes = self.interval.derivative(coefficients[:, :1])
         self._coefficients = np.concatenate([coefficients[:, :1], slopes, coefficients[:, 1:]], axis=1)
-        # A, G and their slopes, as compiled functions take them.
+        # A, G and their slopes for the compiled function.
         self._of_load = np.ascontiguousarray(self._coefficients[:, :2, :2].reshape(-1, 4).T)
         at = self._evaluated(grid.table_basis)
         self._start = _Start(at)
@@ -155,14 +155,14 @@ class ContactCurves:
             U [-].
         """
         at = self._evaluated(self.interval.basis(alpha))
-        one = np.outer([1.0, 0.0, 0.0, 0.0], np.ones_like(alpha))
+        unit_slopes = np.outer([1.0, 0.0, 0.0, 0.0], np.ones_like(alpha))
 
         def rows(law: _Law) -> Differentiated:
             value, *slopes = _law(law, alpha, root_adhesion, at)
             return Differentiated(value, np.stack(slopes))
 
         laws = (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)
-        return ContactRows(Differentiated(alpha, one), *map(rows, laws))
+        return ContactRows(Differentiated(alpha, unit_slopes), *map(rows, laws))
 
     def stiffness_at(self, alpha: Floats) -> Differentiated:
         """S at a/h (rows,) from 0 to LARGEST_A_OVER_H, with derivatives by α, ν and the slip."""

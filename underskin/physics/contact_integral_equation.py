@@ -52,7 +52,7 @@ class EdgeSolutions:
 
 
 class ContactEquation:
-    """The integral equation at given contact radii; computes once what does not depend on the layer.
+    """The integral equation at given contact radii; computes the layer-independent part once.
 
     Parameters
     ----------

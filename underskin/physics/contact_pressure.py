@@ -59,7 +59,7 @@ class SpherePressure:
         return share
 
     def hertz_parts(self) -> tuple[Floats, Floats]:
-        """Radii over a and shares of the force of the Hertz pressures that together are this one (parts,).
+        """Radii over a and shares of the force of the Hertz pressures whose sum is this one (parts,).
 
         By parts, with G of `ring_share` and G(1)/3 = 1 in Hertz theory: p is G(1)/3 of the Hertz pressure of radius a,
         and −G'(x) x³/3 dx of that of each radius x a.
@@ -100,8 +100,8 @@ def sphere_pressures(
     load = forces * indenter_radii / (plane_modulus * thickness**3)
     different, row = np.unique(load, return_inverse=True)
     alpha = _grid().curves(layer).at_load(different, np.zeros_like(different)).alpha.value
-    known = np.isfinite(alpha)
-    shapes = iter(ContactEquation(alpha[known]).solve(layer).sphere_shape.value if known.any() else ())
+    valid = np.isfinite(alpha)
+    shapes = iter(ContactEquation(alpha[valid]).solve(layer).sphere_shape.value if valid.any() else ())
     pressures = [SpherePressure(float(a) * thickness, next(shapes)) if a == a else None for a in alpha]
     return [pressures[i] for i in row]
 

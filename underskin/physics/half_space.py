@@ -11,7 +11,7 @@ from underskin.physics.charge_response import Sigma
 from underskin.physics.hankel_transform import hertz_transform, normal_stress, tangential_stress
 from underskin.units import Floats
 
-# The integral is done anew for each row, at a cost that grows with a/h and rT/h.
+# The integral is evaluated for each row, at a cost that grows with a/h and rT/h.
 DOMAIN_END = 10.0
 # Of the quadrature against one on twice as many panels, over that domain (tests/service/routes/test_service_sigma.py).
 REL_ERROR = 1e-10

@@ -112,7 +112,7 @@ def contact_radius_over_indenter_radius(load_parameter: ArrayLike, poisson_ratio
 
 
 def peak_pressure_over_modulus(load_parameter: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Floats:
-    """Peak pressure over modulus, q0/E = (3/2π) [(3/4)(1 − ν²)]^(−2/3) L^(1/3): the strain that L stands for.
+    """Peak pressure over modulus, q0/E = (3/2π) [(3/4)(1 − ν²)]^(−2/3) L^(1/3): the strain measured by L.
 
     Parameters and result as in `contact_radius_over_indenter_radius`.
     """

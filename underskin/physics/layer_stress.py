@@ -53,11 +53,11 @@ def layer_stress(poisson_ratio: float, a: Floats, r: Floats, depth: Floats) -> F
 
 
 def half_space_stress(a: Floats, r: Floats, depth: Floats) -> Floats:
-    """The same in the half space; parameters and result as in `layer_stress`, but for a depth of any size."""
+    """The normal stress in the half space; parameters and result as in `layer_stress`, for any depth."""
     a, d = a[:, None, None], depth[:, None]
     excess, product = r**2 + d**2 - a**2, a**2 * d**2
     root = np.hypot(excess, 2 * a * d)
-    other = np.where(root > excess, root - excess, 1.0)  # of which u would be a small difference, inside the contact
+    other = np.where(root > excess, root - excess, 1.0)  # avoids u as a small difference inside the contact
     u = np.where(excess > 0, (excess + root) / 2, 2 * product / other)
     surface = np.sqrt(np.clip(1 - r**2 / a**2, 0, None)) / a**2
     safe = np.where(d > 0, u, 1.0)

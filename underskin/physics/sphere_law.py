@@ -1,4 +1,4 @@
-"""A rigid sphere pressed into an elastic half space or a bonded layer without adhesion, as deep as it is round. SI.
+"""A rigid sphere pressed into an elastic half space or a bonded layer without adhesion, to any depth. SI.
 
 On the half space, with the contact radius a and E' = E/(1 − ν²) (Sneddon, Int. J. Eng. Sci. 3 (1965) 47):
 
@@ -22,26 +22,26 @@ from underskin.units import Floats
 
 _NODES = 4001
 _WIDEST = 0.999  # of R, up to which the contact radius is tabulated
-_PARABOLOID_TO = 10.0  # of R, the same of a paraboloid, which a fit that goes astray may ask for
+_PARABOLOID_TO = 10.0  # of R, the same for a paraboloid, which a diverging fit may need
 PARABOLOID = 0.4  # of R: pressed less deep, a paraboloid's force is within 4 % of the sphere's
 LOAD_OF_REDUCED = 4 / 3  # L = F/(R²E) over F/(R²E'), at ν = ½
-# δ of the whole sphere over the paraboloid's at the same force is 1 + this L^(2/3): Sneddon's law to its second order,
+# δ of the full sphere over that of the paraboloid at the same force is 1 + this L^(2/3): Sneddon's law to second order,
 # with a/R = (9L/16)^(1/3).
-WHOLE_OF_LOAD = (9 / 16) ** (2 / 3) / 15
+FULL_SPHERE_OF_LOAD = (9 / 16) ** (2 / 3) / 15
 
-# δ over the linear contact's at the same force, less 1, of a/h, L^(1/3), and whether that contact is the whole sphere's
+# δ over that of the linear contact at the same force, less 1, by a/h, L^(1/3), and whether the contact is a full sphere
 Softening = Callable[[Floats, Floats, bool], Floats]
 
 
 class SphereLaw:
     """F/E' [m²] over the depth [m] under a sphere; `thickness` is that of the layer, None on a half space.
 
-    A paraboloid stands for the sphere unless it is `whole`.
+    The sphere is approximated by a paraboloid unless `full_sphere`.
 
     Attributes
     ----------
     deepest : float
-        Depth [m] up to which the law is known: on a layer that at a/h = LARGEST_A_OVER_H.
+        Largest depth [m] of the law: on a layer that at a/h = LARGEST_A_OVER_H.
     """
 
     def __init__(
@@ -51,14 +51,14 @@ class SphereLaw:
         poisson_ratio: float,
         softening: Softening | None = None,
         *,
-        whole: bool = False,
+        full_sphere: bool = False,
     ) -> None:
         """Tabulate the law."""
-        widest = (_WIDEST if whole else _PARABOLOID_TO) * radius
+        widest = (_WIDEST if full_sphere else _PARABOLOID_TO) * radius
         if thickness is not None:
             widest = min(widest, LARGEST_A_OVER_H * thickness)
         a = widest * np.linspace(0.0, 1.0, _NODES)
-        depth, stiffness = (a * np.arctanh(a / radius) if whole else a**2 / radius), 2 * a
+        depth, stiffness = (a * np.arctanh(a / radius) if full_sphere else a**2 / radius), 2 * a
         if thickness is not None:
             ratio = _ratios(poisson_ratio)(a / thickness)
             depth, stiffness = depth * ratio[:, 1], stiffness * ratio[:, 2]
@@ -67,7 +67,7 @@ class SphereLaw:
         if softening is not None:
             cbrt_load = np.cbrt(LOAD_OF_REDUCED * force) / np.cbrt(radius) ** 2
             alpha = np.zeros_like(a) if thickness is None else a / thickness
-            depth = depth * (1 + softening(alpha, cbrt_load, whole))
+            depth = depth * (1 + softening(alpha, cbrt_load, full_sphere))
         self._depth, self._root = depth, np.cbrt(force) ** 2
         self.deepest = float(depth[-1])
 

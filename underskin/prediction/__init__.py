@@ -1,1 +1,1 @@
-"""The forward model for given conditions, and what is said of its answers."""
+"""The forward model for given conditions, and checks and messages on its answers."""

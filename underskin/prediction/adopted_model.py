@@ -1,8 +1,8 @@
-"""An explained diagnosis as the model of its skin: what the mechanisms that it found predict for new recordings.
+"""An explained diagnosis as the model of its skin: what its mechanisms predict for new recordings.
 
-The mechanisms stand at the values of the report, the declared modulus and thickness as declared. FRF = d33 · response,
-since every mechanism is linear in d33. A response is what one line shows; its level is the same without those
-mechanisms that act line by line (resonance, delays, high pass), as a plateau would show it.
+The mechanisms have the parameter values of the report; modulus and thickness are as declared. FRF = d33 · response,
+since every mechanism is linear in d33. A response is that of one line; its level is the same without the mechanisms
+that act line by line (resonance, delays, high pass), as a plateau would show it.
 """
 
 from collections.abc import Mapping
@@ -37,8 +37,8 @@ NOT_ADOPTED = {
     "no_mismatch": "nothing is missing, so that there is nothing to adopt; the paper's model serves",
     "insufficient_data": "it cannot tell what is missing. Correct what it says is wrong, or record what it says is "
     "lacking and send it together with these recordings; then diagnose that",
-}  # by verdict: why it is refused, and what to do
-UNNAMED = "a law without a name"  # what an adopted one is called
+}  # by verdict: why it is rejected, and what to do
+UNLISTED_LAW = "a law without a name"  # the name of an adopted one in messages
 _SAME = 1e-9  # relative
 _ANY_LINE = np.array([1.0])  # Hz
 _REPORTED_SDS = 2 * float(ndtri(0.975))  # width of a report's interval
@@ -57,49 +57,51 @@ class Response:
 class AdoptedModel:
     """The skin that was diagnosed, and the value of each parameter of each mechanism, by name.
 
-    `unsure` is the relative standard deviation of the d33 that the diagnosis found, its parameters' included: how far
-    responses are unsure within the range of that campaign.
+    `unsure` is the relative standard deviation of the diagnosed d33, that by the parameters included: the uncertainty
+    of responses within the range of that campaign.
     """
 
     skin: SkinDescription
     parameters: Mapping[str, Mapping[str, float]]
     unsure: float
-    law: UnlistedLaw | None = None  # that nobody listed, as it was found
+    law: UnlistedLaw | None = None  # the unlisted law of the diagnosis
     of_law: Mapping[str, float] = field(default_factory=dict)  # its parameters
 
     @property
     def mechanisms(self) -> list[Mechanism]:
-        """Those that move predictions, in order of composition."""
+        """The mechanisms that affect predictions, in order of composition."""
         return [mechanism for mechanism in chosen(list(self.parameters), CATALOGUE) if mechanism.moves_predictions]
 
     @property
     def of_lines(self) -> list[str]:
         """Names of the mechanisms that act line by line."""
         names = [mechanism.name for mechanism in self.mechanisms if mechanism.stage is Stage.LINES]
-        return [*names, *([UNNAMED] if self.law is not None and self.law.stage is Stage.LINES else [])]
+        return [*names, *([UNLISTED_LAW] if self.law is not None and self.law.stage is Stage.LINES else [])]
 
     @property
     def needs(self) -> dict[str, str]:
-        """Fields of a recording that its predictions need beside sphere, preload and lines; each with who needs it."""
+        """Fields of a recording needed for predictions besides sphere, preload and lines, each with what needs it."""
         needed = needed_fields(self.mechanisms)
         if isinstance(self.law, RecordingLaw | LagLaw) and self.law.axis.name in NEEDED_FIELDS:
-            needed.setdefault(self.law.axis.name, UNNAMED)
+            needed.setdefault(self.law.axis.name, UNLISTED_LAW)
         return needed
 
     def require_skin(self, declared: Mapping[str, Any]) -> None:
-        """Raises InvalidInput where a skin is declared otherwise than the one that was diagnosed.
+        """Raise InvalidInput where a skin is declared otherwise than the diagnosed one.
 
-        What was found may be about those very values, such as a wrong modulus.
+        The diagnosis may concern these values, such as a wrong modulus.
         """
         for name in _DECLARED:
-            here = getattr(self.skin, name)
-            there = np.atleast_1d(np.asarray(declared[name], dtype=float))
-            if not np.allclose(there, here, rtol=_SAME, atol=0):
-                off = there[~np.isclose(there, here, rtol=_SAME, atol=0)][0]
-                raise conflicting(name, float(off), f"must be {here:g}, as the skin was declared when it was diagnosed")
+            diagnosed = getattr(self.skin, name)
+            stated = np.atleast_1d(np.asarray(declared[name], dtype=float))
+            if not np.allclose(stated, diagnosed, rtol=_SAME, atol=0):
+                differing = stated[~np.isclose(stated, diagnosed, rtol=_SAME, atol=0)][0]
+                raise conflicting(
+                    name, float(differing), f"must be {diagnosed:g}, as the skin was declared when it was diagnosed"
+                )
 
     def response(self, conditions: Conditions, table: SigmaTable, *, level: bool = False) -> Response:
-        """What each line of FRFs under these conditions shows; their `level` with one row a recording instead.
+        """The response of each line of FRFs under these conditions; with `level` one row a recording instead.
 
         Raises InvalidInput where a recording lacks what a mechanism needs.
         """
@@ -108,7 +110,7 @@ class AdoptedModel:
             mechanisms = [mechanism for mechanism in mechanisms if mechanism.stage is not Stage.LINES]
             conditions = _levels(conditions)
         require_fields(self.mechanisms, conditions, "the adopted model")
-        known: dict[str, float] = {}
+        values: dict[str, float] = {}
         for mechanism in mechanisms:
             known |= mechanism.transfer(self.parameters[mechanism.name], conditions)
         inside = np.ones(len(frf_of(conditions)), dtype=bool)
@@ -116,9 +118,9 @@ class AdoptedModel:
             law, inside = bound_to(self.law, conditions, table, tuple(CATALOGUE.values()))
             if not (level and law.stage is Stage.LINES):
                 mechanisms = [*mechanisms, law]
-                known |= self.of_law
+                values |= self.of_law
         model = forward_model(mechanisms, conditions, table, "frf")
-        fit = [_on_fit(parameter, known.get(parameter.name, 1.0)) for parameter in model.parameters]
+        fit = [_on_fit(parameter, values.get(parameter.name, 1.0)) for parameter in model.parameters]
         predicted = model.predict(np.array(fit))
         return Response(
             value=predicted.value.astype(np.complex128) / float(to_si("d33_pc_per_n", 1.0)),
@@ -127,28 +129,28 @@ class AdoptedModel:
         )
 
     def as_base_model(self, campaign: Campaign, table: SigmaTable) -> tuple[Campaign, list[str]]:
-        """The campaign as the base model would show it, for what knows only that; and the recordings left out.
+        """The campaign as the base model would show it, for methods limited to that; and the recordings left out.
 
-        Each line is multiplied by the base model's response over this one's. Recordings beyond the table, and lines
-        that are not finite, are left out, as are recordings of other kinds. Raises InvalidInput.
+        Each line is multiplied by the base model's response over this one's. Recordings beyond the table, lines that
+        are not finite, and recordings of other kinds are left out. Raises InvalidInput.
         """
         self.require_skin(vars(campaign.skin))
-        kept = replace(campaign, recordings=tuple(map(_finite_lines, frf_recordings(campaign))))
-        own = self.response(kept, table)
-        base = AdoptedModel(self.skin, {}, 0.0).response(kept, table)
-        ratio = base.value / own.value
-        recordings, left_out = [], []
-        for number, entry in enumerate(frf_recordings(kept)):
-            rows = own.recording == number
-            if own.inside[rows].all() and base.inside[rows].all():
-                recordings.append(_times(entry, ratio[rows]))
+        finite = replace(campaign, recordings=tuple(map(_finite_lines, frf_recordings(campaign))))
+        adopted_response = self.response(finite, table)
+        base_response = AdoptedModel(self.skin, {}, 0.0).response(finite, table)
+        ratio = base_response.value / adopted_response.value
+        recordings, omitted = [], []
+        for index, recording in enumerate(frf_recordings(finite)):
+            rows = adopted_response.recording == index
+            if adopted_response.inside[rows].all() and base_response.inside[rows].all():
+                recordings.append(_times(recording, ratio[rows]))
             else:
-                left_out.append(entry.id)
-        return replace(campaign, recordings=tuple(recordings)), left_out
+                omitted.append(recording.id)
+        return replace(campaign, recordings=tuple(recordings)), omitted
 
 
 def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | None = None) -> AdoptedModel:
-    """The model of a `report/1` and the campaign that it is of; raises InvalidInput where it cannot serve."""
+    """The model of a `report/1` and its campaign; raises InvalidInput where it cannot be used."""
     why_not = not_adopted(report)
     if why_not is not None:
         raise InvalidInput(
@@ -157,43 +159,43 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     reason = implausible_d33(report)
     if reason is not None:
         raise InvalidInput("diagnosis_id", "a diagnosis", f"its d33 cannot be right: {reason}")
-    if not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
+    if not any(isinstance(recording, FrfRecording) for recording in campaign.recordings):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {
-        current_name(entry["name"]): {
-            current_name(parameter["name"]): float(parameter["value"]) for parameter in entry["parameters"]
+        current_name(stated["name"]): {
+            current_name(parameter["name"]): float(parameter["value"]) for parameter in stated["parameters"]
         }
-        for entry in report["mechanisms"]
-        if not _of_curves_alone(entry["name"])
+        for stated in report["mechanisms"]
+        if not _is_for_curves_only(stated["name"])
     }
     if report["mechanisms"] and not parameters:
         allowed = "must be of mechanisms that act on FRFs: those of curves alone predict none"
         raise InvalidInput("diagnosis_id", report["mechanisms"][0]["name"], allowed)
     frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
-    known = parameters_together(frf, campaign, "frf")
+    current = parameters_together(frf, campaign, "frf")
     for name, values in parameters.items():
         # Parameters that move no prediction are not used; those of older reports may be others.
-        as_known = name in known and (
-            not CATALOGUE[name].moves_predictions or set(values) == {entry.name for entry in known[name]}
+        matches = name in current and (
+            not CATALOGUE[name].moves_predictions or set(values) == {parameter.name for parameter in current[name]}
         )
-        if not as_known:
+        if not matches:
             allowed = "must be of mechanisms that this version knows, with the parameters that it knows"
             raise InvalidInput("diagnosis_id", name, allowed)
     d33 = report["d33"]
-    unsure = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
-    model = AdoptedModel(campaign.skin, parameters, unsure)
+    relative_deviation = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
+    model = AdoptedModel(campaign.skin, parameters, relative_deviation)
     return model if report["verdict"] in ("explained", "ambiguous") else replace(model, **_law(report, campaign, table))
 
 
-def _of_curves_alone(name: str) -> bool:
+def _is_for_curves_only(name: str) -> bool:
     return name in CATALOGUE and "frf" not in CATALOGUE[name].kinds
 
 
 def not_adopted(report: Mapping[str, Any]) -> str | None:
-    """Why a diagnosis cannot serve as a model, by its verdict; None where it may.
+    """Why a diagnosis cannot be used as a model, by its verdict; None where it can.
 
-    A law that nobody listed may, where it is certain and its axis says something of other recordings; so may one of
-    several answers that predict the recordings alike.
+    An unlisted law can where it is certain and its axis applies to other recordings; so can one of several answers with
+    equal predictions.
     """
     if report["verdict"] == "explained" or (
         report["verdict"] == "ambiguous" and report.get("provenance", {}).get("alike")
@@ -207,17 +209,17 @@ def not_adopted(report: Mapping[str, Any]) -> str | None:
 
 def _law(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | None) -> dict[str, Any]:
     """The law of a report, and its parameters."""
-    found = report["provenance"]["unnamed"]
-    lines = np.concatenate([lines_of(entry).frequency for entry in frf_recordings(campaign)])
+    stored = report["provenance"]["unnamed"]
+    lines = np.concatenate([lines_of(recording).frequency for recording in frf_recordings(campaign)])
     grammar = Grammar.of(campaign, lines, load_table() if table is None else table, tuple(CATALOGUE.values()), ())
-    law = next((entry for entry in grammar.laws if entry.name == found["law"]), None)
-    if law is None or {entry.name for entry in law.parameters_bound} != set(found["parameters"]):
-        raise InvalidInput("diagnosis_id", found["law"], "must be a law that this version knows")
-    return {"law": law, "of_law": dict(found["parameters"])}
+    law = next((candidate for candidate in grammar.laws if candidate.name == stored["law"]), None)
+    if law is None or {parameter.name for parameter in law.parameters_bound} != set(stored["parameters"]):
+        raise InvalidInput("diagnosis_id", stored["law"], "must be a law that this version knows")
+    return {"law": law, "of_law": dict(stored["parameters"])}
 
 
 def implausible_d33(report: Mapping[str, Any]) -> str | None:
-    """Why the d33 of a `report/1`, by the middle of its interval, is none that PVDF can have; None where it may be."""
+    """Why the d33 of a `report/1`, the middle of its interval, is impossible for PVDF; None where it is possible."""
     interval = report["d33"] or {}
     if not {"low", "high"} <= set(interval):
         return None
@@ -227,26 +229,26 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
 
 
 def _on_fit(parameter: Parameter, value: float) -> float:
-    """Within the bounds, which rounding may have left."""
+    """The fit coordinate, clipped to the bounds against rounding."""
     return float(np.clip(parameter.to_fit(value), *parameter.bounds))
 
 
 def _levels(conditions: Conditions) -> Conditions:
     """Each FRF at one line: without the mechanisms that act line by line, any frequency shows the level."""
-    recordings = [entry.without_measurements(frequency_hz=_ANY_LINE) for entry in frf_of(conditions)]
+    recordings = [recording.without_measurements(frequency_hz=_ANY_LINE) for recording in frf_of(conditions)]
     return Conditions(conditions.name, conditions.skin, tuple(recordings))
 
 
-def _finite_lines(entry: FrfRecording) -> FrfRecording:
-    """With its lines in place of its time series, those that are finite."""
-    measured = lines_of(entry)
+def _finite_lines(recording: FrfRecording) -> FrfRecording:
+    """The recording with its finite lines instead of its time series."""
+    measured = lines_of(recording)
     good = np.isfinite(measured.values)
     coherence = None if measured.coherence is None else measured.coherence[good]
-    return FrfRecording.of_lines(entry, measured.frequency[good], measured.values[good], coherence)
+    return FrfRecording.of_lines(recording, measured.frequency[good], measured.values[good], coherence)
 
 
-def _times(entry: FrfRecording, factor: Complexes) -> FrfRecording:
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    lines = (entry.frf_re_pc_per_n + 1j * entry.frf_im_pc_per_n) * factor
-    return replace(entry, frf_re_pc_per_n=lines.real, frf_im_pc_per_n=lines.imag)
+def _times(recording: FrfRecording, factor: Complexes) -> FrfRecording:
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    lines = (recording.frf_re_pc_per_n + 1j * recording.frf_im_pc_per_n) * factor
+    return replace(recording, frf_re_pc_per_n=lines.real, frf_im_pc_per_n=lines.imag)

@@ -1,7 +1,6 @@
-"""Answers to questions on a pressed skin.
+"""Answers of server and command line on a pressed skin: columns in lab units; a single number holds for all rows.
 
-What server and command line answer: columns in lab units in and out; a single number holds for all rows. d33 by the
-contact model that was not asked for, where the two say different things.
+Also d33 by the other contact model, where both differ.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,8 +31,8 @@ _FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"
 
 @dataclass(frozen=True)
 class ComputedColumns:
-    """Columns by field name, and which rows are inside the `domain` (NaN in what depends on σ where not); `limits` says
-    of each other row which limit it exceeds, and is None where all are inside."""
+    """Columns by field name, and which rows are inside the `domain` (others have NaN where σ enters); `limits`: the
+    exceeded limit of each row outside, None where all are inside."""
 
     columns: Mapping[str, Floats]
     inside: Mask
@@ -56,7 +55,7 @@ def sigma(table: SigmaTable, given: Mapping[str, Floats], model: SigmaModelName)
 
 
 def frf(contact_model: ContactModel, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
-    """FRF of a sensor under a preloaded sphere, FRF = d33 (3/2) (rT/h)² σ, and what leads to it.
+    """FRF of a sensor under a preloaded sphere, FRF = d33 (3/2) (rT/h)² σ, with intermediate results.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ def frf(contact_model: ContactModel, given: Mapping[str, Floats], units_checked:
 
 
 def d33(contact_model: ContactModel, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
-    """d33 of a sensor from the measured plateau of its FRF, d33 = FRF / ((3/2) (rT/h)² σ), and what leads to it.
+    """d33 of a sensor from the measured plateau of its FRF, d33 = FRF / ((3/2) (rT/h)² σ), with intermediate results.
 
     Parameters
     ----------
@@ -94,7 +93,7 @@ def d33(contact_model: ContactModel, given: Mapping[str, Floats], units_checked:
     -------
     ComputedColumns
         With the FRF and its uncertainty. A row is inside where the table holds it and its d33 is finite. Findings name
-        magnitudes that look wrong.
+        implausible magnitudes.
 
     Raises
     ------
@@ -115,25 +114,25 @@ def d33(contact_model: ContactModel, given: Mapping[str, Floats], units_checked:
 
 def measured(given: Mapping[str, Floats]) -> dict[str, Floats]:
     """The measured plateau and its uncertainty, NaN where none is given; raises InvalidInput."""
-    unsure = np.full((), np.nan)
+    uncertainty = np.full((), np.nan)
     if _FRF_UNCERTAINTY in given:
-        unsure = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
-    return {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: unsure}
+        uncertainty = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
+    return {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: uncertainty}
 
 
 def refused(given: Mapping[str, Floats], units_checked: bool) -> list[InvalidInput]:
-    """What is wrong with each of these columns whose values are declared, in lab units."""
-    found = []
-    for name in (one for one in _DECLARED if one in given):
+    """The errors of the declared columns among these, in lab units."""
+    errors = []
+    for name in (field for field in _DECLARED if field in given):
         try:
             checked(name, given[name], units_checked=units_checked)
         except InvalidInput as error:
-            found.append(error)
-    return found
+            errors.append(error)
+    return errors
 
 
 def pressed(contact_model: ContactModel, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
-    """What reaches the sensor of a skin described in lab units; raises InvalidInput."""
+    """The transmission to the sensor of a skin described in lab units; raises InvalidInput."""
     skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
     preload = checked("preload_n", given["preload_n"], units_checked=units_checked)
@@ -160,7 +159,7 @@ def _skin_answer(
     columns: Mapping[str, Floats],
     result: Floats,
 ) -> ComputedColumns:
-    """A row whose result is not finite is outside, as one that the table does not hold."""
+    """The answer; a row whose result is not finite is outside, like one beyond the table."""
     domain = f"{_table_domain(contact_model)}, Poisson's ratio 0.5"
     inside = reached.inside & np.isfinite(result)
     return ComputedColumns(
@@ -171,7 +170,7 @@ def _skin_answer(
 def limits_of_pressed(
     contact_model: ContactModel, reached: Transmission, given: Mapping[str, Floats], inside: Mask, count: int
 ) -> Words | None:
-    """Which limit each row of a pressed skin exceeds that is not inside; `given`: preload and Poisson's ratio."""
+    """The exceeded limit of each row of a pressed skin that is outside; `given`: preload and Poisson's ratio."""
     limits = of_pressed(reached, given["preload_n"], contact_model)
     return in_words(inside, count, limits, given["poisson_ratio"])
 
@@ -186,17 +185,17 @@ WORDS: Mapping[ContactName, str] = {
     "paper": "under Hertz' pressure (paper)",
     "solved": "in contact with the layer itself (solved)",
 }
-STATED = 0.01  # relative difference from which on the other value is stated
+STATED = 0.01  # least relative difference at which the other value is stated
 
 
 @dataclass(frozen=True)
 class OtherContact:
-    """d33 [pC/N] (rows,) by the contact `name`, NaN outside its domain, and in which rows it `differs` by more than 1 %
-    from the one asked for."""
+    """d33 [pC/N] (rows,) by the contact `name`, NaN outside its domain, and the rows where it `differs` by more than
+    1 % from the requested one."""
 
     name: ContactName
     d33: Floats
-    ratio: Floats  # over the one asked for
+    ratio: Floats  # over the requested one
 
     @property
     def differs(self) -> Mask:
@@ -219,7 +218,7 @@ class OtherContact:
 
 def other_contact(
     table: SigmaTable,
-    asked_for: ContactName,
+    requested: ContactName,
     given: Mapping[str, Floats],
     d33: Floats,
     *,
@@ -230,11 +229,11 @@ def other_contact(
     Parameters
     ----------
     table : the σ table.
-    asked_for : the contact by which `d33` [pC/N] (rows,) was found.
+    requested : the contact of `d33` [pC/N] (rows,).
     given : columns in lab units by field name, as for `answers.d33`.
     units_checked : accept magnitudes that look like a slip of units.
     """
-    name = OTHER[asked_for]
+    name = OTHER[requested]
     with np.errstate(all="ignore"):  # what overflows is outside
         reached = pressed(contact_model(table, name), given, units_checked)
         other = given["frf_pc_per_n"] / gain(reached.sigma, reached.rt_over_h)

@@ -34,8 +34,8 @@ def statuses(inside: Mask, count: int) -> list[str]:
     return ["ok" if row else "out_of_domain" for row in np.broadcast_to(inside, (count,)).tolist()]
 
 
-def told(inside: Mask, limits: Sequence[str | None] | None, count: int) -> dict[str, list[str]]:
-    """The last columns of a CSV: of each of `count` rows which limit it exceeds, empty where none, and its status."""
+def limits_and_statuses(inside: Mask, limits: Sequence[str | None] | None, count: int) -> dict[str, list[str]]:
+    """The last columns of a CSV: for each of `count` rows the exceeded limit, empty without one, and the status."""
     words = [""] * count if limits is None else [text or "" for text in limits]
     return {"limit": words, "status": statuses(inside, count)}
 
@@ -50,7 +50,7 @@ def to_csv(columns: Mapping[str, Floats | Sequence[Any]], line_end: str) -> str:
 
 
 def to_spreadsheet(columns: Mapping[str, Sequence[Any]]) -> str:
-    """Columns as CSV for a spreadsheet: `NaN` where there is no value, and what it would take for a formula as text."""
+    """Columns as CSV for a spreadsheet: `NaN` for missing values, and text that looks like a formula quoted."""
     return to_csv({name: [_as_text(value) for value in column] for name, column in columns.items()}, "\r\n")
 
 

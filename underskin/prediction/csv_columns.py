@@ -1,5 +1,5 @@
-"""Columns in lab units from CSV, as spreadsheets and users write it: headings and cells are read as those of the CSV
-template of campaigns are.
+"""Columns in lab units from CSV as spreadsheets and users write it; headings and cells are read like those of the CSV
+template of campaigns.
 """
 
 import csv
@@ -16,11 +16,11 @@ from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE
 
 REAL = "frf_pc_per_n"  # which has no imaginary part
 _SAYS_NOTHING = re.compile(r'\s*(#|"?sep=.?"?\s*$)', re.IGNORECASE)
-_LABELS = ("id", "sensor", "name", "recorded_at")  # columns that only say what a row is, in numbers too
+_LABELS = ("id", "sensor", "name", "recorded_at")  # columns that only label rows, also by numbers
 
 
 class CsvError(ValueError):
-    """A text is not columns in CSV; the message says what it must be."""
+    """A text is no CSV of columns; the message says what it must be."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class CsvColumn:
         return [value * self.factor for value in values if value is not None]
 
     def _refused(self, field: str, rows: Sequence[int]) -> InvalidInput:
-        """Of these rows, which hold no number, the first, and how many more there are."""
+        """The error for the first of these rows without a number, with the count of the others."""
         cell = self.cells[rows[0]]
         more = f", and {len(rows) - 1} more in this column" if len(rows) > 1 else ""
         hint = f"; {cell} {text.ungrouped(cell)}" if text.is_grouped(cell) else ""
@@ -63,7 +63,7 @@ class RealPart:
 
     @property
     def cells(self) -> Sequence[str]:
-        """Those of the magnitude."""
+        """The cells of the magnitude."""
         return self.magnitude.cells
 
     def numbers(self, _field: str) -> list[float]:
@@ -74,8 +74,8 @@ class RealPart:
 
 @dataclass(frozen=True)
 class CsvColumns:
-    """The columns by field; the cells of `unknown` ones, which hold numbers and name no field, and of `labels`, which
-    only say what a row is, by heading; and in `notes` what was left out or read otherwise than its heading says."""
+    """The columns by field; by heading, the cells of `unknown` columns, which hold numbers and name no field, and of
+    `labels`, which only label rows; `notes`: what was left out or interpreted."""
 
     fields: dict[str, CsvColumn | RealPart]
     unknown: dict[str, list[str]]
@@ -94,62 +94,62 @@ class _Table:
     notes: list[str]
 
     def columns(self) -> list[list[str]]:
-        return [[row[place] for row in self.rows] for place in range(len(self.header))]
+        return [[row[index] for row in self.rows] for index in range(len(self.header))]
 
 
-def from_csv(data: bytes, known: Collection[str]) -> CsvColumns:
-    """The columns of a text whose first line names the fields; `known` are those that there are.
+def from_csv(data: bytes, field_names: Collection[str]) -> CsvColumns:
+    """The columns of a text whose first line names the fields; `field_names` are those that there are.
 
     The text is UTF-8, UTF-16 or Latin-1. Cells are separated by commas, or by semicolons or tabs where the header is;
-    all numbers have the decimal mark that `text.decimal_mark` finds. Headings are read in capitals or not, with units
-    in brackets or in the name; magnitude and phase of an FRF are its real part, `frf_pc_per_n`, where that is known. A
-    first line `sep=;`, lines that begin with # and lines without a cell say nothing, and neither does a column without
-    a heading that is empty or counts the rows. Words below a blank line under the table are a note.
+    the decimal mark follows from `text.decimal_mark`. Headings are read in capitals or not, with units in brackets or
+    in the name; magnitude and phase of an FRF become its real part, `frf_pc_per_n`, where that is a field. A first line
+    `sep=;`, lines that begin with #, empty lines, and a column without a heading that is empty or counts the rows are
+    ignored. Words below a blank line under the table are a note.
 
     Raises:
         CsvError: the text is no CSV, a field comes twice, or a row has too many or too few cells.
     """
     table = _table(data)
-    found = CsvColumns({}, {}, {}, table.notes)
+    result = CsvColumns({}, {}, {}, table.notes)
     columns = table.columns()
     values = [cells for heading, cells in zip(table.header, columns, strict=True) if not _is_named_label(heading)]
     decimal = text.decimal_mark(lambda _: values, table.separator)
-    polar = (MAGNITUDE, PHASE) if REAL in known else ()
+    polar = (MAGNITUDE, PHASE) if REAL in field_names else ()
     parts: dict[str, CsvColumn] = {}
-    meanings = template_columns.fields_of(table.header, known)
-    for place, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
-        if meant is None and polar and polar_columns.is_phase_alone(heading):
-            meant = PHASE, _angle(heading, cells, decimal, found.notes)
-        if meant is not None and meant[0] in (*known, *polar):
+    meanings = template_columns.fields_of(table.header, field_names)
+    for index, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
+        if meant is None and polar and polar_columns.is_phase_without_unit(heading):
+            meant = PHASE, _angle(heading, cells, decimal, result.notes)
+        if meant is not None and meant[0] in (*field_names, *polar):
             field, factor = meant
-            if field in (fields := parts if field in polar else found.fields):
+            if field in (fields := parts if field in polar else result.fields):
                 raise _twice(field, fields[field].heading, heading)
             fields[field] = CsvColumn(heading, cells, table.lines, factor, decimal)
-        elif _only_counts(place, heading, cells):
+        elif _only_counts(index, heading, cells):
             continue
         elif _is_label(heading, cells, decimal):
-            if heading in found.labels:
+            if heading in result.labels:
                 raise CsvError(f"must name each column once; its header has {heading!r} twice")
-            found.labels[heading] = cells
+            result.labels[heading] = cells
         else:
-            found.unknown[heading] = cells
-    found.notes.extend(template_columns.halved(column.heading for column in found.fields.values()))
+            result.unknown[heading] = cells
+    result.notes.extend(template_columns.halved(column.heading for column in result.fields.values()))
     if parts:
         real = _real_part(parts)
-        if REAL in found.fields:
-            raise _twice(REAL, found.fields[REAL].heading, real.heading)
-        found.fields[REAL] = real
-        found.notes.append(f"{real.heading}: the real part is taken as {REAL}")
-    return found
+        if REAL in result.fields:
+            raise _twice(REAL, result.fields[REAL].heading, real.heading)
+        result.fields[REAL] = real
+        result.notes.append(f"{real.heading}: the real part is taken as {REAL}")
+    return result
 
 
-def _twice(field: str, one: str, other: str) -> CsvError:
-    twice = f"{one!r} and {other!r} are the same"
+def _twice(field: str, first: str, second: str) -> CsvError:
+    twice = f"{first!r} and {second!r} are the same"
     return CsvError(f"must name each field once; its header has {field!r} twice: {twice}")
 
 
 def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -> float:
-    """The factor to rad of a phase without a unit, by its values; a note says so."""
+    """The factor to rad of a phase without a unit, by its values; adds a note."""
     numbers = [abs(number) for cell in cells if (number := _number(cell, decimal)) is not None]
     try:
         factor = polar_columns.angle_by_values(heading, max(numbers, default=0.0))
@@ -160,7 +160,7 @@ def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -
 
 
 def _real_part(parts: Mapping[str, CsvColumn]) -> RealPart:
-    """Of magnitude and phase; raises CsvError where one is missing."""
+    """The real part from magnitude and phase; raises CsvError where one is missing."""
     if len(parts) == 1:
         ((field, column),) = parts.items()
         raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {polar_columns.lacking(field)}")
@@ -200,29 +200,29 @@ def _table(data: bytes) -> _Table:
 
 
 def _notes_under(table: list[list[str]], lines: list[int]) -> list[str]:
-    """Takes the rows of words below a blank line under a table off it: what they say, in words."""
+    """Remove rows of words below a blank line under a table; returns a message on each."""
     end = len(table)
     while end > 2 and template_lines.is_note(table[end - 1]):
         end -= 1
     start = next((row for row in range(end, len(table)) if lines[row] > lines[row - 1] + 1), len(table))
-    notes = [template_lines.note_told(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
+    notes = [template_lines.note_message(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
     del table[start:], lines[start:]
     return notes
 
 
 def _without_empty_end(cells: list[str], least: int) -> list[str]:
-    """The cells without the empty ones at the end, as spreadsheets write them, but so many at least."""
+    """The cells without empty ones at the end, as spreadsheets write them, but at least `least` of them."""
     while len(cells) > least and not cells[-1]:
         cells.pop()
     return cells
 
 
-def _only_counts(place: int, heading: str, cells: Sequence[str]) -> bool:
+def _only_counts(index: int, heading: str, cells: Sequence[str]) -> bool:
     """Whether it is an index of the rows, as spreadsheets write it, or an empty column."""
     if heading.lower() not in template_columns.NO_NAME:
         return False
     counts = [[str(first + row) for row in range(len(cells))] for first in (0, 1)]
-    return not any(cells) or (place == 0 and list(cells) in counts)
+    return not any(cells) or (index == 0 and list(cells) in counts)
 
 
 def _is_named_label(heading: str) -> bool:

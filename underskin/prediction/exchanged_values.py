@@ -1,8 +1,8 @@
-"""Preloads and spheres that look exchanged: loads beyond what a skin bears, which all come within once they are.
+"""Preloads and spheres that look exchanged: loads beyond what a skin bears, which all come within range once exchanged.
 
-Contact radius and depth go with F R, which an exchange of the numbers of F [N] and R [mm] leaves as it is; the load
-parameter L = F/(R² E) tells. A small sphere that is pressed hard makes L as large: an exchange is one of two
-explanations where every preload [N] is above every radius [mm], and none elsewhere.
+Contact radius and depth depend on F R, which an exchange of the numbers of F [N] and R [mm] leaves unchanged; the load
+parameter L = F/(R² E) does change. A small sphere pressed hard makes L equally large: an exchange is one of two
+explanations where every preload [N] is above every radius [mm], and none otherwise.
 """
 
 from collections.abc import Sequence
@@ -24,12 +24,12 @@ _LARGEST_MM = 30.0  # radius of a ball that a laboratory has: beyond it a preloa
 def exchanged_values(
     skin: SkinDescription, recorded: Sequence[FrfRecording], contact_model: ContactModel
 ) -> list[Finding]:
-    """That preload and sphere of the recordings look exchanged, if they do."""
+    """A finding where preload and sphere of the recordings look exchanged."""
     if not recorded or skin.youngs_modulus_mpa is None:
         return []
     modulus = float(to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa))
-    preload = np.array([entry.preload_n for entry in recorded])
-    radius_mm = np.array([entry.indenter_radius_mm for entry in recorded])
+    preload = np.array([recording.preload_n for recording in recorded])
+    radius_mm = np.array([recording.indenter_radius_mm for recording in recorded])
 
     def beyond(force: Floats, sphere_mm: Floats) -> Mask:
         load = hertz.load_parameter(force, to_si("indenter_radius_mm", sphere_mm), modulus)

@@ -96,15 +96,15 @@ def predict(
     declared = conditions.skin.d33_pc_per_n
     values = {} if declared is None or kind != "frf" else {"d33": declared}
     values |= parameters
-    own = sum(map(len, parameters_together(acting, conditions, kind).values()))
-    fit = _fit_coordinates(model, values, own)
+    mechanism_count = sum(map(len, parameters_together(acting, conditions, kind).values()))
+    fit = _fit_coordinates(model, values, mechanism_count)
     prediction = model.predict(fit)
     unit = float(to_lab("frf_pc_per_n", 1.0)) if kind == "frf" else 1.0
     return Predicted(
         value=unit * prediction.value,
         derivatives={
-            entry.name: unit * slopes / (entry.from_fit(at) if entry.scale == "log" else 1.0)
-            for entry, slopes, at in zip(model.parameters, prediction.slopes, fit.tolist(), strict=True)
+            parameter.name: unit * slopes / (parameter.from_fit(at) if parameter.scale == "log" else 1.0)
+            for parameter, slopes, at in zip(model.parameters, prediction.slopes, fit.tolist(), strict=True)
         },
         recording=model.recording,
         inside=model.valid & prediction.inside,
@@ -112,7 +112,7 @@ def predict(
 
 
 def needed_fields(mechanisms: Sequence[Mechanism]) -> dict[str, str]:
-    """Fields of an FRF's conditions needed beside sphere, preload and lines, each with the mechanism that needs it."""
+    """Fields of an FRF's conditions needed besides sphere, preload and lines, each with the mechanism that needs it."""
     needed: dict[str, str] = {}
     for mechanism in mechanisms:
         needed |= {name: mechanism.name for name in mechanism.needs_fields if name not in needed}
@@ -122,40 +122,49 @@ def needed_fields(mechanisms: Sequence[Mechanism]) -> dict[str, str]:
 def require_fields(mechanisms: Sequence[Mechanism], conditions: Conditions, model: str = "the model") -> None:
     """Raises InvalidInput for the first FRF whose conditions lack a field that a mechanism of this model needs."""
     for name, mechanism in needed_fields(mechanisms).items():
-        for entry in conditions.recordings:
-            if isinstance(entry, FrfConditions) and getattr(entry, name) is None:
-                raise required(f"recordings[{entry.id}].{name}", f"is required: {model} has {mechanism}")
+        for recording in conditions.recordings:
+            if isinstance(recording, FrfConditions) and getattr(recording, name) is None:
+                raise required(f"recordings[{recording.id}].{name}", f"is required: {model} has {mechanism}")
 
 
-def _fit_coordinates(model: Model, values: Mapping[str, float], own: int) -> NDArray[np.float64]:
+def _fit_coordinates(model: Model, values: Mapping[str, float], mechanism_count: int) -> NDArray[np.float64]:
     """The fit coordinates (parameters,) of values by name; nuisances that are not given are at their priors' centres.
 
-    `own`: how many of the parameters, the first ones, are the mechanisms'.
+    `mechanism_count`: how many of the parameters, the first ones, are the mechanisms'.
     """
-    names = [entry.name for entry in model.parameters]
+    names = [parameter.name for parameter in model.parameters]
     for name in values:
         if name not in names:
             raise not_one_of("parameters", name, names)
-    needed = {*(entry.name for entry in model.parameters[:own] if entry.relative_to is None), "d33"}
-    return np.array([_coordinate(entry, _fitted(entry, values), entry.name in needed) for entry in model.parameters])
+    needed = {
+        *(parameter.name for parameter in model.parameters[:mechanism_count] if parameter.relative_to is None),
+        "d33",
+    }
+    return np.array(
+        [_coordinate(parameter, _fitted(parameter, values), parameter.name in needed) for parameter in model.parameters]
+    )
 
 
-def _fitted(entry: Parameter, values: Mapping[str, float]) -> float | None:
+def _fitted(parameter: Parameter, values: Mapping[str, float]) -> float | None:
     """The given value, as a multiple where the parameter is one of another."""
-    value = values.get(entry.name)
-    return value if value is None or entry.relative_to is None else value / values[entry.relative_to]
+    value = values.get(parameter.name)
+    return value if value is None or parameter.relative_to is None else value / values[parameter.relative_to]
 
 
-def _coordinate(entry: Parameter, value: float | None, needed: bool) -> float:
+def _coordinate(parameter: Parameter, value: float | None, needed: bool) -> float:
     if value is None:
         if needed:
-            raise required(f"parameters.{entry.name}", f"required{_unit(entry.unit, ', in ')}: {entry.reason}")
-        return entry.start
-    if not entry.low <= value <= entry.high:
+            raise required(
+                f"parameters.{parameter.name}", f"required{_unit(parameter.unit, ', in ')}: {parameter.reason}"
+            )
+        return parameter.start
+    if not parameter.low <= value <= parameter.high:
         raise out_of_range(
-            f"parameters.{entry.name}", value, f"must be {entry.low:g} to {entry.high:g}{_unit(entry.unit)}"
+            f"parameters.{parameter.name}",
+            value,
+            f"must be {parameter.low:g} to {parameter.high:g}{_unit(parameter.unit)}",
         )
-    return entry.to_fit(value)
+    return parameter.to_fit(value)
 
 
 def _unit(unit: str, lead: str = " ") -> str:

@@ -1,6 +1,6 @@
-"""Whether a d33 from measured values is plausible: sizes that no sensor has, and reversed signs, are findings.
+"""Findings on an implausible d33 from measured values: impossible magnitudes and reversed signs.
 
-The d33 is answered all the same: a wrong gain or unit moves every value alike, and the fit does not see it.
+The d33 is answered all the same: a wrong gain or unit changes every value alike, and the fit cannot detect it.
 """
 
 from collections.abc import Iterator
@@ -12,12 +12,12 @@ from underskin.findings.finding import Finding
 from underskin.findings.sentences import ImplausibleD33
 from underskin.units import LAB, Floats, Mask, unusual
 
-_LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: beyond these no skin's sensors have been
+_LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: range of all reported sensors of skins
 _OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
 
 
 def of_array(d33: float) -> list[Finding]:
-    """What looks wrong in an array's d33 [pC/N]."""
+    """A finding on an implausible d33 of an array [pC/N]."""
     implausible = implausibility(d33)
     arguments = {"d33_pc_per_n": d33, "kind": implausible}
     return [] if implausible is None else [Finding(Reason.D33_OF_ARRAY, "", "d33_pc_per_n", arguments)]
@@ -32,9 +32,9 @@ def implausibility(d33: float) -> ImplausibleD33 | None:
 
 
 def of_rows(frf: Floats, d33: Floats) -> list[Finding]:
-    """Of measured FRF and the d33 that they mean, a row each [pC/N]: the first row of each kind.
+    """Findings on measured FRF and the resulting d33 (rows,) [pC/N]: the first row of each kind.
 
-    A row whose FRF is named already is not named for its d33 as well.
+    A row with a finding on its FRF has none on its d33.
     """
     likely = LAB["frf_pc_per_n"].likely
     assert likely is not None

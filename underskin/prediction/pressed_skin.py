@@ -1,14 +1,12 @@
-"""A skin pressed by a sphere, and the limits of what is computed.
+"""The base model: a skin pressed by a sphere, and the limits of its domain.
 
-The skin pressed by a sphere: contact radius, a/h, L, σ, stress on the sensor and FRF; and d33 from a measured FRF.
+`transmission` gives contact radius, a/h, L, σ, stress on the sensor and FRF, and d33 from a measured FRF, for columns
+in SI that broadcast. The contact edge stands still; the contact is one of two models: `paper`, the σ table (Hertz'
+radius on a half space, σ of the bonded finite-strain layer under Hertz' pressure as a dead load; Seminara 2018,
+equations 7 to 16), and `solved`, a sphere in frictionless contact with that layer.
 
-Columns in SI that broadcast. In the base model the contact edge stands still; the contact is one of two models:
-`paper`, the σ table: Hertz' radius on a half space, σ of the bonded finite-strain layer under Hertz' pressure as a dead
-load (Seminara 2018, equations 7 to 16); and `solved`: a sphere in frictionless contact with that layer itself.
-
-Which limit a row exceeds that is out of the domain, in words: `L = 1.17 exceeds 0.1: at most 25.6 N`. Why the base
-model says nothing of a recording, in words that name what exceeds which limit. A skin as its campaign declares it, and
-how the base model's FRF follows from what is declared.
+`in_words` says which limit a row outside the domain exceeds, `L = 1.17 exceeds 0.1: at most 25.6 N`; `reasons` why a
+recording cannot be used; `declared_skin` and `log_slopes` relate the FRF to the declared values.
 """
 
 import math
@@ -29,7 +27,7 @@ from underskin.units import Floats, Mask
 
 @dataclass(frozen=True)
 class Transmission:
-    """What reaches the sensor; every array has one entry a row, NaN in σ, rel_error and stress where not `inside`."""
+    """Contact and stress on the sensor (rows,); NaN in σ, rel_error and stress where not `inside`."""
 
     contact_radius: Floats  # a [m]
     a_over_h: Floats
@@ -120,8 +118,8 @@ def frf_gradient(
     scale = np.where(reached.inside, charge_response.frf(d33, 1.0, rho), np.nan)
     slopes = contact_model.gradient(alpha, rho, reached.load_parameter)
     # ∂FRF/∂ of the logarithm of each dimensionless number, F R/(E h³), L and ρ.
-    _, growth = contact_model.load_over_cube(alpha)
-    in_force, in_load = scale * slopes[0] * alpha * growth, scale * slopes[2] * reached.load_parameter
+    _, radius_exponent = contact_model.load_over_cube(alpha)
+    in_force, in_load = scale * slopes[0] * alpha * radius_exponent, scale * slopes[2] * reached.load_parameter
     in_rho = scale * (2 * reached.sigma + slopes[1] * rho)
     return {
         "thickness": -(3 * in_force + in_rho) / skin.thickness,
@@ -142,8 +140,8 @@ Words = Sequence[str | None]
 
 @dataclass(frozen=True)
 class Limit:
-    """A quantity by its symbol, its values of each row, its lowest and highest; and of a force that it grows with the
-    highest [N] of each row."""
+    """A limited quantity: its symbol, its values (rows,), its lowest and highest value; and `most_n`, the force [N] of
+    each row at which it reaches the highest value."""
 
     symbol: str
     values: Floats
@@ -175,8 +173,8 @@ def of_pressed(reached: Transmission, preload_n: Floats, contact_model: ContactM
 def in_words(
     inside: Mask, count: int, limits: Sequence[Limit], poisson_ratio: Floats | float = INCOMPRESSIBLE
 ) -> Words | None:
-    """Of each row that is not inside what it exceeds, and where a force would be inside the highest; None where all
-    are inside."""
+    """For each row outside, the limits that it exceeds, and the highest force inside, if any; None where all rows are
+    inside."""
     rows = np.flatnonzero(~np.broadcast_to(inside, (count,)))
     if not rows.size:
         return None
@@ -184,19 +182,19 @@ def in_words(
     ratio = _at(np.asarray(poisson_ratio), rows, count)
     values = [_at(limit.values, rows, count) for limit in limits]
     most = [[math.inf] * len(rows) if limit.most_n is None else _at(limit.most_n, rows, count) for limit in limits]
-    for place, row in enumerate(rows.tolist()):
-        if ratio[place] != INCOMPRESSIBLE:
-            words[row] = OTHER_MODULUS.format(ratio[place])
+    for index, row in enumerate(rows.tolist()):
+        if ratio[index] != INCOMPRESSIBLE:
+            words[row] = OTHER_MODULUS.format(ratio[index])
             continue
         beyond = [
-            (told, most[number][place])
-            for number, limit in enumerate(limits)
-            for told in _told(limit, values[number][place])
+            (message, most[limit_index][index])
+            for limit_index, limit in enumerate(limits)
+            for message in _excess(limit, values[limit_index][index])
         ]
         forces = [force for _, force in beyond]
-        # No force brings a row back that exceeds another limit as well.
+        # No force is inside for a row that exceeds a limit independent of force.
         at_most = f": at most {_rounded_down(min(forces))} N" if forces and all(map(math.isfinite, forces)) else ""
-        words[row] = (", ".join(told for told, _ in beyond) or NOT_FINITE) + at_most
+        words[row] = (", ".join(message for message, _ in beyond) or NOT_FINITE) + at_most
     return words
 
 
@@ -204,20 +202,20 @@ def _at(values: Floats, rows: np.ndarray[tuple[int], np.dtype[np.intp]], count: 
     return np.broadcast_to(values, (count,))[rows].tolist()
 
 
-def _told(limit: Limit, value: float) -> Iterator[str]:
+def _excess(limit: Limit, value: float) -> Iterator[str]:
     if value > limit.high:
-        yield f"{limit.symbol} = {_beside(value, limit.high)} exceeds {limit.high:g}"
+        yield f"{limit.symbol} = {_distinguishable(value, limit.high)} exceeds {limit.high:g}"
     elif value < limit.low:
-        yield f"{limit.symbol} = {_beside(value, limit.low)} is below {limit.low:g}"
+        yield f"{limit.symbol} = {_distinguishable(value, limit.low)} is below {limit.low:g}"
 
 
-def _beside(value: float, limit: float) -> str:
-    """A number with three digits, or as many as tell it from a limit."""
+def _distinguishable(value: float, limit: float) -> str:
+    """A number with three digits, or as many as distinguish it from a limit."""
     return next((text for digits in (3, 6, 9) if float(text := f"{value:.{digits}g}") != limit), repr(value))
 
 
 def _rounded_down(force: float) -> str:
-    """A force with three digits that is not greater, but for the rounding of floats."""
+    """A force rounded down to three digits, up to float rounding."""
     if not force > 0:
         return "0"
     step = 10.0 ** (math.floor(math.log10(force)) - 2)
@@ -225,12 +223,12 @@ def _rounded_down(force: float) -> str:
 
 
 _MOST_CHARGE = 1.0  # C/N
-_LIKE_MILLI = 100.0  # N: from here on a preload that fits as 1/1000 may be in mN
+_LIKE_MILLI = 100.0  # N: a larger preload that is inside at 1/1000 may be in mN
 
 
 @dataclass(frozen=True)
 class RowConditions:
-    """A row's force, sphere and elastomer, as a lab writes them."""
+    """Force, sphere and elastomer of a row in lab units."""
 
     preload_n: float
     indenter_radius_mm: float
@@ -239,7 +237,7 @@ class RowConditions:
 
 
 def usable(level: Floats, noise: Floats, sigma: Floats, transmitted: Transmission) -> Mask:
-    """The rows inside the table's domain, at an offset that it reaches, with a line in the band and below 1 C/N."""
+    """The rows inside the table's domain, at an offset within it, with a line in the band and an FRF below 1 C/N."""
     return transmitted.inside & np.isfinite(sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
 
 
@@ -250,7 +248,7 @@ def reasons(
     level: Floats,
     contact_model: ContactModel,
 ) -> Iterator[Finding]:
-    """Of each recording that is not `usable` why; `level` is its averaged FRF [C/N], NaN without a line in the band."""
+    """Why each recording is not `usable`; `level`: its averaged FRF [C/N], NaN without a line in the band."""
     for row, recording in enumerate(recorded):
         if skin.poisson_ratio != INCOMPRESSIBLE or not transmitted.inside[row]:
             assert skin.youngs_modulus_mpa is not None
@@ -277,7 +275,7 @@ def _numbers(transmitted: Transmission) -> tuple[Floats, Floats, Floats]:
 
 
 def beyond(pressed: RowConditions, numbers: Sequence[float], contact_model: ContactModel) -> str:
-    """What of ν, or of `numbers`, a/h, rT/h and L, is outside the table's domain, with F, R and E."""
+    """Which of ν and of `numbers` (a/h, rT/h and L) is outside the table's domain, in words with F, R and E."""
     if pressed.poisson_ratio != INCOMPRESSIBLE:
         return f"Poisson's ratio = {pressed.poisson_ratio:g}: the table is of incompressible elastomer, 0.5"
     over_h, rt_over_h, load = numbers
@@ -299,7 +297,7 @@ DECLARED = ("thickness", "sensor_radius", "youngs_modulus")
 
 
 def declared_skin(described: SkinDescription) -> Skin:
-    """In SI; the campaign's reader has checked that it is whole, as FRFs need it, and its units."""
+    """The declared skin in SI; the campaign's reader has checked that FRFs have all fields, and their units."""
     assert described.thickness_mm is not None
     assert described.youngs_modulus_mpa is not None
     assert described.sensor_radius_mm is not None

@@ -1,5 +1,5 @@
-"""A skin before it is built: how much of a load reaches a sensor, how finely the array tells where it is, and how far
-apart two loads must be to be told from one (Seminara 2018, section 4, as a tool).
+"""Design of a skin before it is built: the share of a load that reaches a sensor, how finely the array locates it, and
+the least distance at which two loads are resolved (Seminara 2018, section 4, as a tool).
 
 A sensor's *response* to a contact at the distance e from its centre is σ(e): it bears the share (3/2) ρ² σ(e) of the
 force. Two loads are equal, and their responses add, as on a linear layer.
@@ -12,7 +12,7 @@ import numpy as np
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.pressed_skin import Transmission, transmission
 from underskin.surrogate.contact_model import ContactModel
-from underskin.surrogate.off_centre_sigma import sigma_beside
+from underskin.surrogate.off_centre_sigma import sigma_off_centre
 from underskin.units import Floats, Mask
 
 _SWEEP = 61  # points of a sweep
@@ -33,13 +33,13 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Resolution:
-    """How finely an array tells where a load is; lengths in m, NaN where nothing can be told.
+    """Spatial resolution of an array; lengths in m, NaN where undetermined.
 
-    `width`: full width at half maximum of a sensor's response against the contact's place.
+    `width`: full width at half maximum of a sensor's response against the contact's position.
     `between`, `amid`: response to a contact midway between two sensors, and amid four, over that above a sensor.
-    `separation`: the smallest distance from which on two equal contacts in line with a row of sensors show as two,
-    wherever the row lies; `best_separation`: the smallest at which they do where it lies best. They show as two where
-    a sensor between two others reads less than both, by `dip` times the reading above a sensor.
+    `separation`: the smallest distance from which on two equal contacts in line with a row of sensors are resolved for
+    any placement of the row; `best_separation`: the smallest for the best placement. They are resolved where a sensor
+    between two others reads less than both, by `dip` times the reading above a sensor.
     """
 
     width: float
@@ -65,7 +65,7 @@ class Design:
 def design(
     contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: float, pitch: float, dip: float
 ) -> Design:
-    """How much of a load reaches the sensors of a skin, and how finely its array locates it.
+    """The share of a load that reaches the sensors of a skin, and the resolution of its array.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def design(
     pitch
         Distance between the centres of neighbouring sensors [m].
     dip
-        By how much a sensor between two others must read less than both for two loads to show as two, over the reading
+        How much less a sensor between two others must read than both for two loads to be resolved, over the reading
         above a sensor [-].
 
     Returns
@@ -90,8 +90,8 @@ def design(
     point = tuple(float(part) for part in (contact.small_strain_a_over_h, contact.rt_over_h, contact.load_parameter))
     h = float(skin.thickness)
     inside = bool(contact.inside)
-    offset, response = sigma_beside(contact_model, *point) if inside else (np.zeros(1), np.full(1, np.nan))
-    _, point_response = sigma_beside(contact_model, 0.0, point[1], 0.0) if inside else (offset, response)
+    offset, response = sigma_off_centre(contact_model, *point) if inside else (np.zeros(1), np.full(1, np.nan))
+    _, point_response = sigma_off_centre(contact_model, 0.0, point[1], 0.0) if inside else (offset, response)
     return Design(
         contact=contact,
         gamma=float(contact_model.sigma(0.0, point[1], 0.0).sigma),
@@ -105,17 +105,17 @@ def design(
 
 def _sweeps(contact_model: ContactModel, point: tuple[float, ...]) -> tuple[Sweep, ...]:
     sweeps = []
-    for place, (axis, (low, high)) in enumerate(contact_model.domain.items()):
+    for axis_index, (axis, (low, high)) in enumerate(contact_model.domain.items()):
         # σ turns fastest near L = 0, where it grows like its cube root.
         values = low + (high - low) * np.linspace(0, 1, _SWEEP) ** (3 if axis == "load_parameter" else 1)
-        columns = [values if number == place else np.full(_SWEEP, own) for number, own in enumerate(point)]
+        columns = [values if index == axis_index else np.full(_SWEEP, fixed) for index, fixed in enumerate(point)]
         gamma = contact_model.sigma(0.0, columns[1], 0.0).sigma
         sweeps.append(Sweep(axis, values, contact_model.sigma(*columns).sigma, gamma))
     return tuple(sweeps)
 
 
 def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, dip: float) -> Resolution:
-    """The resolution of an array from a sensor's response to the place of the load.
+    """The resolution of an array from a sensor's response against the position of the load.
 
     Parameters
     ----------
@@ -135,25 +135,27 @@ def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, d
     width = 2 * float(np.interp(float(response[0]) / 2, response[pair], offset[pair]))
     spacing = max(pitch, width / _FINEST)
     distances = np.linspace(nearest, nearest + 4 * spacing + 3 * width, _DISTANCES)
-    seen = told_apart(offset, response, spacing, distances, _PLACEMENTS, dip)
-    always, sometimes = (np.asarray(part) for part in (seen.all(axis=1), seen.any(axis=1)))
-    settled = len(distances) - int(np.argmin(always[::-1])) if not always.all() else 0
+    resolved = are_resolved(offset, response, spacing, distances, _PLACEMENTS, dip)
+    always, sometimes = (np.asarray(part) for part in (resolved.all(axis=1), resolved.any(axis=1)))
+    first_resolved = len(distances) - int(np.argmin(always[::-1])) if not always.all() else 0
     between, amid = (
-        float(np.interp(place, offset, response, right=0.0)) / float(response[0])
-        for place in (pitch / 2, pitch / np.sqrt(2))
+        float(np.interp(distance, offset, response, right=0.0)) / float(response[0])
+        for distance in (pitch / 2, pitch / np.sqrt(2))
     )
     return Resolution(
         width=width,
         between=between,
         amid=amid,
-        separation=float(distances[settled]) if settled < len(distances) else float("nan"),
+        separation=float(distances[first_resolved]) if first_resolved < len(distances) else float("nan"),
         best_separation=float(distances[np.argmax(sometimes)]) if sometimes.any() else float("nan"),
     )
 
 
-def told_apart(offset: Floats, response: Floats, pitch: float, distances: Floats, placements: int, dip: float) -> Mask:
-    """Whether two contacts show as two: (m, n), at each distance (m,) and for each placement of the row of sensors,
-    which are over half a pitch, since the other half is its mirror image."""
+def are_resolved(
+    offset: Floats, response: Floats, pitch: float, distances: Floats, placements: int, dip: float
+) -> Mask:
+    """Whether two contacts are resolved: (m, n), at each distance (m,) and for each placement of the row of sensors
+    over half a pitch, of which the other half is the mirror image."""
     count = int(np.ceil(distances[-1] / 2 / pitch)) + 2
     half = distances[:, None, None] / 2
     sensors = pitch * np.arange(-count, count + 1) + pitch * np.linspace(0, 0.5, placements)[:, None]

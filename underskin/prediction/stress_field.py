@@ -77,7 +77,7 @@ def stress_field(
     Parameters
     ----------
     contact_model
-        The σ table, or the solved contact, which knows ν = 0.5 alone.
+        The σ table, or the solved contact, which is defined for ν = 0.5 only.
     skin, indenter
         One skin and one sphere, in SI.
     preload
@@ -118,7 +118,7 @@ def stress_field(
 def field_from_lab(
     contact_model: ContactModel, given: Mapping[str, float], radii: int, depths: int, *, units_checked: bool
 ) -> StressField:
-    """The same from numbers in lab units by field name: the skin's, `indenter_radius_mm` and `preload_n`.
+    """`stress_field` from numbers in lab units by field name: the skin's, `indenter_radius_mm` and `preload_n`.
 
     Raises
     ------
@@ -134,19 +134,19 @@ def field_from_lab(
 
 
 def _solved_section(poisson_ratio: float, a: Floats, r: Floats, depth: Floats) -> Floats:
-    """As `layer_stress`, under the pressures of the linear layer's own contacts of these radii."""
+    """`layer_stress` under the pressures of the linear layer's contacts of these radii."""
     solved = ContactEquation(a).solve(Layer(poisson_ratio)).sphere_shape.value
-    parts = (SpherePressure(float(one), shape).hertz_parts() for one, shape in zip(a, solved, strict=True))
+    parts = (SpherePressure(float(radius), shape).hertz_parts() for radius, shape in zip(a, solved, strict=True))
     sections = [
-        np.tensordot(shares, layer_stress(poisson_ratio, one * radii, r, depth), 1)
-        for one, (radii, shares) in zip(a, parts, strict=True)
+        np.tensordot(shares, layer_stress(poisson_ratio, radius * radii, r, depth), 1)
+        for radius, (radii, shares) in zip(a, parts, strict=True)
     ]
     return np.stack(sections)
 
 
 def _contact(contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: Floats) -> Transmission:
-    """As the base model has it; for ν ≠ 0.5 in the contact `paper` with the linear layer's σ in the domain that the
-    table has for 0.5."""
+    """The contact by the base model; for ν ≠ 0.5 in the contact `paper` with the linear layer's σ in the domain of the
+    table for 0.5."""
     contact = transmission(contact_model, skin, indenter, preload)
     if float(skin.poisson_ratio) == INCOMPRESSIBLE or contact_model.name != "paper":
         return contact
@@ -159,7 +159,7 @@ def _contact(contact_model: ContactModel, skin: Skin, indenter: Indenter, preloa
 
 
 def _end(contact: Transmission) -> float:
-    """How far a section reaches, over the thickness: beyond all contacts that the table holds, and the sensor."""
+    """The extent of a section over the thickness: beyond all contacts inside the table, and the sensor."""
     widest = float(contact.a_over_h[contact.inside].max(initial=0.0))
     sensor = float(contact.rt_over_h[0]) if contact.inside.any() else 0.0
     return max(_LEAST, widest + _AROUND_CONTACT, sensor + _AROUND_SENSOR)

@@ -1,4 +1,4 @@
-"""What a lab records, in the formats its instruments write, as one campaign model.
+"""Recordings of a lab, in the formats of its instruments, as one campaign model.
 
 reading = read_file("palm.tdms", "palm.tdms", rig=rig_description.parse(rig_bytes, "rig.yaml"))
 reading.campaign.recordings

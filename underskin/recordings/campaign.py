@@ -1,20 +1,13 @@
-"""A campaign: the conditions of its recordings, and what was recorded.
+"""The campaign (`campaign/1`): a skin, the conditions of its recordings, and what was recorded, in the lab's units.
 
-The conditions of recordings: skin, sphere or sample, and all else that is chosen before anything is measured.
+Conditions (skin, sphere or sample, and everything else chosen before a measurement) are what a forward model takes; a
+recording extends its conditions by the measured columns, so a campaign can be used wherever conditions are needed.
+Fields are named as in the document; a field absent from a document is None. Reading a document keeps the valid
+recordings and reports the problems of the others; writing one gives the canonical document.
 
-A forward model takes conditions and predicts what would be measured under them. A recording is its conditions and what
-was measured under them (`underskin.recordings.campaign`), so that a campaign stands wherever conditions are asked for.
-Fields are named as in `campaign/1` and keep its units.
-
-Numbers beyond any instrument and any skin, whatever their unit: their products and powers overflow.
-
-The bounds lie far beyond any slip of units: from a picometre to a kilometre, from a millionth of a pascal to the
-pressure in neutron stars. `units_checked` does not confirm such numbers.
-
-The campaign (`campaign/1`): recordings of one skin, each its conditions and what was measured, in the lab's units.
-
-Fields are named as in the document and keep its units; a field that a document leaves out is None. Reading a document
-keeps the good recordings and says of each of the others what is wrong; writing one gives the canonical document.
+Numbers beyond any instrument and any skin are rejected in every unit, since their products and powers overflow. The
+bounds lie far beyond any slip of units: a picometre to a kilometre, a millionth of a pascal to the pressure in neutron
+stars. `units_checked` does not admit them.
 """
 
 import math
@@ -46,10 +39,10 @@ class Sensor:
 
 
 def read_sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
-    """The sensors of an array, each with an id of its own."""
+    """The sensors of an array, with distinct ids."""
     if not isinstance(value, list | tuple):
         raise wrong_type(name, shown(value), "must be a list of sensors")
-    sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]
+    sensors = [field.build(Sensor, f"{name}[{index}]", document, units_checked) for index, document in enumerate(value)]
     seen: set[str] = set()
     for index, sensor in enumerate(sensors):
         if sensor.id in seen:
@@ -63,9 +56,9 @@ Sensors = Annotated[tuple[Sensor, ...], read_sensors]
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What declared values of the skin may be off by: standard deviations [%].
+    """Standard deviations of declared values of the skin [%].
 
-    They are part of absolute intervals, such as that of the array's d33, and of none that compares sensors or dates.
+    They widen absolute intervals, such as that of the array's d33, not those that compare sensors or dates.
     """
 
     thickness_percent: field.NotNegative = 2.0
@@ -74,7 +67,7 @@ class Tolerances:
 
 
 def read_tolerances(name: str, value: Any, units_checked: bool) -> Tolerances:
-    """Those that differ from the default ones."""
+    """The tolerances that a document states; others have their defaults."""
     return field.build(Tolerances, name, value, units_checked)
 
 
@@ -102,9 +95,8 @@ class SkinDescription:
 class FrfConditions:
     """The skin is pressed by `preload_n` and shaken by `dynamic_force_n` (peak amplitude) at `frequency_hz`.
 
-    A `dynamic_force_n` of 0 stands for the limit of a small oscillation. `frequency_hz` is None where a time series is
-    recorded, whose lines are yet to be estimated. `conditions` holds what else the lab noted, numbers or words by names
-    of its own.
+    A `dynamic_force_n` of 0 is the limit of a small oscillation. `frequency_hz` is None for a time series, whose lines
+    are estimated later. `conditions` holds the lab's further columns, numbers or words by names of its own.
     """
 
     id: field.Name
@@ -121,20 +113,20 @@ class FrfConditions:
     conditions: Further | None = None
 
     def without_measurements(self, **changes: Any) -> "FrfConditions":
-        """These conditions alone, with some of them changed."""
-        own = vars(self)
-        return FrfConditions(**({name: own[name] for name in _OF_FRF} | changes))
+        """The conditions without measurements, with some of them changed."""
+        values = vars(self)
+        return FrfConditions(**({name: values[name] for name in _OF_FRF} | changes))
 
 
-_OF_FRF = [entry.name for entry in fields(FrfConditions)]
+_OF_FRF = [model_field.name for model_field in fields(FrfConditions)]
 
 
 @dataclass(frozen=True, eq=False)
 class IndentationConditions:
     """A sphere pressed in and drawn back by `displacement_mm`, loading and unloading in order.
 
-    `displacement_mm` is the sphere's own; `stage_stiffness_n_per_mm` is that of a stage or cantilever whose deflection
-    has been subtracted, which decides where a contact that sticks comes off.
+    `displacement_mm` is that of the sphere. `stage_stiffness_n_per_mm` is that of a stage or cantilever whose
+    deflection has been subtracted; it determines the pull-off of an adhesive contact.
     """
 
     id: field.Name
@@ -175,7 +167,7 @@ RecordingConditions = FrfConditions | IndentationConditions | CompressionConditi
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions of several recordings of one skin; `name` is what messages call them."""
+    """Conditions of several recordings of one skin; `name` is their name in messages."""
 
     name: str
     skin: SkinDescription
@@ -222,7 +214,7 @@ def frf_conditions(
     if unknown:
         raise not_one_of(unknown[0], "given", ("indenter_radius_mm", "preload_n", "frequency_hz", *_FURTHER_COLUMNS))
     skin = skin if skin.sensors else replace(skin, sensors=(Sensor("sensor", 0.0, 0.0),))
-    centres = {entry.id: entry for entry in skin.sensors}
+    centres = {skin_sensor.id: skin_sensor for skin_sensor in skin.sensors}
     if sensor is not None and sensor not in centres:
         raise not_one_of("sensor", sensor, centres)
     centre = skin.sensors[0] if sensor is None else centres[sensor]
@@ -232,10 +224,10 @@ def frf_conditions(
     lines = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     _check_values(skin, columns, lines)
     recordings = []
-    for number, row in enumerate(_rows(columns)):
-        place = centre.x_mm + row.pop("offset_x_mm"), centre.y_mm + row.pop("offset_y_mm")
+    for index, row in enumerate(_rows(columns)):
+        position = centre.x_mm + row.pop("offset_x_mm"), centre.y_mm + row.pop("offset_y_mm")
         recordings.append(
-            FrfConditions(id=f"row {number}", sensor=centre.id, position_mm=place, frequency_hz=lines, **row)
+            FrfConditions(id=f"row {index}", sensor=centre.id, position_mm=position, frequency_hz=lines, **row)
         )
     return Conditions("rows", skin, tuple(recordings))
 
@@ -266,39 +258,44 @@ def _check_values(skin: SkinDescription, columns: Mapping[str, ArrayLike], lines
 def _rows(columns: Mapping[str, ArrayLike]) -> list[dict[str, Any]]:
     """One dictionary a row of columns that broadcast to one dimension."""
     try:
-        whole = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values, dtype=float)) for values in columns.values()))
+        broadcast = np.broadcast_arrays(
+            *(np.atleast_1d(np.asarray(values, dtype=float)) for values in columns.values())
+        )
     except ValueError:
         lengths = ", ".join(f"{name} {np.size(values)}" for name, values in columns.items())
         raise InvalidInput(
             "columns", lengths, "must have one length, or be single numbers", code=ErrorCode.UNEQUAL_LENGTHS
         ) from None
-    return [dict(zip(columns, row, strict=True)) for row in zip(*(column.tolist() for column in whole), strict=True)]
+    return [
+        dict(zip(columns, row, strict=True)) for row in zip(*(column.tolist() for column in broadcast), strict=True)
+    ]
 
 
 def frf_of(conditions: Conditions) -> list[FrfConditions]:
-    """Those of FRF recordings, in order; raises InvalidInput where there is none."""
-    recordings = [entry for entry in conditions.recordings if isinstance(entry, FrfConditions)]
+    """The conditions of FRF recordings, in order; raises InvalidInput where there is none."""
+    recordings = [recording for recording in conditions.recordings if isinstance(recording, FrfConditions)]
     if not recordings:
         raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
 
 
 def curves_of(conditions: Conditions) -> list[CurveConditions]:
-    """Those of indentations and compressions, in order."""
-    return [entry for entry in conditions.recordings if isinstance(entry, CurveConditions)]
+    """The conditions of indentations and compressions, in order."""
+    return [recording for recording in conditions.recordings if isinstance(recording, CurveConditions)]
 
 
 def offsets(conditions: Conditions) -> Floats:
-    """The commanded place of the sphere in each FRF recording, from its sensor's centre (recordings, 2) [m]."""
+    """The commanded position of the sphere in each FRF recording, from its sensor's centre (recordings, 2) [m]."""
     centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors}
-    beside = [
-        np.subtract(entry.position_mm or centres[entry.sensor], centres[entry.sensor]) for entry in frf_of(conditions)
+    offsets_mm = [
+        np.subtract(recording.position_mm or centres[recording.sensor], centres[recording.sensor])
+        for recording in frf_of(conditions)
     ]
-    return to_si("thickness_mm", np.array(beside))
+    return to_si("thickness_mm", np.array(offsets_mm))
 
 
 _LENGTH, _FORCE, _TIME = (1e-9, 1e6), (1e-8, 1e8), (1e-12, 1e12)
-_PLACE = (0.0, 1e6)  # of what differences and rotations leave where 0 is meant, too
+_POSITION = (0.0, 1e6)  # also rounding of differences and rotations that should be 0
 _CHARGE = (1e-9, 1e9)
 _STIFFNESS = (1e-12, 1e12)
 _BOUNDS = {
@@ -308,11 +305,11 @@ _BOUNDS = {
     "d33_pc_per_n": _CHARGE,
     "width_mm": _LENGTH,
     "length_mm": _LENGTH,
-    "sensors": _PLACE,
+    "sensors": _POSITION,
     "indenter_radius_mm": _LENGTH,
     "sample_height_mm": _LENGTH,
     "sample_diameter_mm": _LENGTH,
-    "position_mm": _PLACE,
+    "position_mm": _POSITION,
     "displacement_mm": _LENGTH,
     "preload_n": _FORCE,
     "dynamic_force_n": _FORCE,
@@ -326,7 +323,7 @@ _BOUNDS = {
     "stage_stiffness_n_per_mm": _STIFFNESS,
     "conditions": (0.0, 1e20),  # a lab's own columns: clocks that count nanoseconds have 19 digits
 }
-# Of what is measured zeros, rounded, may be as small as they like: only a diagnosis is of no use then.
+# Measured values may be arbitrarily small (rounded zeros): then only a diagnosis is impossible.
 _MEASURED = ("displacement_mm", "force_n", "frf_re_pc_per_n", "frf_im_pc_per_n", "charge_pc", "time_s", "dwell_s")
 _YEARS = (1000, 8999)  # an unset clock may write year 1 or 9999, where other time zones lie outside the calendar
 
@@ -347,13 +344,13 @@ class Excess:
 
     @property
     def error(self) -> InvalidInput:
-        """As the refusal of the field."""
+        """The error that rejects the field."""
         allowed = f"must be {self.low:g} to {self.high:g} in magnitude: no skin and no instrument is beyond"
         return out_of_range(self.field, self.largest, allowed)
 
 
 def excesses(model: Any) -> Iterator[Excess]:
-    """Of the fields of a skin's description, or of a recording."""
+    """The fields of a skin's description or a recording whose magnitude is out of bounds."""
     kind: Any = type(model)
     for name in _bounded(kind):
         value, (low, high) = getattr(model, name), _BOUNDS[name]
@@ -364,13 +361,14 @@ def excesses(model: Any) -> Iterator[Excess]:
 
 @cache
 def _bounded(model: Any) -> tuple[str, ...]:
-    return tuple(entry.name for entry in fields(model) if entry.name in _BOUNDS)
+    return tuple(model_field.name for model_field in fields(model) if model_field.name in _BOUNDS)
 
 
 def _largest(value: Any) -> float:
-    """The largest finite magnitude of a column, a place, the sensors' places, or a lab's own columns; 0 without any."""
+    """The largest finite magnitude of a column, a position, the sensors' positions, or a lab's own columns; 0 if
+    none."""
     if isinstance(value, dict):
-        value = [entry for entry in value.values() if not isinstance(entry, str)]
+        value = [number for number in value.values() if not isinstance(number, str)]
     elif isinstance(value, tuple) and value and isinstance(value[0], Sensor):
         value = [(sensor.x_mm, sensor.y_mm) for sensor in value]
     if value is None or np.size(value) == 0:
@@ -380,7 +378,7 @@ def _largest(value: Any) -> float:
 
 
 def refusals(model: Any) -> list[InvalidInput]:
-    """What a document may not hold: such numbers, and times outside the years that every time zone has."""
+    """The errors of a model: numbers out of bounds, and times outside the years that every time zone has."""
     refused = [excess.error for excess in excesses(model) if not excess.is_faint]
     written = getattr(model, "recorded_at", None)
     first, last = _YEARS
@@ -394,7 +392,7 @@ SCHEMA = "campaign/1"
 
 
 def read_estimator(name: str, value: Any, units_checked: bool) -> Estimator:  # noqa: ARG001
-    """How an FRF is estimated from a time series."""
+    """The estimator of an FRF from a time series."""
     return checked_estimator(name, shown(value))
 
 
@@ -418,10 +416,10 @@ class FrfRecording(FrfConditions):
     def of_lines(
         cls, conditions: FrfConditions, frequency: Floats, values: Complexes, coherence: Floats | None = None
     ) -> Self:
-        """The recording of an FRF `values` [C/N] at lines `frequency` [Hz], in other conditions as these."""
-        known = vars(conditions.without_measurements(frequency_hz=frequency))
+        """The recording of an FRF `values` [C/N] at lines `frequency` [Hz], otherwise under these conditions."""
+        attributes = vars(conditions.without_measurements(frequency_hz=frequency))
         real, imaginary = 1e12 * values.real, 1e12 * values.imag
-        return cls(**known, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary, coherence=coherence)
+        return cls(**attributes, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary, coherence=coherence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -459,7 +457,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class Campaign(Conditions):
-    """Recordings of one skin; `units_checked` accepts magnitudes that look like a slip of units."""
+    """Recordings of one skin. `units_checked` accepts magnitudes that look like a slip of units."""
 
     recordings: tuple[Recording, ...]
     units_checked: bool = False
@@ -467,7 +465,7 @@ class Campaign(Conditions):
 
 @dataclass(frozen=True)
 class RecordingProblem:
-    """Why a recording was refused: its id (or its place, `recordings[3]`), the field, its value, what is allowed."""
+    """Why a recording was rejected: its id (or index, `recordings[3]`), the field, its value, what is allowed."""
 
     recording: str
     field: str
@@ -488,16 +486,16 @@ def samples_of(curve: CurveRecording, rows: NDArray[Any]) -> CurveRecording:
 
 def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
     """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
-    recordings = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
+    recordings = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recordings:
         raise errors.too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
 
 
 def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
-    """The campaign of a document, with its good recordings, and what is wrong with the others.
+    """The campaign of a document with its valid recordings, and the problems of the others.
 
-    Raises InvalidInput where the campaign itself or its skin cannot be used.
+    Raises InvalidInput where the campaign itself or its skin is invalid.
     """
     fields_known = ("schema", "name", "skin", "recordings", "units_checked")
     document = field.of_schema("campaign", document, SCHEMA, fields_known)
@@ -506,18 +504,18 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
     for refusal in refusals(skin):
         raise refusal.at(f"skin.{refusal.field}")
-    entries = document.get("recordings")
-    if not isinstance(entries, list) or not entries:
-        raise errors.wrong_type("recordings", shown(entries), "must be a list of at least one recording")
+    recording_documents = document.get("recordings")
+    if not isinstance(recording_documents, list) or not recording_documents:
+        raise errors.wrong_type("recordings", shown(recording_documents), "must be a list of at least one recording")
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
-    for index, entry in enumerate(entries):
-        recording, refused = _recording(entry, skin, units_checked)
+    for index, recording_document in enumerate(recording_documents):
+        recording, refused = _recording(recording_document, skin, units_checked)
         if recording is not None and recording.id in good:
             refused = [errors.not_unique("id", recording.id, "must differ from every other recording's")]
         if recording is not None and not refused:
             good[recording.id] = recording
-        label = recording.id if recording is not None else _label(entry, index)
+        label = recording.id if recording is not None else _label(recording_document, index)
         problems += [RecordingProblem(label, error.place, error.value, error.allowed, error.code) for error in refused]
     if not good and all(problem.field.startswith("skin.") for problem in problems):
         raise problems[0].as_error(problems[0].field)
@@ -525,7 +523,7 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
 
 
 def parse(document: Any) -> Campaign:
-    """The campaign of a document; raises InvalidInput at the first thing wrong, in a recording too."""
+    """The campaign of a document; raises InvalidInput for the first problem, also of a recording."""
     campaign, problems = from_dict(document)
     if problems:
         first = problems[0]
@@ -553,7 +551,7 @@ def to_dict(campaign: Campaign) -> dict[str, Any]:
 
 def _plain(model: Any) -> dict[str, Any]:
     document: dict[str, Any] = {}
-    for name in (entry.name for entry in fields(model)):
+    for name in (model_field.name for model_field in fields(model)):
         value = getattr(model, name)
         if isinstance(value, np.ndarray):
             document[name] = value.tolist()
@@ -564,19 +562,19 @@ def _plain(model: Any) -> dict[str, Any]:
     return document
 
 
-def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[Recording | None, list[InvalidInput]]:
+def _recording(given: Any, skin: SkinDescription, units_checked: bool) -> tuple[Recording | None, list[InvalidInput]]:
     try:
-        document = field.mapping("recording", entry)
+        document = field.mapping("recording", given)
     except InvalidInput as refusal:
         return None, [refusal]
     kind = shown(document.get("kind")) or "frf"
     if kind not in KINDS:
         return None, [errors.not_one_of("kind", kind, KINDS)]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
-    known = {error.field for error in refused}
+    refused_fields = {error.field for error in refused}
     together = [*_unmet_needs(kind, document, values, skin), *_unequal_lengths(values)]
-    refused += [error for error in together if error.field not in known]
-    if known:
+    refused += [error for error in together if error.field not in refused_fields]
+    if refused_fields:
         return None, refused
     recording = KINDS[kind](**{**values, "kind": kind})
     return recording, [*refused, *refusals(recording)]
@@ -585,10 +583,10 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
 def _unmet_needs(
     kind: str, document: Mapping[str, Any], values: Mapping[str, Any], skin: SkinDescription
 ) -> list[InvalidInput]:
-    """What the recording's kind needs of the skin, and of its own fields together; `values`: those that are good."""
+    """The missing requirements of the recording's kind on the skin and its own fields; `values`: the valid fields."""
     refused = []
     sensor = None if kind == "compression" else values.get("sensor")
-    if sensor is not None and sensor not in (known.id for known in skin.sensors):
+    if sensor is not None and sensor not in (skin_sensor.id for skin_sensor in skin.sensors):
         refused.append(
             InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors", code=ErrorCode.NOT_ONE_OF)
         )
@@ -598,7 +596,7 @@ def _unmet_needs(
             for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
             if getattr(skin, name) is None
         ]
-        refused += _not_one_of_two_forms(document)
+        refused += _form_errors(document)
     return refused
 
 
@@ -606,8 +604,8 @@ LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
 TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
 
 
-def _not_one_of_two_forms(document: Mapping[str, Any]) -> list[InvalidInput]:
-    """An FRF or the time series it is estimated from: one of the two, whole."""
+def _form_errors(document: Mapping[str, Any]) -> list[InvalidInput]:
+    """Errors unless a recording holds either a complete FRF or a complete time series."""
     series = [name for name in TIME_SERIES if document.get(name) is not None]
     lines = [name for name in (*LINES, "coherence") if document.get(name) is not None]
     if document.get("estimator") is not None and not series:
@@ -627,6 +625,6 @@ def _unequal_lengths(values: Mapping[str, Any]) -> list[InvalidInput]:
     return [errors.unequal_lengths(name, size, length, first) for name, size in columns.items() if size != length]
 
 
-def _label(entry: Any, index: int) -> str:
-    called = entry.get("id") if isinstance(entry, Mapping) else None
-    return shown(called) if isinstance(called, str) and called else f"recordings[{index}]"
+def _label(document: Any, index: int) -> str:
+    recording_id = document.get("id") if isinstance(document, Mapping) else None
+    return shown(recording_id) if isinstance(recording_id, str) and recording_id else f"recordings[{index}]"

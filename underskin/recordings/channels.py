@@ -1,4 +1,4 @@
-"""What an instrument's file holds before a rig description says what its channels are."""
+"""The content of an instrument's file before a rig description maps its channels."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -16,10 +16,9 @@ FIRST_YEAR = 1970  # LabVIEW writes an unset clock as the beginning of 1904
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One column: its name as written, its unit as labelled (empty where the file says none), its values.
+    """One column: its name as written, its unit as labelled (empty without one), its values.
 
-    Where the file states them: `sample_rate_hz`, and `starts_s`, the time of its first sample after `recorded_at` of
-    the block [s].
+    `sample_rate_hz`, and `starts_s`, the time of its first sample after `recorded_at` of the block [s], where stated.
     """
 
     name: str
@@ -30,15 +29,15 @@ class Channel:
 
     @property
     def label(self) -> str:
-        """The unit as labelled, or as its name has it: `Force (lbs)`; empty where neither says one."""
+        """The unit as labelled, or in its name: `Force (lbs)`; empty without one."""
         return self.unit or labelled_unit(self.name)
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Channels acquired together; `sample_rate_hz` where all are evenly sampled in time at one rate, `recorded_at`
-    where the file says when the acquisition began (ISO 8601). `group_starts` are the samples at which groups of rows
-    of a text begin, which blank or comment lines part; empty where there is one group."""
+    """Channels acquired together; `sample_rate_hz` where all are evenly sampled at one rate, `recorded_at` the stated
+    start of the acquisition (ISO 8601). `group_starts` are the first samples of groups of rows in a text, separated by
+    blank or comment lines; empty for a single group."""
 
     name: str
     channels: tuple[Channel, ...]
@@ -52,14 +51,14 @@ class Block:
 
     def headed(self, name: str) -> Channel | None:
         """The channel of that name, or the only one whose heading is it with a unit in brackets: `Piezo [V]`."""
-        named = [one for one in self.channels if (in_brackets(one.name) or ("",))[0] == name]
+        named = [channel for channel in self.channels if (in_brackets(channel.name) or ("",))[0] == name]
         return self.channel(name) or (named[0] if len(named) == 1 else None)
 
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """A file: its blocks, what it says about itself (`properties`), what the user should know (`warnings`), and how it
-    was read where that had to be guessed (`layout`, in words)."""
+    """A file: its blocks, its stated `properties`, `warnings` for the user, and how it was read where that had to be
+    inferred (`layout`, in words)."""
 
     blocks: tuple[Block, ...]
     properties: Mapping[str, str | float] = field(default_factory=dict)
@@ -68,7 +67,7 @@ class Contents:
 
     def described(self) -> str:
         """The channels and their units, for an error message."""
-        units = [(one.name, f"[{one.unit or '?'}]") for block in self.blocks for one in block.channels]
+        units = [(channel.name, f"[{channel.unit or '?'}]") for block in self.blocks for channel in block.channels]
         names = [name if name.endswith(unit) else f"{name} {unit}" for name, unit in units]
         different = list(dict.fromkeys(names))
         return ", ".join(different[:20]) + (", …" if len(different) > 20 else "") if different else "no channels"
@@ -76,14 +75,14 @@ class Contents:
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A file that holds a campaign: the document (`campaign/1`, not yet checked), and what the user should know."""
+    """A file that holds a campaign: the document (`campaign/1`, not yet checked), and warnings."""
 
     campaign: Any
     warnings: tuple[str, ...] = ()
 
 
 def with_distinct_names(channels: list[Channel]) -> tuple[Channel, ...]:
-    """The same channels; a name that comes again is numbered, `force (2)`."""
+    """The channels with repeated names numbered, `force (2)`."""
     seen: dict[str, int] = {}
     distinct = []
     for channel in channels:
@@ -94,5 +93,5 @@ def with_distinct_names(channels: list[Channel]) -> tuple[Channel, ...]:
 
 
 def as_values(stored: NDArray[Any]) -> Values:
-    """Numbers of any kind as the model keeps them."""
+    """Stored numbers as float64, or complex128."""
     return stored.astype(np.complex128) if stored.dtype.kind == "c" else stored.astype(np.float64)

@@ -1,30 +1,17 @@
-"""Curves prepared for fits.
+"""Force-displacement curves prepared for fits: signs, exchanged columns, row order, saturation and periodic errors.
 
-How a curve counts force and displacement, told from all of its course; turned where asked.
+Compression and depth are positive. The signs of a sphere's channels follow from two properties of contact, wherever the
+recording begins and in whatever order its rows stand: force grows with depth except at jumps, and its slope grows with
+depth, so the stiffest of all turning points and ends of the travel is the deepest. A pull-off, a lift before loading or
+the first row give no information. A block may be compressed or pulled: its curve shows only that force and displacement
+have one sign; the sign of the force shows which.
 
-Compression and depth are positive here. Two facts of contact tell how a sphere's channels are counted, wherever the
-recording begins and in whatever order its rows stand: the force grows with the depth, but for jumps; and it grows the
-faster the deeper the sphere is, so that of all turns and ends of the travel the stiffest is the deepest. What pulls a
-sphere on its way out, a lift before it is pressed, or the first of the rows tells nothing. A block may be pressed or
-pulled: that force and displacement have one sign is all that its curve tells, and which it was, the sign of the force.
+Columns are taken for exchanged where the "force" moves steadily like a stage while the "displacement" first stands
+still or lags like a force (a block needs both, since its displacement may begin late by play of the extensometer). No
+material does that: by Hertz depth grows as F^(2/3), never with an exponent above 1.
 
-Curves whose columns of force and displacement look exchanged.
-
-A stage travels at the speed that it was told, and the force follows: it stays at its zero as long as the sphere or the
-platen is in the air, and rises ever faster in a contact. Where instead the "force" moves steadily while the
-"displacement" first stands still, or follows it as a force follows a travel, the two are exchanged; of a block only
-where it does both, as a displacement may begin late, by play of the extensometer. No material does
-that: what is pressed harder is pressed deeper, by Hertz as F^(2/3), never with an exponent above 1.
-
-Defects of a curve's channels that have nothing to do with the sample: a force that saturates, and one that carries
-an error that is periodic in the travel.
-
-Compression and depth are positive here.
-
-Curves as everything that reads them takes them: compression and depth positive, from the air into the sample,
-without samples at which the channel saturates and without an error that is periodic in the travel.
-
-What is changed is a finding. A block whose force and displacement are both negative stays so: it may be pulled.
+`prepared` applies all corrections and reports each as a finding. A block with negative force and displacement is left
+as it is: it may be in tension.
 """
 
 from collections.abc import Mapping, Sequence
@@ -47,43 +34,43 @@ from underskin.recordings.curve_course import roughness
 from underskin.units import Floats, Indices, Mask
 
 FORCE, TRAVEL = "force_n", "displacement_mm"
-_LEAST_TELLING = 8  # samples: fewer tell nothing of how a curve goes
+_LEAST_TELLING = 8  # samples needed to determine signs
 _COMPARED_BLOCKS = 200  # of a curve, whose means are compared
-_CHANGE, _BEYOND_NOISE = 2e-3, 4.0  # of the range of force, and standard deviations: a change that counts
-_AGREE = 0.2  # of the changes, by which those of one sign must outnumber the others
+_CHANGE, _BEYOND_NOISE = 2e-3, 4.0  # least change that counts: of the range of force, and in standard deviations
+_AGREE = 0.2  # majority of one sign among the changes, as a share of all
 _RETURN = 0.05  # of the range of travel: smaller returns are noise
 _SAMPLED = 20_000  # samples among which turns are sought
-_NEAR = 0.15  # of the range of travel, over which the stiffness at a turn is read
-_HELD = 0.02  # of that way from the turn: of what is not farther away, a hold, one sample counts
-_STIFFER = 1.15  # times as stiff: less does not tell the deep end from the other
-_OTHER_SIGN = 0.1  # of the largest force, of the other sign: less is none
-_LONGEST = 0.9  # of a block's height: what moves farther is no compression
-_BOW = 0.02  # of the range of force, by which a curve lies above its chord on average where it softens plainly
+_NEAR = 0.15  # of the range of travel, over which the stiffness at a turn is computed
+_HELD = 0.02  # of that distance from the turn: samples within it are a hold, of which one counts
+_STIFFER = 1.15  # least ratio of stiffness of the deep end to the other
+_OTHER_SIGN = 0.1  # of the largest force: forces of the other sign below it are ignored
+_LONGEST = 0.9  # of a block's height: a larger displacement is no compression
+_BOW = 0.02  # of the range of force, by which a softening curve lies above its chord on average
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """How a curve's columns are counted: `negative` ones fall as it is pressed.
+    """The signs of a curve's columns: `negative` ones fall as it is pressed.
 
-    `turns` are the samples at which the travel turns, with the first and the last; `is_known` is whether the deep end
-    was told from the curve, and not taken for the end to which it first moves.
+    `turns` are the samples at which the travel turns, with the first and the last. `is_deep_end_known` is whether the
+    deep end follows from the stiffness, rather than being assumed from the direction of the first movement.
     """
 
     negative: tuple[str, ...]
     turns: Indices
-    is_known: bool
+    is_deep_end_known: bool
 
 
-_UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_known=False)
+_UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_deep_end_known=False)
 
 
 def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
-    """Those of `force_n` and `displacement_mm` that fall while the curve is pressed."""
+    """The columns among `force_n` and `displacement_mm` that fall during loading."""
     return orientation(recording).negative
 
 
 def orientation(recording: CurveRecording) -> Orientation:
-    """How a recording counts, by its finite samples; `turns` are numbered among these."""
+    """The signs of a recording by its finite samples; `turns` are indices among these."""
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
     if isinstance(recording, IndentationRecording):
         return _oriented(force, travel, sphere=True)
@@ -93,7 +80,7 @@ def orientation(recording: CurveRecording) -> Orientation:
 
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
-    """The same of a sphere's or a block's force and travel, (samples,) in any unit."""
+    """The columns that fall during loading, for force and travel of a sphere or a block, (samples,) in any unit."""
     return _oriented(force, travel, sphere=sphere).negative
 
 
@@ -104,32 +91,32 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
     force, travel = force[finite], travel[finite]
     if len(force) < _LEAST_TELLING or not np.ptp(force) or not np.ptp(travel):
         return _UNKNOWN
-    together = _sign_together(force, travel)
+    relative_sign = _relative_sign(force, travel)
     turns = turning_points(travel)
-    if not together:
-        return Orientation((), turns, is_known=False)
+    if not relative_sign:
+        return Orientation((), turns, is_deep_end_known=False)
     if not sphere:
-        return Orientation(_of_block(force, travel, together), turns, is_known=True)
-    deep = _deep_side(force, travel, turns, together)
+        return Orientation(_of_block(force, travel, relative_sign), turns, is_deep_end_known=True)
+    deep = _deep_side(force, travel, turns, relative_sign)
     side = deep or _first_movement(travel)
-    negative = ((FORCE, together * side < 0), (TRAVEL, side < 0))
-    return Orientation(tuple(name for name, falls in negative if falls), turns, is_known=deep != 0)
+    negative = ((FORCE, relative_sign * side < 0), (TRAVEL, side < 0))
+    return Orientation(tuple(name for name, falls in negative if falls), turns, is_deep_end_known=deep != 0)
 
 
-def _of_block(force: Floats, travel: Floats, together: int) -> tuple[str, ...]:
-    """Of a block: the force is negative where it is pulled alone, the displacement where it goes against the force.
+def _of_block(force: Floats, travel: Floats, relative_sign: int) -> tuple[str, ...]:
+    """The negative columns of a block: the force where it is only pulled, the displacement where it opposes the force.
 
-    Both may be right of a sample that is pulled, and are where it softens as it is strained, as pulled rubber does.
+    Both may be right for a sample in tension, and are where it softens with strain, as rubber in tension does.
     """
     low, high = float(force.min()), float(force.max())
     pulled = low < 0 and high < _OTHER_SIGN * -low
-    if together > 0:
+    if relative_sign > 0:
         return (FORCE, TRAVEL) if pulled and not _softens(-force, -travel) else ()
     return (FORCE,) if pulled else (TRAVEL,)
 
 
 def _softens(force: Floats, strain: Floats) -> bool:
-    """Whether the force rises less and less with the strain, plainly: on average it lies above the chord."""
+    """Whether the curve softens with strain: on average the force lies above the chord."""
     order = np.argsort(strain, kind="stable")
     strain, force = strain[order], force[order]
     tail = max(1, len(force) // 20)
@@ -138,9 +125,11 @@ def _softens(force: Floats, strain: Floats) -> bool:
     return area > (0.5 + _BOW) * (high - low)
 
 
-def _sign_together(force: Floats, travel: Floats) -> int:
-    """1 where the force mostly grows with the travel, -1 where it falls, 0 where neither is plain: changes of means
-    over blocks are counted, so that a jump counts once."""
+def _relative_sign(force: Floats, travel: Floats) -> int:
+    """1 where the force mostly grows with the travel, -1 where it falls, 0 where undecided.
+
+    Changes of block means are counted, so that a jump counts once.
+    """
     starts = np.linspace(0, len(force), min(len(force), _COMPARED_BLOCKS), endpoint=False).astype(np.intp)
     counts = np.diff(np.append(starts, len(force)))
     change, moved = (np.diff(np.add.reduceat(column, starts) / counts) for column in (force, travel))
@@ -151,36 +140,36 @@ def _sign_together(force: Floats, travel: Floats) -> int:
 
 
 def turning_points(travel: Floats) -> Indices:
-    """The samples between which the travel goes one way, but for returns below a twentieth of its range; the first and
-    the last are among them."""
+    """The samples between which the travel is monotonic, except for returns below a twentieth of its range; includes
+    the first and the last sample."""
     at = np.unique(np.linspace(0, len(travel) - 1, min(len(travel), _SAMPLED)).round().astype(np.intp))
     values, least = travel[at].tolist(), _RETURN * float(np.ptp(travel))
-    turns, extreme, way = [0], 0, 0
-    for number, value in enumerate(values):
-        if way == 0:
+    turns, extreme, direction = [0], 0, 0
+    for index, value in enumerate(values):
+        if direction == 0:
             if abs(value - values[0]) > least:
-                way, extreme = (1 if value > values[0] else -1), number
-        elif (value - values[extreme]) * way >= 0:
-            extreme = number
-        elif (values[extreme] - value) * way > least:
+                direction, extreme = (1 if value > values[0] else -1), index
+        elif (value - values[extreme]) * direction >= 0:
+            extreme = index
+        elif (values[extreme] - value) * direction > least:
             turns.append(extreme)
-            way, extreme = -way, number
+            direction, extreme = -direction, index
     return at[np.unique([*turns, len(values) - 1])]
 
 
-def _deep_side(force: Floats, travel: Floats, turns: Indices, together: int) -> int:
-    """1 where the travel is largest at the deep end, -1 where it is least there, 0 where neither turns out stiffer."""
+def _deep_side(force: Floats, travel: Floats, turns: Indices, relative_sign: int) -> int:
+    """1 where the travel is largest at the deep end, -1 where it is least there, 0 where neither end is stiffer."""
     stiffest = {1: (0.0, 0.0), -1: (0.0, 0.0)}
     legs = list(zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True))
     near = _NEAR * float(np.ptp(travel))
-    for number, turn in enumerate(turns.tolist()):
-        beside = legs[max(number - 1, 0) : number + 1]
-        first, last = next((leg for leg in beside if leg[0] != leg[1]), (turn, turn))
+    for index, turn in enumerate(turns.tolist()):
+        adjacent = legs[max(index - 1, 0) : index + 1]
+        first, last = next((leg for leg in adjacent if leg[0] != leg[1]), (turn, turn))
         other = last if turn == first else first
         side = 1 if travel[turn] > travel[other] else -1
-        slopes = np.array([_stiffness(force, travel, turn, leg, near) for leg in beside])
+        slopes = np.array([_stiffness(force, travel, turn, leg, near) for leg in adjacent])
         error = float(np.linalg.norm(slopes[:, 1])) / len(slopes)
-        stiffest[side] = max(stiffest[side], (float(slopes[:, 0].mean()) * together, error))
+        stiffest[side] = max(stiffest[side], (float(slopes[:, 0].mean()) * relative_sign, error))
     (low, _), (high, error) = sorted(stiffest.values())
     error = max(error, roughness(force) / np.sqrt(_NEAR * len(force)) / near)
     if high < _BEYOND_NOISE * error or high < _STIFFER * low:
@@ -189,9 +178,9 @@ def _deep_side(force: Floats, travel: Floats, turns: Indices, together: int) -> 
 
 
 def _stiffness(force: Floats, travel: Floats, turn: int, leg: tuple[int, int], near: float) -> tuple[float, float]:
-    """The slope of the force over the travel on one way, near the turn at one of its ends, and its standard error.
+    """The slope of force over travel on one leg near the turn at one of its ends, and its standard error.
 
-    Of a hold at the turn the sample nearest to the rest of the way counts alone: there the force relaxes.
+    Of a hold at the turn, during which the force relaxes, only the sample nearest to the rest of the leg counts.
     """
     rows = np.arange(leg[0], leg[1] + 1)
     away = np.abs(travel[rows] - travel[turn])
@@ -215,7 +204,7 @@ def _first_movement(travel: Floats) -> int:
 
 
 def findings(campaign: Campaign) -> list[Finding]:
-    """One for the first curve of each kind and way of counting, with how many more there are."""
+    """One finding for the first curve of each kind and set of negative columns, with the number of further ones."""
     by_fields: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for recording in _curves(campaign).values():
         by_fields.setdefault((recording.kind, counted_negative(recording)), []).append(recording.id)
@@ -223,18 +212,18 @@ def findings(campaign: Campaign) -> list[Finding]:
 
 
 def finding(kind: str, fields: tuple[str, ...], ids: Sequence[str]) -> Finding:
-    """On curves of a kind that count these columns negative."""
+    """The finding on curves of one kind whose columns `fields` are counted negative."""
     arguments = {"fields": list(fields), "more": len(ids) - 1, "may_be_pulled": may_be_pulled(kind, fields)}
     return Finding(Reason.CURVE_COUNTED_NEGATIVE, ids[0], fields[0], arguments)
 
 
 def may_be_pulled(kind: str, fields: tuple[str, ...]) -> bool:
-    """Whether columns that are counted negative may be right: a block's, both of them."""
+    """Whether negative columns may be right: both columns of a block (tension)."""
     return kind == "compression" and len(fields) > 1
 
 
 def turned(campaign: Campaign) -> tuple[Campaign, int]:
-    """The campaign with what its curves count negative turned, and how many curves that changed."""
+    """The campaign with negative columns of its curves sign-reversed, and the number of curves changed."""
     changed = 0
     recordings: list[Recording] = []
     for recording in campaign.recordings:
@@ -245,30 +234,30 @@ def turned(campaign: Campaign) -> tuple[Campaign, int]:
 
 
 def with_turned(recording: CurveRecording, fields: tuple[str, ...]) -> CurveRecording:
-    """A curve with the signs of these columns turned."""
+    """A curve with the signs of these columns reversed."""
     columns = {name: -np.asarray(getattr(recording, name)) for name in fields}
     return replace(recording, **columns) if columns else recording  # type: ignore[arg-type]
 
 
 def _curves(campaign: Campaign) -> Mapping[str, CurveRecording]:
-    return {one.id: one for one in campaign.recordings if not isinstance(one, FrfRecording)}
+    return {recording.id: recording for recording in campaign.recordings if not isinstance(recording, FrfRecording)}
 
 
-_LEAST_IN = 32  # samples on the way in
-_WAY_IN = 0.99  # of the largest excursion: the way in, without a hold
-_STILL = 6.0  # times the noise of one sample: a mean over a block that has not moved
+_LEAST_IN = 32  # samples of the approach
+_WAY_IN = 0.99  # of the largest excursion: end of the approach, without a hold
+_STILL = 6.0  # times the noise of one sample: a block mean within it has not moved
 _LEAST_STILL = 0.02  # of its range
 _STAYS = 0.8  # of the blocks after the first that moved: a force that snaps in passes its zero once more
-_STANDS = 0.15  # of the samples on the way in, at the least
-_STEADY = 3.0  # ratio of two mean speeds of a stage on its way
-_BLOCKS_IN = 40  # of the way in
-_UNIFORM = 0.03  # of its range: the departure of a steady travel from a straight line
-_FOLLOWS = 0.4  # of its way where the other has gone half of its own: (1/2)^(3/2) is 0.35, (1/2)^(2/3) is 0.63
-_LAGS = 0.49  # the same of a block: it is 0.488 of a neo-Hookean one at 5 % strain, and 1/2 of a straight line
+_STANDS = 0.15  # least share of the approach during which a column stands still
+_STEADY = 3.0  # largest ratio of two mean speeds of a steady stage
+_BLOCKS_IN = 40  # blocks of the approach
+_UNIFORM = 0.03  # of its range: largest departure of a steady travel from a straight line
+_FOLLOWS = 0.4  # share of its range at half of the other's: (1/2)^(3/2) = 0.35 for a force, (1/2)^(2/3) = 0.63 inverse
+_LAGS = 0.49  # the same for a block: 0.488 for a neo-Hookean one at 5 % strain, 1/2 for a straight line
 
 
-def require_own_columns(recording: CurveRecording) -> None:
-    """Raises InvalidInput where force and displacement of a curve look exchanged."""
+def reject_exchanged_columns(recording: CurveRecording) -> None:
+    """Raise InvalidInput where force and displacement of a curve look exchanged."""
     if are_exchanged(recording):
         seen = "moves as a force does, and force_n as a stage"
         raise unusable("displacement_mm", seen, "the two columns look exchanged: exchange their names or channels")
@@ -281,8 +270,8 @@ def are_exchanged(recording: CurveRecording) -> bool:
 
 
 def look_exchanged(displacement: Floats, force: Floats, *, sphere: bool) -> bool:
-    """Whether force (samples,) moves as a stage does, and displacement as a force; only a `sphere` tells it without
-    samples in the air."""
+    """Whether `force` (samples,) moves like a stage and `displacement` like a force; without samples in the air this
+    can be decided for a `sphere` only."""
     if len(displacement) != len(force) or not np.ptp(displacement) or not np.ptp(force):
         return False
     excursion = np.abs(force - force[0])
@@ -299,8 +288,7 @@ def look_exchanged(displacement: Floats, force: Floats, *, sphere: bool) -> bool
 
 
 def _stands_first(load: Floats, travel: Floats) -> int:
-    """The samples for which the first column stands still, on the first part of a way that the second goes steadily; 0
-    where it does not."""
+    """The number of initial samples over which `load` stands still while `travel` moves steadily; 0 without any."""
     parts = np.array_split(load, min(_BLOCKS_IN, len(load) // 2))
     means, places = np.array([part.mean() for part in parts]), np.cumsum([len(part) for part in parts])
     still = max(_STILL * roughness(load) / np.sqrt(len(parts[0])), _LEAST_STILL * float(np.ptp(load)))
@@ -314,58 +302,58 @@ def _stands_first(load: Floats, travel: Floats) -> int:
 
 
 def _lags(load: Floats, travel: Floats) -> bool:
-    """Whether the first column has gone less than half of its way where the second has gone half: so the force on a
-    block, that stiffens as it is pressed; a displacement that begins late, by play, is ahead."""
+    """Whether `load` is below half of its range where `travel` is at half, as the force on a block that stiffens in
+    compression; a displacement that begins late by play is above half."""
     few = max(len(load) // _BLOCKS_IN, 1)
     gone = np.abs(travel - travel[0])
     at = max(int(np.argmax(gone >= gone[-1] / 2)), few)
-    begin, half, end = (float(part.mean()) for part in (load[:few], load[at - few : at + few], load[-few:]))
-    return end != begin and (half - begin) / (end - begin) < _LAGS
+    start, half, end = (float(part.mean()) for part in (load[:few], load[at - few : at + few], load[-few:]))
+    return end != start and (half - start) / (end - start) < _LAGS
 
 
 def _is_steady(way: Floats) -> bool:
-    """Whether both halves of a way are gone in one direction, at about the same speed."""
+    """Whether both halves of a path have one direction and about one speed."""
     first, second = way[len(way) // 2] - way[0], way[-1] - way[len(way) // 2]
     return bool(first * second > 0 and 1 / _STEADY < first / second < _STEADY)
 
 
 def _is_alike(way: Floats, at: int) -> bool:
-    """Whether the parts of a way before and after a sample are gone in one direction, at about the same speed."""
+    """Whether the parts of a path before and after a sample have one direction and about one speed."""
     before, after = (way[at - 1] - way[0]) / at, (way[-1] - way[at - 1]) / (len(way) - at + 1)
     return bool(before * after > 0 and 1 / _STEADY < before / after < _STEADY)
 
 
 def _follows(load: Floats, travel: Floats) -> bool:
-    """Whether the second column goes at one speed, and the first lags behind it as the force on a sphere does."""
+    """Whether `travel` has constant speed and `load` lags behind it like the force on a sphere."""
     samples = np.arange(len(travel))
     line = np.polyval(np.polyfit(samples, travel, 1), samples)
     if np.abs(travel - line).max() > _UNIFORM * np.ptp(travel):
         return False
     few = max(len(load) // _BLOCKS_IN, 1)
-    begin, half, end = (
-        float(load[place : place + few].mean()) for place in (0, (len(load) - few) // 2, len(load) - few)
+    start, half, end = (
+        float(load[first : first + few].mean()) for first in (0, (len(load) - few) // 2, len(load) - few)
     )
-    return end != begin and (half - begin) / (end - begin) < _FOLLOWS
+    return end != start and (half - start) / (end - start) < _FOLLOWS
 
 
-_EQUAL = 5  # samples in a row, at least, that read the same where a force saturates
-_MOVED = 0.02  # of the range of travel, at least, over which they do
-_LONGER = 4.0  # times as far as any other value is read on end: steps of a converter are as long everywhere
-_MOST_OF_WAY, _PACE = 0.75, 0.5  # of the way at the limit, and of the stage's pace, at least: creep is slower by then
-_DEEP = 0.8  # of the other samples lie less deep than those that saturate
-_SHALLOW_SHARE = 0.05  # of the samples, the shallowest, whose median is what the air reads
-_AIR, _ABOVE = 0.05, 2.5  # of the range of force, and standard deviations there, up to which means lie in the air
-_FEWEST = 24  # samples there at least
-_PERIODS = 1.5  # in the air, at least: less is a drift
-_SHORTEST = 4.0  # samples in a period, at least
-_OVER_RANGE = 6.0  # periods in the range of travel, at least: what is slower may be the contact's own
-_SINE = 0.25  # of the squares, at most, that a sine leaves of what else is left
-_LARGE, _LEAST_AMPLITUDE = 4.0, 2e-3  # amplitude over the noise beside it, and over the largest force
-_AROUND = 0.8, 1.25  # times the period in the air, between which that of the whole curve is sought
+_EQUAL = 5  # least number of consecutive equal samples of a saturated force
+_MOVED = 0.02  # of the range of travel: least travel during them
+_LONGER = 4.0  # times the longest run of any other value: steps of a converter are equally long everywhere
+_MOST_OF_WAY, _PACE = 0.75, 0.5  # of the travel at the limit, and of the stage's speed, at least: creep is slower
+_DEEP = 0.8  # share of the other samples that lie less deep than the saturated ones
+_SHALLOW_SHARE = 0.05  # share of shallowest samples, whose median is the reading in air
+_AIR, _ABOVE = 0.05, 2.5  # of the range of force, and standard deviations there: limits of means in air
+_FEWEST = 24  # least number of samples in air
+_PERIODS = 1.5  # least number of periods in air: fewer is a drift
+_SHORTEST = 4.0  # least number of samples in a period
+_OVER_RANGE = 6.0  # least number of periods in the range of travel: slower variations may be the contact's own
+_SINE = 0.25  # largest ratio of the sums of squares with and without the sine
+_LARGE, _LEAST_AMPLITUDE = 4.0, 2e-3  # least amplitude over the residual noise, and over the largest force
+_AROUND = 0.8, 1.25  # times the period in air: range in which the period of the whole curve is sought
 _OF_CYCLES, _FINER = 12, 25  # periods tried for each cycle in the range; and between two of them
-_IN_AIR = 0.25  # of a cycle in the air, between the frequencies tried there
-_MOST_SAMPLES = 1500  # by which a period is told
-_KNOTS = 2.0  # periods between the knots of the splines that stand for the contact
+_IN_AIR = 0.25  # of a cycle in air: step of the frequencies tried there
+_MOST_SAMPLES = 1500  # samples from which a period is estimated
+_KNOTS = 2.0  # periods between the knots of the splines that represent the contact
 
 
 @dataclass(frozen=True)
@@ -382,17 +370,19 @@ class PeriodicError:
         return float(np.hypot(self.cosine, self.sine))
 
     def at(self, travel: Floats) -> Floats:
-        """What it adds to the force [N] at a travel [mm]."""
+        """The error of the force [N] at a travel [mm]."""
         phase = 2 * np.pi * travel / self.period
         return np.asarray(self.cosine * np.cos(phase) + self.sine * np.sin(phase))
 
 
 def saturated(travel: Floats, force: Floats, *, sphere: bool) -> Mask:
-    """Which samples (samples,) read the largest, or the least, force of all while a sphere or a platen moves on, and
-    lie deeper than the others: the air may read one value as well, and a load that is held as the sample creeps."""
-    found = np.zeros(len(force), dtype=bool)
+    """Which samples (samples,) are saturated: they read the largest or the smallest force while the travel goes on.
+
+    They must lie deeper than the others: a force in air, or one held while the sample creeps, is constant as well.
+    """
+    at_limits = np.zeros(len(force), dtype=bool)
     if not np.ptp(force) or not np.ptp(travel):
-        return found
+        return at_limits
     runs = _runs(travel, force)
     extremes = float(force.max()), float(force.min())
     between = ~np.isin(force, extremes)
@@ -402,94 +392,96 @@ def saturated(travel: Floats, force: Floats, *, sphere: bool) -> Mask:
     usual = max((moved for rows, moved in runs if force[rows[0]] not in (*extremes, air)), default=0.0)
     for extreme in extremes:
         at_limit = force == extreme
-        there = [run for run in runs if force[run[0][0]] == extreme]
-        longest, moved = max(there, key=lambda run: run[1], default=(np.zeros(0, dtype=np.intp), 0.0))
+        runs_at_limit = [run for run in runs if force[run[0][0]] == extreme]
+        longest, moved = max(runs_at_limit, key=lambda run: run[1], default=(np.zeros(0, dtype=np.intp), 0.0))
         if moved < max(_MOVED * np.ptp(travel), _LONGER * usual) or (~at_limit).sum() < _EQUAL:
             continue
         is_deep = np.median(depth[at_limit]) > np.quantile(depth[~at_limit], _DEEP)
         if is_deep and _goes_on(travel, longest):
-            found |= at_limit
-    return found
+            at_limits |= at_limit
+    return at_limits
 
 
 def _goes_on(travel: Floats, rows: Indices) -> bool:
-    """Whether the travel keeps its pace where these samples begin to read the limit, or up to where they end."""
+    """Whether the travel keeps its speed at the first or the last of these samples at the limit."""
     first, last = int(rows[0]), int(rows[-1])
     return _keeps_pace(travel[rows], travel[first::-1]) or _keeps_pace(travel[rows[::-1]], travel[last:])
 
 
 def _keeps_pace(inside: Floats, outside: Floats) -> bool:
-    """Whether the travel at the limit, from its edge on, goes as fast as beside it, away from the edge.
+    """Whether the travel `inside` the limit, from its edge on, is as fast as `outside`, away from the edge.
 
-    Over the samples that most of the way at the limit takes, so that a hold of the stage at its end does not count.
+    Evaluated over the samples of most of the travel at the limit, so that a hold at its end does not count.
     """
-    gone = np.abs(inside - inside[0])
-    count = int(np.argmax(gone >= _MOST_OF_WAY * gone.max()))
-    beside = min(count, len(outside) - 1)
-    return beside > 0 and bool(gone[count] / count > _PACE * abs(outside[beside] - outside[0]) / beside)
+    moved = np.abs(inside - inside[0])
+    count = int(np.argmax(moved >= _MOST_OF_WAY * moved.max()))
+    outside_count = min(count, len(outside) - 1)
+    return outside_count > 0 and bool(
+        moved[count] / count > _PACE * abs(outside[outside_count] - outside[0]) / outside_count
+    )
 
 
 def _runs(travel: Floats, force: Floats) -> list[tuple[Indices, float]]:
-    """The samples in a row that read the same force, where there are enough, and how far they go."""
+    """Runs of consecutive samples of equal force, at least `_EQUAL` long, and the travel during each."""
     starts = np.flatnonzero(np.append(True, np.diff(force) != 0))
     ends = np.append(starts[1:], len(force))
     long = ends - starts >= _EQUAL
-    rows = [np.arange(first, end) for first, end in zip(starts[long].tolist(), ends[long].tolist(), strict=True)]
-    return [(own, float(np.ptp(travel[own]))) for own in rows]
+    runs = [np.arange(first, end) for first, end in zip(starts[long].tolist(), ends[long].tolist(), strict=True)]
+    return [(rows, float(np.ptp(travel[rows]))) for rows in runs]
 
 
 def periodic_error(travel: Floats, force: Floats) -> PeriodicError | None:
-    """A sine over the travel in the force that the air shows as well as the contact; None where there is none.
+    """A sine over the travel in the force, present in air as well as in contact; None without one.
 
-    Its period is told in the air, and then where it leaves least of the whole curve beside a spline on each way, which
-    stands for the contact whatever its law. Of many samples means are taken: single ones would show hum of a frequency
-    above half of theirs as a slow change. Means over a part x of a period show sin(πx)/(πx) of the amplitude; and what
-    is left in them of hum, the samples do not show at that period.
+    Its period is estimated in air, then by least squares over the whole curve together with a spline on each leg, which
+    represents the contact whatever its law. Many samples are averaged, since hum above the Nyquist frequency of thinned
+    samples would be aliased. Means over a part x of a period keep sin(πx)/(πx) of the amplitude; what hum remains in
+    them is absent from the samples at that period.
     """
     samples, is_mean = (travel, force), len(travel) > _MOST_SAMPLES
     travel, force = _means(travel), _means(force)
     air = _in_air(travel, force)
     if air.sum() < _FEWEST:
         return None
-    first = _period_in_air(travel[air], force[air])
-    if first is None or first * _OVER_RANGE > np.ptp(travel):
+    period_in_air = _period_in_air(travel[air], force[air])
+    if period_in_air is None or period_in_air * _OVER_RANGE > np.ptp(travel):
         return None
-    low, high = first * _AROUND[0], first * _AROUND[1]
-    count = int(_OF_CYCLES * (high - low) / first * np.ptp(travel) / first) + 2
+    low, high = period_in_air * _AROUND[0], period_in_air * _AROUND[1]
+    count = int(_OF_CYCLES * (high - low) / period_in_air * np.ptp(travel) / period_in_air) + 2
     step = (high - low) / (count - 1)
-    near = _best_of(travel, force, np.linspace(low, high, count))[0].period
-    error, left, without = _best_of(travel, force, np.linspace(near - step, near + step, _FINER))
-    noise = float(np.sqrt(left / len(travel)))
+    coarse_period = _best_of(travel, force, np.linspace(low, high, count))[0].period
+    error, residual, total = _best_of(travel, force, np.linspace(coarse_period - step, coarse_period + step, _FINER))
+    noise = float(np.sqrt(residual / len(travel)))
     largest = float(np.abs(force - np.median(force[air])).max())
-    if left > _SINE * without or error.amplitude < max(_LARGE * noise, _LEAST_AMPLITUDE * largest):
+    if residual > _SINE * total or error.amplitude < max(_LARGE * noise, _LEAST_AMPLITUDE * largest):
         return None
-    shown = float(np.sinc(np.median(np.abs(np.diff(travel))) / error.period)) if is_mean else 1.0
-    error = PeriodicError(error.period, error.cosine / shown, error.sine / shown)
+    kept_by_means = float(np.sinc(np.median(np.abs(np.diff(travel))) / error.period)) if is_mean else 1.0
+    error = PeriodicError(error.period, error.cosine / kept_by_means, error.sine / kept_by_means)
     return error if _amplitude(*samples, error.period, travel[air].max()) > error.amplitude / 2 else None
 
 
 def _amplitude(travel: Floats, force: Floats, period: float, end: float) -> float:
-    """Of a sine of this period beside a line in the force of all samples of the air, up to the travel `end`."""
+    """Amplitude of a sine of this period, fitted with a line to the force of all samples in air, up to travel `end`."""
     air = travel <= end
-    place, phase = travel[air] - travel[air].mean(), 2 * np.pi * travel[air] / period
-    design = np.column_stack([np.ones_like(place), place, np.cos(phase), np.sin(phase)])
+    position, phase = travel[air] - travel[air].mean(), 2 * np.pi * travel[air] / period
+    design = np.column_stack([np.ones_like(position), position, np.cos(phase), np.sin(phase)])
     fitted = np.linalg.lstsq(design, force[air], rcond=None)[0]
     return float(np.hypot(fitted[2], fitted[3]))
 
 
 def _means(column: Floats) -> Floats:
-    """Over at most so many blocks of samples."""
+    """Means over at most `_MOST_SAMPLES` blocks."""
     starts = np.unique(np.linspace(0, len(column), min(len(column), _MOST_SAMPLES), endpoint=False).astype(np.intp))
     return np.asarray(np.add.reduceat(column, starts) / np.diff(np.append(starts, len(column))))
 
 
 def _best_of(travel: Floats, force: Floats, periods: Floats) -> tuple[PeriodicError, float, float]:
-    """Of these periods, see _beside_spline."""
-    return min((_beside_spline(travel, force, period) for period in periods.tolist()), key=lambda one: one[1])
+    """The fit with the least sum of squares among these periods; see `_sine_beside_spline`."""
+    return min((_sine_beside_spline(travel, force, period) for period in periods.tolist()), key=lambda fit: fit[1])
 
 
 def _in_air(travel: Floats, force: Floats) -> Mask:
-    """The samples at less travel than where means over the travel leave the level of the shallowest."""
+    """The samples at less travel than that at which means over the travel leave the level of the shallowest samples."""
     order = np.argsort(travel, kind="stable")
     count = max(len(order) // 40, 1)
     starts = np.arange(0, len(order), count)
@@ -504,47 +496,47 @@ def _in_air(travel: Floats, force: Floats) -> Mask:
 
 
 def _period_in_air(travel: Floats, force: Floats) -> float | None:
-    """The period of the sine that leaves least of samples in the air beside a straight line, where that is plain."""
+    """The period of the best-fitting sine with a straight line in air; None where it does not explain enough."""
     span = float(np.ptp(travel))
     step = span / (len(travel) / max(len(turning_points(travel)) - 1, 1))
     if not step > 0 or span < 2 * _PERIODS * _SHORTEST * step:
         return None
-    place = (travel - travel.mean()) / span
-    line = np.column_stack([np.ones_like(place), place])
-    beside_line = force - line @ np.linalg.lstsq(line, force, rcond=None)[0]
+    position = (travel - travel.mean()) / span
+    line = np.column_stack([np.ones_like(position), position])
+    detrended = force - line @ np.linalg.lstsq(line, force, rcond=None)[0]
     frequencies = np.arange(_PERIODS, span / (_SHORTEST * step), _IN_AIR)
-    left = []
+    misfits = []
     for frequency in frequencies.tolist():
-        phase = 2 * np.pi * frequency * place
+        phase = 2 * np.pi * frequency * position
         design = np.column_stack([line, np.cos(phase), np.sin(phase)])
-        rest = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
-        left.append(float(rest @ rest))
-    best = int(np.argmin(left))
-    if left[best] > _SINE * float(beside_line @ beside_line):
+        residual = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
+        misfits.append(float(residual @ residual))
+    best = int(np.argmin(misfits))
+    if misfits[best] > _SINE * float(detrended @ detrended):
         return None
     return span / float(frequencies[best])
 
 
-def _beside_spline(travel: Floats, force: Floats, period: float) -> tuple[PeriodicError, float, float]:
-    """The sine of a period beside a cubic spline on each way, and the squares that are left with and without it."""
+def _sine_beside_spline(travel: Floats, force: Floats, period: float) -> tuple[PeriodicError, float, float]:
+    """The sine of a period fitted with a cubic spline on each leg, and the sums of squares with and without it."""
     turns = turning_points(travel)
     phase = 2 * np.pi * travel / period
     sine = np.column_stack([np.cos(phase), np.sin(phase)])
-    rest, force_rest = sine.copy(), force.copy()
+    sine_residual, force_rest = sine.copy(), force.copy()
     for first, last in zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True):
         rows = np.arange(first, last + (last == len(travel) - 1))
         basis = _splines(travel[rows], _KNOTS * period)
         both = np.column_stack([sine[rows], force[rows]])
-        left = both - basis @ np.linalg.lstsq(basis, both, rcond=None)[0]
-        rest[rows], force_rest[rows] = left[:, :2], left[:, 2]
-    amplitudes = np.linalg.lstsq(rest, force_rest, rcond=None)[0]
-    left = force_rest - rest @ amplitudes
-    found = PeriodicError(period, float(amplitudes[0]), float(amplitudes[1]))
-    return found, float(left @ left), float(force_rest @ force_rest)
+        residual = both - basis @ np.linalg.lstsq(basis, both, rcond=None)[0]
+        sine_residual[rows], force_rest[rows] = residual[:, :2], residual[:, 2]
+    amplitudes = np.linalg.lstsq(sine_residual, force_rest, rcond=None)[0]
+    residual = force_rest - sine_residual @ amplitudes
+    error = PeriodicError(period, float(amplitudes[0]), float(amplitudes[1]))
+    return error, float(residual @ residual), float(force_rest @ force_rest)
 
 
 def _splines(travel: Floats, apart: float) -> Floats:
-    """Cubic B-splines over a way, with knots so far apart (samples, splines)."""
+    """Cubic B-splines over a leg, with knots `apart` in travel (samples, splines)."""
     low, high = float(travel.min()), float(travel.max())
     count = max(int(np.ceil((high - low) / apart)), 1)
     inner = np.linspace(low, high, count + 1)
@@ -554,23 +546,23 @@ def _splines(travel: Floats, apart: float) -> Floats:
     return np.asarray(BSpline.design_matrix(travel, knots, 3).toarray())
 
 
-_LEAST = 16  # samples, with which a defect can be told
-_ONE_WAY = 2  # turning points of a curve of one way: its first and its last sample
-_STICKS = 0.05  # of the range of force, below what the shallow end shows: a pull, so that this is a way out
-_UNLOADED = 0.1  # of a block's first force, at most, with which it ends then
-_SHALLOW = 20  # one in so many samples, the shallowest: the air, where any was recorded
+_LEAST = 16  # samples needed to detect a defect
+_TURNS_OF_ONE_WAY = 2  # turning points of a monotonic curve: its first and its last sample
+_STICKS = 0.05  # of the range of force below the shallow end: adhesion, so that the rows are a withdrawal
+_UNLOADED = 0.1  # largest final force of a reversed block, of its first force
+_SHALLOW = 20  # one in so many samples, the shallowest: air, where any was recorded
 
 
 @dataclass(frozen=True)
 class PreparedCurves:
-    """A campaign whose curves were prepared, and the findings on what was changed."""
+    """A campaign with prepared curves, and the findings on the changes."""
 
     campaign: Campaign
     findings: tuple[Finding, ...]
 
 
 def prepared(campaign: Campaign) -> PreparedCurves:
-    """The campaign with its curves prepared; other recordings stay as they are."""
+    """The campaign with its curves prepared; other recordings are unchanged."""
     findings: list[Finding] = []
     negative: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     recordings: list[Recording] = []
@@ -578,14 +570,14 @@ def prepared(campaign: Campaign) -> PreparedCurves:
         if isinstance(recording, FrfRecording) or are_exchanged(recording):
             recordings.append(recording)
             continue
-        curve, found = _without_saturation(recording)
+        curve, curve_findings = _without_saturation(recording)
         oriented = orientation(curve)
         negative.setdefault((curve.kind, oriented.negative), []).append(curve.id)
         for step in (_turned, _forwards, _without_periodic_error):
-            curve, further = step(curve, oriented)
-            found += further
+            curve, step_findings = step(curve, oriented)
+            curve_findings += step_findings
         recordings.append(curve)
-        findings += found
+        findings += curve_findings
     counted = [finding(kind, fields, ids) for (kind, fields), ids in negative.items() if fields]
     return PreparedCurves(replace(campaign, recordings=tuple(recordings)), (*counted, *findings))
 
@@ -597,8 +589,9 @@ def _turned(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecordin
 
 
 def _forwards(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
-    """Of one way, from the air to the deepest; what relaxes on a way out alone no law tells, so that its times go."""
-    if not oriented.is_known or len(oriented.turns) > _ONE_WAY or not _is_backwards(curve):
+    """A monotonic curve from air to the deepest sample; a reversed one loses its times, since relaxation cannot be
+    determined from a withdrawal alone."""
+    if not oriented.is_deep_end_known or len(oriented.turns) > _TURNS_OF_ONE_WAY or not _is_backwards(curve):
         return curve, []
     finding = Finding(Reason.ROWS_REVERSED, curve.id, "displacement_mm", {"is_timed": curve.time_s is not None})
     backwards = samples_of(replace(curve, time_s=None), np.arange(len(curve.force_n))[::-1])
@@ -606,8 +599,7 @@ def _forwards(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecord
 
 
 def _is_backwards(curve: CurveRecording) -> bool:
-    """Whether the rows of a curve of one way begin where it is deepest, and the force is nowhere the pull that tells a
-    way out."""
+    """Whether the rows of a monotonic curve begin at the deepest sample, without the adhesive pull of a withdrawal."""
     travel, force = (column[np.isfinite(column)] for column in (curve.displacement_mm, curve.force_n))
     if isinstance(curve, IndentationRecording):
         shallow = float(np.median(force[np.argsort(travel, kind="stable")[: max(1, len(force) // _SHALLOW)]]))
@@ -631,8 +623,8 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
         "samples": int(at_limit.sum()),
         "limits_n": [float(value) for value in limits],
     }
-    kept = np.setdiff1d(np.arange(len(curve.force_n)), finite[at_limit])
-    return samples_of(curve, kept), [Finding(Reason.FORCE_SATURATES, curve.id, "force_n", arguments)]
+    unsaturated = np.setdiff1d(np.arange(len(curve.force_n)), finite[at_limit])
+    return samples_of(curve, unsaturated), [Finding(Reason.FORCE_SATURATES, curve.id, "force_n", arguments)]
 
 
 def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
@@ -647,15 +639,15 @@ def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tup
         return curve, []
     corrected = np.array(curve.force_n, dtype=float)
     corrected[finite] = force - error.at(travel)
-    left = float(np.ptp(corrected[finite]))
-    if left == 0:  # no contact is left to correct
+    force_range = float(np.ptp(corrected[finite]))
+    if force_range == 0:  # no contact is left to correct
         return curve, []
     arguments = {
         "period_mm": error.period,
         "amplitude_n": error.amplitude,
-        "percent": 100 * error.amplitude / left,
+        "percent": 100 * error.amplitude / force_range,
     }
-    if curve.time_s is not None and len(oriented.turns) <= _ONE_WAY:
-        lasting = abs(float(curve.time_s[finite[-1]] - curve.time_s[finite[0]]))
-        arguments["frequency_hz"] = float(np.ptp(travel)) / error.period / max(lasting, 1e-300)
+    if curve.time_s is not None and len(oriented.turns) <= _TURNS_OF_ONE_WAY:
+        duration = abs(float(curve.time_s[finite[-1]] - curve.time_s[finite[0]]))
+        arguments["frequency_hz"] = float(np.ptp(travel)) / error.period / max(duration, 1e-300)
     return replace(curve, force_n=corrected), [Finding(Reason.PERIODIC_ERROR, curve.id, "force_n", arguments)]

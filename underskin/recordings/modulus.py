@@ -1,21 +1,14 @@
-"""Moduli of single curves.
+"""Young's modulus from the first loading branch of a single curve. SI inside.
 
-The first loading branch of a curve: what a modulus is told from.
+Cylinders in compression or tension: two laws are tried, each over the first part of the curve that follows it, the
+incompressible neo-Hookean solid between smooth platens, nominal stress = (E/3)(λ⁻² − λ) with λ = 1 − strain,
+compression positive, and Hooke's line, nominal stress = E strain. The law that holds over more strain is used; with
+equal ranges the line if its residual is smaller, else the neo-Hookean law.
 
-The modulus that the first loading branch of a compressed or pulled sample tells. SI inside.
-
-Two laws are tried, each over the first part of the curve that it holds: the incompressible neo-Hookean solid between
-smooth platens, nominal stress = (E/3)(λ⁻² − λ) with λ = 1 − strain, compression positive; and Hooke's straight line,
-nominal stress = E strain. That which holds over more strain is the sample's; where both hold equally far the line if it
-leaves less, else the neo-Hookean one.
-
-The modulus that the first loading branch of an indentation tells: F = F0 + E' f(d − d0), the contact point d0 free,
-f that of a sphere on the layer whose thickness is declared, else on a half space; of the whole sphere where it is
-pressed deep (physics/sphere_law.py). SI inside.
-
-No number is quoted where the law does not hold: pressed deeper than it reaches, or where the force follows another
-power of the depth than a sphere's. That power is 1 under a flat punch or a stage that gives, 3/2 under a small sphere,
-2 under a cone, and above 3/2 on a layer whose thickness nobody declared.
+Indentations: F = F0 + E' f(d − d0) with a free contact point d0 and f of a sphere on a layer of the declared thickness,
+else on a half space; of the full sphere where it is pressed deep (physics/sphere_law.py). No modulus is quoted where
+the law does not hold: pressed deeper than its range, or with another power of depth than a sphere's: 1 under a flat
+punch or with a compliant stage, 3/2 under a small sphere, 2 under a cone, above 3/2 on a layer of undeclared thickness.
 """
 
 from collections.abc import Callable
@@ -54,17 +47,17 @@ def loading_branch(along: Floats, load: Floats) -> tuple[Floats, Floats]:
     return along[: top + 1], load[: top + 1]
 
 
-# Largest departure from a law: of the stress that it spans, of the stress there, and of that of the whole curve
+# Largest departure from a law: of the range of stress of the part, of the stress there, and of the range of the curve
 _STRAIGHT, _LOCALLY, _LEAST = 0.012, 0.05, 2e-3
-_LEAVES = 0.02  # departure from it, of the stress, at which the curve no longer follows the law
-_EARLY = 0.1  # the first such part starts below this share of the stress at its end
+_LEAVES = 0.02  # departure, of the stress, beyond which the curve no longer follows the law
+_EARLY = 0.1  # the part starts below this share of the stress at its end
 _POINTS = 400
-_LEAST_STRETCH = 0.05  # of λ: a sample that is pressed to less is none
-_FOOT_ROUNDS = 2  # by which the foot of the curve is found, from which strain counts
+_LEAST_STRETCH = 0.05  # least λ
+_FOOT_ROUNDS = 2  # iterations for the foot of the curve, from which strain counts
 _FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
-_SMOOTH = 5  # degree of the polynomial that stands for a curve of few points
-_LONGER = 1.15  # times as much strain: a law that holds over so much more is the better one
-_BETTER = 0.8  # of the other's departure: of two that hold equally far, the line is the better law then
+_SMOOTH = 5  # degree of the polynomial that represents a curve of few points
+_LONGER = 1.15  # ratio of strain ranges beyond which the law of the longer range is chosen
+_BETTER = 0.8  # ratio of departures below which the line is chosen where both hold equally far
 
 
 @dataclass(frozen=True)
@@ -73,9 +66,9 @@ class CompressionModulus:
     where the curve leaves the law.
 
     Strains count from the foot of the curve, compression or tension positive. `leaves_at_strain` and `leaves_at_stress`
-    are None where the curve follows the law to its end; `departure` is the root mean square of what it leaves of the
-    part, over the stress that it spans. The uncertainty holds noise and the change of slope within the part;
-    friction at the platens and the sample's size are not in it.
+    are None where the curve follows the law to its end; `departure` is the rms residual of the part over its range of
+    stress. The uncertainty includes noise and the change of slope within the part, not friction at the platens or the
+    sample's size.
     """
 
     modulus: float
@@ -89,7 +82,7 @@ class CompressionModulus:
 
     @property
     def statement(self) -> str:
-        """Which law, and where it holds, in words."""
+        """The law and its range in words."""
         law = "straight" if self.is_straight else "neo-Hookean"
         first = 0.0 if abs(self.first_strain) < _FOOT * self.last_strain else self.first_strain
         follows = f"{law} from {100 * first:.3g} to {100 * self.last_strain:.3g} % strain"
@@ -121,10 +114,10 @@ def compression_modulus(displacement: Floats, force: Floats, height: float, diam
     noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
     foot = float(along[np.abs(load).argmin()])
     line = _by_law(along, stress, height, sign, noise, foot, straight=True)
-    if (along.max() - foot) / height > 1 - _LEAST_STRETCH:  # through all of the sample: a slip of units
+    if (along.max() - foot) / height > 1 - _LEAST_STRETCH:  # displacement beyond the sample's height: a slip of units
         return line
     neo_hookean = _by_law(along, stress, height, sign, noise, foot, straight=False)
-    by_law, by_line = (one.last_strain - one.first_strain for one in (neo_hookean, line))
+    by_law, by_line = (fit.last_strain - fit.first_strain for fit in (neo_hookean, line))
     if max(by_law, by_line) > _LONGER * min(by_law, by_line):
         return line if by_line > by_law else neo_hookean
     return line if line.departure < _BETTER * neo_hookean.departure else neo_hookean
@@ -133,7 +126,7 @@ def compression_modulus(displacement: Floats, force: Floats, height: float, diam
 def _by_law(
     along: Floats, stress: Floats, height: float, sign: float, noise: float, foot: float, *, straight: bool
 ) -> CompressionModulus:
-    """By one law; `foot` is about where the stress is 0, `sign` 1 where it grows with the displacement's pressing."""
+    """The modulus by one law; `foot`: displacement where the stress is about 0; `sign`: 1 where the stress rises."""
     for _ in range(_FOOT_ROUNDS):
         strain, binned = _thinned(sign * (along - foot) / height, sign * stress)
         stretched = strain if straight else sign * _neo_hookean(sign * strain)
@@ -165,7 +158,7 @@ def _by_law(
 
 
 def _neo_hookean(strain: Floats) -> Floats:
-    """Nominal stress over E at strains, compression positive."""
+    """Nominal stress over E of strains, compression positive."""
     stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
     return np.asarray((stretch**-2 - stretch) / 3)
 
@@ -178,23 +171,23 @@ def _thinned(strain: Floats, stress: Floats) -> tuple[Floats, Floats]:
 
 
 def _noise(along: Floats, values: Floats) -> float:
-    """Of one point: by the second difference, which a smooth curve of many points hardly has, and at most by what a
-    smooth polynomial leaves, since few points bend from one to the next by more than their noise."""
+    """Noise of one point: by second differences, negligible in a smooth curve of many points, and at most the residual
+    of a polynomial, since in a curve of few points curvature exceeds the noise."""
     if len(values) < 3:
         return 0.0
     by_difference = float(1.4826 * np.median(np.abs(np.diff(values, n=2))) / np.sqrt(6))
-    place = 2 * (along - along.min()) / np.ptp(along) - 1
+    position = 2 * (along - along.min()) / np.ptp(along) - 1
     degree = min(_SMOOTH, len(values) - 3)
-    powers = np.polynomial.legendre.legvander(place, degree)
-    left = values - powers @ np.linalg.lstsq(powers, values, rcond=None)[0]
+    powers = np.polynomial.legendre.legvander(position, degree)
+    residual = values - powers @ np.linalg.lstsq(powers, values, rcond=None)[0]
     freedom = max(len(values) - degree - 1, 1)
-    return min(by_difference, float(np.sqrt(left @ left / freedom)))
+    return min(by_difference, float(np.sqrt(residual @ residual / freedom)))
 
 
 def _first_straight(strain: Floats, stress: Floats, noise: float) -> tuple[int, int]:
     """First and last point of the longest straight part among those that start early.
 
-    A toe is passed over, a start that is steeper is not: there the stress lies below the line.
+    A toe is skipped; a steeper start, where the stress lies below the line, is not.
     """
     best = (0, min(len(strain), FEWEST) - 1)
     least = _LEAST * float(np.ptp(stress))
@@ -226,28 +219,28 @@ def _leaves(strain: Floats, stress: Floats, slope: float, level: float, last: in
     return start if start < len(strain) else None
 
 
-_AIR = 5  # points before contact that make a force offset known
+_AIR = 5  # points before contact needed for a force offset
 _CONTACTS = 200  # contact points tried
 _THINNED = 300  # samples by which powers are compared
 _DEEPEST_OF_RADIUS = 2.0  # a/R is 0.96 there: a sphere pressed deeper is held at its equator
-_DEEPEST_OF_THICKNESS = 0.5  # a linear layer pressed to half its thickness: strains are of order 1 beyond
-_NOT_ALL = 3.0  # times a sample's noise, that a law leaves where more than it is at work
-_PLAINLY = 0.7  # of the other's residual: one of layer and half space is then the better law
-_MISSES = 0.01  # of the force that it spans, root mean square, beyond which a law may miss plainly
-_BEYOND_NOISE = 4.0  # times a sample's noise, that it leaves then
-_POWERS = np.arange(0.7, 3.05, 0.1)  # of the depth, that are tried in place of the law's own
-_TAKES = 0.4  # of the law's residual, at most, that another power leaves where the law misses plainly
-_AS_NOISE, _AS_IDEAL = 1.5, 1e-3  # times the noise, and of the force: less is left where the power says all
-_SPHERES = 1.25, 1.8  # powers that adhesion, creep, stiffening and a stage that gives make of a sphere's 3/2
+_DEEPEST_OF_THICKNESS = 0.5  # largest depth of the linear layer: strains are of order 1 beyond
+_NOT_ALL = 3.0  # residual over a sample's noise, beyond which the law is incomplete
+_PLAINLY = 0.7  # ratio of residuals below which the half space is chosen instead of the layer
+_MISSES = 0.01  # least rms residual of a wrong law, of the range of force
+_BEYOND_NOISE = 4.0  # the same over a sample's noise
+_POWERS = np.arange(0.7, 3.05, 0.1)  # powers of the depth that are compared with the law
+_TAKES = 0.4  # largest residual of another power, of the law's, where the law is wrong
+_AS_NOISE, _AS_IDEAL = 1.5, 1e-3  # largest residual of a sufficient power: times the noise, and of the force
+_SPHERES = 1.25, 1.8  # apparent powers of a sphere with adhesion, creep, stiffening or a compliant stage
 
 
 @dataclass(frozen=True)
 class IndentationModulus:
-    """The modulus [Pa] with its standard uncertainty, the contact point d0 [m] and what the fit leaves [N].
+    """The modulus [Pa] with its standard uncertainty, the contact point d0 [m] and the rms residual [N].
 
-    `noise` [N] is a sample's, `depth` [m] the largest; `radius` and `thickness` are those of the law, None of a half
-    space. The uncertainty goes by the residuals and their correlation from point to point. `residual` far above the
-    noise says that the law is not the whole story, and that E is a number for this curve only.
+    `noise` [N]: of a sample; `depth` [m]: the largest; `radius` and `thickness` [m]: of the law, None for a half space.
+    The uncertainty follows from the residuals and their correlation from point to point. A `residual` far above the
+    noise means that the law is incomplete and E holds for this curve only.
     """
 
     modulus: float
@@ -259,11 +252,11 @@ class IndentationModulus:
     thickness: float | None
     declared_thickness: float | None
     noise: float
-    finite_strain: float = 0.0  # by which E is higher where the solved contact is taken
+    finite_strain: float = 0.0  # increase of E by the solved contact [Pa]
 
     @property
     def statement(self) -> str:
-        """Which law, where contact begins, how deep it was pressed, and what the law leaves, in words."""
+        """The law, the contact point, the depth and the residual in words."""
         contact = float(to_lab("displacement_mm", self.contact_point))
         over = f"{self.depth / self.radius:.2g} of the radius"
         if self.declared_thickness is not None:
@@ -299,7 +292,7 @@ class _Fit:
     at_bound: bool
 
     @property
-    def left(self) -> float:
+    def rms(self) -> float:
         """The root mean square of the residual."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
@@ -330,43 +323,43 @@ def indentation_modulus(
     thickness: float | None = None,
     softening: Softening | None = None,
 ) -> IndentationModulus:
-    """The sphere's modulus with a free contact point, and a free force offset where points before contact show it.
+    """The modulus with a free contact point, and a free force offset where there are points before contact.
 
-    The modulus is the linear contact's. What finite strain adds to the depth is known for one contact alone
-    (`softening`): the uncertainty is that of a value anywhere between the moduli without and with it.
-    Raises InvalidInput where the loading branch has too few points, does not load, or leaves the modulus open, where it
-    is pressed deeper than the law holds, and where it follows no sphere's law.
+    The modulus is that of the linear contact. The effect of finite strain on the depth is known for one contact only
+    (`softening`): the uncertainty is that of a uniform value between the moduli without and with it.
+    Raises InvalidInput where the loading branch has too few points, does not load, or does not determine the modulus,
+    where it is deeper than the law holds, and where it follows no sphere's law.
     """
     depth, load = loading_branch(displacement, force)
     fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
     if fit.at_bound:
         allowed = "must show where contact begins: record from the air, or deeper, so that the force bends"
         raise unusable("displacement_mm", None, allowed)
-    found = _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
-    require_depth(found)
+    result = _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
+    require_depth(result)
     tip = _tip(depth, load, fit, thickness)
     if tip is not None:
         raise tip.refusal
     if softening is None:
-        return found
+        return result
     softer = _as_deep(depth, load, radius, used, poisson_ratio, softening)
     more = float(softer.fitted[0] - fit.fitted[0]) * (1 - poisson_ratio**2)
-    return replace(found, uncertainty=float(np.hypot(found.uncertainty, more / np.sqrt(3))), finite_strain=more)
+    return replace(result, uncertainty=float(np.hypot(result.uncertainty, more / np.sqrt(3))), finite_strain=more)
 
 
 def estimate(
     displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None = None
 ) -> IndentationModulus:
-    """The same whatever it is worth: where a fit begins."""
+    """The modulus without checks of the law, as a starting value of fits."""
     depth, load = loading_branch(displacement, force)
     fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
     return _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
 
 
-def require_depth(found: IndentationModulus) -> None:
-    """Raises InvalidInput where it is pressed deeper than a law of a sphere, or of a layer, holds."""
-    of_radius = found.depth / found.radius
-    depth_mm, radius_mm = (float(to_lab("displacement_mm", length)) for length in (found.depth, found.radius))
+def require_depth(result: IndentationModulus) -> None:
+    """Raise InvalidInput where the depth is beyond the law of a sphere, or of a layer."""
+    of_radius = result.depth / result.radius
+    depth_mm, radius_mm = (float(to_lab("displacement_mm", length)) for length in (result.depth, result.radius))
     if of_radius > _DEEPEST_OF_RADIUS:
         allowed = (
             f"is {of_radius:.2g} times the declared radius of {radius_mm:.3g} mm, where no sphere's law holds (at most "
@@ -374,11 +367,11 @@ def require_depth(found: IndentationModulus) -> None:
             "Press less deep, or a larger sphere"
         )
         raise unusable("displacement_mm", f"a depth of {depth_mm:.3g} mm", allowed)
-    if found.declared_thickness is None:
+    if result.declared_thickness is None:
         return
-    of_thickness = found.depth / found.declared_thickness
-    layer = SphereLaw(found.radius, found.declared_thickness, INCOMPRESSIBLE)
-    if of_thickness > _DEEPEST_OF_THICKNESS or found.depth >= layer.deepest:
+    of_thickness = result.depth / result.declared_thickness
+    layer = SphereLaw(result.radius, result.declared_thickness, INCOMPRESSIBLE)
+    if of_thickness > _DEEPEST_OF_THICKNESS or result.depth >= layer.deepest:
         allowed = (
             f"is {of_thickness:.2g} of the declared thickness, where the linear layer's law does not hold (at most "
             f"{_DEEPEST_OF_THICKNESS:g}, and a contact of at most 4 thicknesses): press less deep, or a thicker sample"
@@ -388,37 +381,37 @@ def require_depth(found: IndentationModulus) -> None:
 
 @dataclass(frozen=True)
 class Tip:
-    """What a curve looks like that follows no sphere's law: the power of the depth, and why no modulus follows."""
+    """A curve that follows no sphere's law: the power of the depth, and why no modulus follows."""
 
     power: float
     refusal: InvalidInput
-    is_plain: bool  # nothing but noise is left of that power: no law of a sphere beside another effect is needed
+    is_plain: bool  # the power leaves only noise: no sphere with a further effect is needed
 
     @property
     def is_blunt(self) -> bool:
-        """Whether it looks like a flat punch, or a stage that gives, under which nothing tells the modulus."""
+        """Whether it looks like a flat punch or a compliant stage, from which no modulus can be determined."""
         return self.power < _SPHERES[0]
 
 
 def tip_of(
     displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None
 ) -> Tip | None:
-    """What the tip looks like, where that is plainly no sphere."""
+    """The apparent tip where it is clearly no sphere; else None."""
     depth, load = loading_branch(displacement, force)
     fit, _ = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
     return _tip(depth, load, fit, thickness)
 
 
 def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip | None:
-    """Another power n of the depth fits far better, (f(d − d0))^(n/1.5), so that a declared layer's own stiffening is
-    none of it; and is far from what a sphere's force can look like."""
+    """The tip where another power n of the depth, (f(d − d0))^(n/1.5), which includes the stiffening of a declared
+    layer, fits far better and is outside the range of spheres; else None."""
     span, noise = float(np.ptp(load)), roughness(load)
-    if fit.left < max(_MISSES * span, _BEYOND_NOISE * noise):
+    if fit.rms < max(_MISSES * span, _BEYOND_NOISE * noise):
         return None
     at = np.unique(np.linspace(0, len(load) - 1, min(len(load), _THINNED)).round().astype(np.intp))
     fits = {float(power): _fitted(depth[at], load[at], _to_power(fit.law, float(power))) for power in _POWERS}
-    power = min(fits, key=lambda power: fits[power].left)
-    if fits[power].left > _TAKES * fit.left or _SPHERES[0] <= power <= _SPHERES[1]:
+    power = min(fits, key=lambda power: fits[power].rms)
+    if fits[power].rms > _TAKES * fit.rms or _SPHERES[0] <= power <= _SPHERES[1]:
         return None
     like = "as under a cone (2)"
     if power < _SPHERES[0]:
@@ -426,11 +419,11 @@ def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip
     elif thickness is None:
         like += ", or on a thin layer whose thickness is not declared"
     allowed = (
-        f"is {like}; a sphere has 1.5, and its law misses by {100 * fit.left / span:.2g} % of the force, "
-        f"{fit.left / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a block "
+        f"is {like}; a sphere has 1.5, and its law misses by {100 * fit.rms / span:.2g} % of the force, "
+        f"{fit.rms / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a block "
         "of known modulus"
     )
-    is_plain = fits[power].left < max(_AS_NOISE * noise, _AS_IDEAL * span)
+    is_plain = fits[power].rms < max(_AS_NOISE * noise, _AS_IDEAL * span)
     return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed), is_plain)
 
 
@@ -441,13 +434,12 @@ def _sphere_fit(
     poisson_ratio: float,
     thickness: float | None,
 ) -> tuple[_Fit, float | None]:
-    """The fit on the declared layer, or on the half space where that is plainly the better law; and the thickness that
-    it is of."""
+    """The fit on the declared layer, or on the half space where that fits clearly better; and its thickness."""
     half_space = _as_deep(depth, load, radius, None, poisson_ratio)
     if thickness is None:
         return half_space, None
     layer = _as_deep(depth, load, radius, thickness, poisson_ratio)
-    if half_space.left < _PLAINLY * layer.left:
+    if half_space.rms < _PLAINLY * layer.rms:
         return half_space, None
     return layer, thickness
 
@@ -460,11 +452,11 @@ def _as_deep(
     poisson_ratio: float,
     softening: Softening | None = None,
 ) -> _Fit:
-    """With the whole sphere in place of the paraboloid where it is pressed deep."""
+    """The fit with the full sphere instead of the paraboloid where it is pressed deep."""
     fit = _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening))
     if depth.max() - fit.contact < PARABOLOID * radius:
         return fit
-    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening, whole=True))
+    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening, full_sphere=True))
 
 
 def _to_power(law: Callable[[Floats], Floats], power: float) -> Callable[[Floats], Floats]:
@@ -502,7 +494,7 @@ def _modulus(
         modulus=float(fit.fitted[0] * per_reduced),
         uncertainty=float(deviation * per_reduced),
         contact_point=fit.contact,
-        residual=fit.left,
+        residual=fit.rms,
         depth=float(depth.max() - fit.contact),
         radius=radius,
         thickness=thickness,
@@ -528,8 +520,8 @@ def _design(depth: Floats, contact: float, law: Callable[[Floats], Floats], offs
 
 
 def _contact_point(depth: Floats, load: Floats, law: Callable[[Floats], Floats], *, offset: bool) -> tuple[float, bool]:
-    """d0 of the least squares in force, before the first point where the recording starts in contact; and whether it is
-    as far before as is looked for."""
+    """d0 by least squares in force, before the first point where the recording starts in contact; and whether it lies
+    at the end of the search range."""
 
     def misfit(contact: float) -> float:
         pressed = law(depth - contact)
@@ -543,12 +535,12 @@ def _contact_point(depth: Floats, load: Floats, law: Callable[[Floats], Floats],
     guesses = np.linspace(depth.min() - (0 if offset else span), depth.max() - 0.02 * span, _CONTACTS)
     best = int(np.argmin([misfit(float(guess)) for guess in guesses]))
     around = float(guesses[max(best - 1, 0)]), float(guesses[min(best + 1, len(guesses) - 1)])
-    found = minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-9 * span}).x
-    return float(found), not offset and best == 0
+    minimum = minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-9 * span}).x
+    return float(minimum), not offset and best == 0
 
 
 def _correlation_factor(residual: Floats) -> float:
-    """How much fewer independent points there are, for residuals that are alike from one to the next."""
+    """Factor of the variance for residuals with correlation between neighbours, (1 + ρ)/(1 − ρ)."""
     power = float(residual @ residual)
     if power == 0:
         return 1.0

@@ -1,7 +1,6 @@
-"""Files read, and campaigns joined.
+"""Reading of files of any supported format as campaigns, and joining of campaigns of one rig, such as a file a press.
 
-Which recordings are one and the same, whatever they are called. From a lab's file, of whatever format, to a campaign.
-Files of one rig, such as a file a press, as one campaign.
+Recordings are identical, whatever their ids, where their conditions and numbers are (`digest`).
 """
 
 import hashlib
@@ -55,12 +54,12 @@ _FEWEST_VALUES = 16  # different ones: noise makes no two measurements agree in 
 
 
 def digest(recording: Recording) -> str | None:
-    """A text that two recordings share where they are identical; None where nothing can show that another one is.
+    """A hash that is equal for identical recordings; None where identity cannot be established.
 
-    Identical are recordings of one kind, sensor, indenter, preload, dynamic force, position and sample
-    with the same numbers, digit for digit, in every column: ids, times and other conditions may differ. Where what was
-    measured takes fewer than 16 different values, as in a table typed by hand, two measurements can agree by chance:
-    then `recorded_at` must be the same, too, and without one no recording is identical to another.
+    Identical recordings have the same kind, sensor, indenter, preload, dynamic force, position and sample, and the same
+    numbers, digit for digit, in every column; ids, times and other conditions may differ. Measurements of fewer than 16
+    different values, as in a table typed by hand, can agree by chance: then `recorded_at` must agree too, and without
+    one no recording is identical to another.
     """
     columns = {name: values for name in COLUMNS if (values := getattr(recording, name, None)) is not None}
     measured = [values for name, values in columns.items() if name not in _GIVEN]
@@ -69,11 +68,11 @@ def digest(recording: Recording) -> str | None:
         if recording.recorded_at is None:
             return None
         described["recorded_at"] = recording.recorded_at
-    made = hashlib.blake2b(orjson.dumps(described), digest_size=16)
+    hasher = hashlib.blake2b(orjson.dumps(described), digest_size=16)
     for name, values in columns.items():
-        made.update(f"{name} {len(values)} ".encode())
-        made.update(np.asarray(values, "<f8").tobytes())
-    return made.hexdigest()
+        hasher.update(f"{name} {len(values)} ".encode())
+        hasher.update(np.asarray(values, "<f8").tobytes())
+    return hasher.hexdigest()
 
 
 def _agree_by_chance(measured: Iterable[Floats]) -> bool:
@@ -93,8 +92,8 @@ _TEMPLATE = "; below lines about the skin, the first of them schema,campaign/1, 
 
 @dataclass(frozen=True)
 class Reading:
-    """A file's campaign with its good recordings, what is wrong with the others, what the user should know, and by
-    field which channel a rig description took for it, in words (under no field how a text was read)."""
+    """A file's campaign with its valid recordings, the problems of the others, warnings, and by field the channel that
+    a rig description uses, in words (under the empty key how a text was read)."""
 
     campaign: Campaign
     problems: list[RecordingProblem]
@@ -102,7 +101,7 @@ class Reading:
     taken: Mapping[str, str] = field(default_factory=dict)
 
     def with_estimator(self, estimator: Estimator | None) -> "Reading":
-        """The same with the FRFs of all time series estimated so, whatever was said before; None changes nothing.
+        """The reading with this estimator for all time series; None changes nothing.
 
         A warning counts the recordings that it does not apply to.
         """
@@ -116,31 +115,31 @@ class Reading:
             else:
                 recordings.append(recording)
                 others += 1
-        told = [f"{estimator} is for time series, which {others} of {len(recordings)} recordings are not"]
+        messages = [f"{estimator} is for time series, which {others} of {len(recordings)} recordings are not"]
         campaign = replace(self.campaign, recordings=tuple(recordings))
-        return replace(self, campaign=campaign, warnings=[*self.warnings, *(told if others else [])])
+        return replace(self, campaign=campaign, warnings=[*self.warnings, *(messages if others else [])])
 
     def with_curves_turned(self) -> "Reading":
-        """The same with force and displacement turned in curves that count pressing negative; a warning says so."""
+        """The reading with negative force and displacement of curves reversed in sign, and a warning."""
         campaign, changed = curve_preparation.turned(self.campaign)
         if not changed:
             return self
-        told = f"force or displacement of {changed} recordings, counted negative as they were pressed, were turned"
-        return replace(self, campaign=campaign, warnings=[*self.warnings, told])
+        message = f"force or displacement of {changed} recordings, counted negative as they were pressed, were turned"
+        return replace(self, campaign=campaign, warnings=[*self.warnings, message])
 
 
 def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Reading:
-    """The campaign in a file, of which `source` is the place on this machine or the bytes, and `name` what to call it.
+    """The campaign in a file; `source` is its path or its bytes, `name` its name in messages.
 
-    The content decides the format, of another package's formats the name. Files that hold channels, not campaigns,
-    need a rig description. Raises FileError that names the file and the place, InvalidInput where the campaign itself
-    or its skin cannot be used.
+    The format follows from the content, for formats of other packages from the name. Files of channels need a rig
+    description. Raises FileError that names the file and the place, InvalidInput where the campaign itself or its skin
+    is invalid.
     """
     return understood(read_contents(source, name), name, rig)
 
 
 def understood(contents: Contents | Document, name: str, rig: RigDescription | None = None) -> Reading:
-    """The campaign in what `read_contents` has read; raises as `read_file`."""
+    """The campaign of contents read by `read_contents`; raises as `read_file`."""
     if isinstance(contents, Document):
         return Reading(*from_dict(contents.campaign), list(contents.warnings))
     if rig is None:
@@ -154,8 +153,8 @@ def understood(contents: Contents | Document, name: str, rig: RigDescription | N
 def _holds_frfs(contents: Contents) -> bool:
     """Whether a channel is headed as the FRF of the CSV template is."""
     names = {channel.name for block in contents.blocks for channel in block.channels}
-    meant = [template_columns.field_of(one, PARTS) for one in names]
-    return any(one is not None and one[0] in (MAGNITUDE, *PARTS) for one in meant)
+    meant = [template_columns.field_of(name, PARTS) for name in names]
+    return any(meaning is not None and meaning[0] in (MAGNITUDE, *PARTS) for meaning in meant)
 
 
 def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
@@ -169,7 +168,7 @@ def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
 
 
 def sheet_text(content: bytes, name: str, sheet: str | None = None) -> str:
-    """A sheet of a workbook as text, cells separated by tabs: that of a name, or the only one; raises FileError."""
+    """A sheet of a workbook as text with cells separated by tabs: the named or the only one; raises FileError."""
     with _opened(content, name) as stream:
         return str(call_apart(_SHEET_TEXT, stream, name, *([] if sheet is None else [sheet]), what="XLSX")["text"])
 
@@ -193,18 +192,18 @@ def _opened(source: Path | str | bytes, name: str) -> Iterator[BinaryIO]:
 
 _ROUNDING = 1e-6  # relative, and of positions [mm]: single precision, and conversions of units
 _MOST_LISTED = 5  # repeats in a warning
-_PLACE = "recordings["  # how a refused recording without an id is named
+_INDEX_LABEL = "recordings["  # how a refused recording without an id is named
 
-Files = Sequence[tuple[str, Reading]]  # what each file is called, and what was read from it
+Files = Sequence[tuple[str, Reading]]  # name and content of each file
 
 
 def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
     """One campaign called `name` of the recordings of all files, in order.
 
-    The files must be of one skin: what one says of it, each other says too or leaves out, and the sensors of all are
-    its sensors. `skin_id` is the skin's id whatever the files say. A recording's id that two files have is led by the
-    file's name. Of identical recordings (repeats.digest) only the first is there, and a warning names the others.
-    Raises InvalidInput that names the field and the two files where they differ.
+    The files must be of one skin: stated facts must agree, and the sensors are those of all files. `skin_id` replaces
+    the ids in the files. An id used by several files is preceded by the file's name. Of identical recordings (`digest`)
+    only the first is kept, and a warning names the others. Raises InvalidInput that names the field and the two files
+    where they differ.
     """
     name = validation.name("name", name, False)
     if not files:
@@ -229,27 +228,31 @@ def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
 
 
 def _skin(files: Files, skin_id: str | None) -> SkinDescription:
-    """What the files say of their skin, together."""
-    said: dict[str, tuple[Any, str]] = {}  # of each field its value and the file that said it first
+    """The common skin of the files."""
+    facts: dict[str, tuple[Any, str]] = {}  # by field: its value, and the first file that states it
     sensors = {}
     for file, reading in files:
         skin = reading.campaign.skin if skin_id is None else replace(reading.campaign.skin, id=skin_id)
         for name, value in _facts(skin):
-            first, other = said.setdefault(name, (value, file))
+            first, other = facts.setdefault(name, (value, file))
             if not _same(value, first):
                 allowed = f"in {file}; must be {first!r}, as in {other}: files are joined where they are of one skin"
                 raise conflicting(f"skin.{name}", value, allowed)
         sensors.update({sensor.id: sensor for sensor in skin.sensors if sensor.id not in sensors})
-    known = {entry.name: said[entry.name][0] for entry in fields(SkinDescription) if entry.name in said}
-    return SkinDescription(**known, sensors=tuple(sensors.values()))
+    declared = {
+        model_field.name: facts[model_field.name][0]
+        for model_field in fields(SkinDescription)
+        if model_field.name in facts
+    }
+    return SkinDescription(**declared, sensors=tuple(sensors.values()))
 
 
 def _facts(skin: SkinDescription) -> Iterator[tuple[str, Any]]:
-    """Each field that is known, and each sensor's place, under the name that an error may give it."""
-    for entry in fields(skin):
-        value = getattr(skin, entry.name)
-        if entry.name != "sensors" and value is not None:
-            yield entry.name, value
+    """Each stated field, and each sensor's position, by its name in errors."""
+    for model_field in fields(skin):
+        value = getattr(skin, model_field.name)
+        if model_field.name != "sensors" and value is not None:
+            yield model_field.name, value
     for sensor in skin.sensors:
         yield f"sensors[{sensor.id}].x_mm", sensor.x_mm
         yield f"sensors[{sensor.id}].y_mm", sensor.y_mm
@@ -262,19 +265,19 @@ def _same(value: Any, other: Any) -> bool:
 
 
 def _names(files: Files) -> list[dict[str, str]]:
-    """Of each file, what its recordings are called in the campaign, by their ids in the file."""
+    """For each file, the ids of its recordings in the campaign by their ids in the file."""
     ids = [_ids(reading) for _, reading in files]
-    uses = Counter(name for each in ids for name in each)
-    unique = {name for name in uses if uses[name] == 1 and not name.startswith(_PLACE)}
+    uses = Counter(name for file_ids in ids for name in file_ids)
+    unique = {name for name in uses if uses[name] == 1 and not name.startswith(_INDEX_LABEL)}
     taken = set(unique)
     alike: Counter[str] = Counter()
     names = []
-    for (file, _), each in zip(files, ids, strict=True):
+    for (file, _), file_ids in zip(files, ids, strict=True):
         stem = "".join(letter for letter in PurePath(file).stem if letter.isprintable())
         alike[stem] += 1
         label = stem if alike[stem] == 1 else f"{stem} ({alike[stem]})"
-        new = {name: name for name in each if name in unique}
-        for name in each:
+        new = {name: name for name in file_ids if name in unique}
+        for name in file_ids:
             if name not in unique:
                 new[name] = _free(label, "" if name == stem else name, taken)
                 taken.add(new[name])
@@ -283,13 +286,13 @@ def _names(files: Files) -> list[dict[str, str]]:
 
 
 def _ids(reading: Reading) -> list[str]:
-    """Of good and of refused recordings, each once."""
+    """The distinct ids of valid and rejected recordings."""
     good = [recording.id for recording in reading.campaign.recordings]
     return list(dict.fromkeys([*good, *(problem.recording for problem in reading.problems)]))
 
 
 def _free(label: str, name: str, taken: set[str]) -> str:
-    """An id that no recording has: the file's label and the id, and where that is not enough a number."""
+    """An unused id: the file's label and the id, with a number if needed."""
     named = f" {name}" if name else ""
     ends = (named if number == 1 else f"{named} ({number})" for number in itertools.count(1))
     all_free = ((label[: max(0, LONGEST_NAME - len(end))] + end)[-LONGEST_NAME:].strip() for end in ends)
@@ -297,7 +300,7 @@ def _free(label: str, name: str, taken: set[str]) -> str:
 
 
 def _warnings(files: Files) -> Iterator[str]:
-    """Each warning once, with the files that it is about."""
+    """Each distinct warning, with the files that it is about."""
     about: dict[str, list[str]] = {}
     for file, reading in files:
         for warning in reading.warnings:
@@ -309,9 +312,9 @@ def _warnings(files: Files) -> Iterator[str]:
 def _renamed(files: Files, names: Sequence[dict[str, str]]) -> Iterator[str]:
     changed = [
         (file, old, new)
-        for (file, _), each in zip(files, names, strict=True)
-        for old, new in each.items()
-        if old != new and not old.startswith(_PLACE)
+        for (file, _), new_ids in zip(files, names, strict=True)
+        for old, new in new_ids.items()
+        if old != new and not old.startswith(_INDEX_LABEL)
     ]
     if changed:
         file, old, new = changed[0]
@@ -320,18 +323,18 @@ def _renamed(files: Files, names: Sequence[dict[str, str]]) -> Iterator[str]:
 
 
 def _once(recordings: Sequence[Recording]) -> tuple[list[Recording], dict[str, str]]:
-    """Without those that are identical to an earlier one; of these each one's id, and the earlier one's."""
+    """The distinct recordings, and for each repeat its id with the id of the earlier recording."""
     first: dict[str, Recording] = {}
-    once = []
+    distinct = []
     repeats = {}
     for recording in recordings:
-        known = digest(recording)
-        earlier = recording if known is None else first.setdefault(known, recording)
+        key = digest(recording)
+        earlier = recording if key is None else first.setdefault(key, recording)
         if earlier is recording:
-            once.append(recording)
+            distinct.append(recording)
         else:
             repeats[recording.id] = earlier.id
-    return once, repeats
+    return distinct, repeats
 
 
 def _repeated(repeats: Mapping[str, str]) -> Iterator[str]:

@@ -1,6 +1,4 @@
-"""Which channel of a file a field's values are in, and what turns them into the field (`channels` of `rig/1`).
-
-The rig description (`rig/1`): what a lab's instrument files do not say, written once by the user as YAML or JSON.
+"""The rig description (`rig/1`): what a lab's instrument files do not state, written once by the user as YAML or JSON.
 
     schema: rig/1
     kind: indentation
@@ -10,13 +8,12 @@ The rig description (`rig/1`): what a lab's instrument files do not say, written
       displacement_mm: {channel: Z_Position(mm), sign: -1}
       force_n: {channel: Corrected_Force(N), sign: -1}
 
-`skin` and `recording` hold campaign fields that are the same for all files; `{property: ...}` takes one from what the
-file, or the block, says about itself. `channels` says for each campaign field which channel holds it, `curves` how
-several curves in one file are told apart, `estimator` how FRFs are estimated from time series (H1, H2 or Hv).
-`derived` makes channels of others by formulas (`depth: Piezo - Deflection`), `trim` says which samples of each curve
-are used.
+`skin` and `recording` hold campaign fields common to all files; `{property: ...}` takes one from the properties that
+the file or the block states. `channels` maps each campaign field to a channel and its conversion, `curves` says how the
+curves of a file are separated, `estimator` how FRFs are estimated from time series (H1, H2 or Hv), `derived` defines
+channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each curve.
 
-Values that a file states about itself, and units, in a campaign field's own.
+Also here: the values of properties, converted to the unit of their campaign field.
 """
 
 import dataclasses
@@ -50,7 +47,7 @@ from underskin.recordings.validation import mapping, named, shown
 from underskin.several_errors import SeveralInvalid, all_of, noting
 from underskin.units import LAB
 
-_WHOLE = 100.0  # %
+_FULL_PERCENT = 100.0  # %
 
 
 @dataclass(frozen=True)
@@ -60,7 +57,7 @@ class Property:
     property: field.Name
 
 
-AUTOMATIC: Literal["auto"] = "auto"  # a sign that is told from how a curve goes as it is pressed
+AUTOMATIC: Literal["auto"] = "auto"  # a sign determined from the curve itself
 Sign = Literal[1, -1, "auto"]
 
 
@@ -74,19 +71,19 @@ def _sign(name: str, value: Any, units_checked: bool) -> Sign:
 
 def _percent(name: str, value: Any, units_checked: bool) -> float:
     result = field.positive(name, value, units_checked)
-    if result > _WHOLE:
+    if result > _FULL_PERCENT:
         raise out_of_range(name, result, "must be a part of the curve, greater than 0 and up to 100 (%)")
     return result
 
 
 @dataclass(frozen=True)
 class SignalMapping:
-    """A channel and what its numbers mean.
+    """A channel and the conversion of its values.
 
-    `channel` is the name in the file. `unit` is its true unit, which the file's own label must not contradict;
-    `labelled` repeats a label that is known to be wrong, and no other is accepted. `sign` -1 turns the values round,
-    `auto` does where they fall as a curve is pressed. `sensitivity` leads from a signal to a quantity: in signal over
-    quantity (mV/N) it divides the signal, in quantity over signal (nm/V) it multiplies it.
+    `channel` is the name in the file. `unit` is its true unit, which the file's label must not contradict; `labelled`
+    repeats a label that is wrong, and no other is accepted. `sign` -1 reverses the values, `auto` does so where they
+    fall during loading. `sensitivity` converts a signal to a quantity: in signal over quantity (mV/N) it divides the
+    signal, in quantity over signal (nm/V) it multiplies it.
     """
 
     channel: field.Name
@@ -109,12 +106,12 @@ def _spring_constant(name: str, value: Any, units_checked: bool) -> float | Prop
 
 @dataclass(frozen=True)
 class ChannelMapping(SignalMapping):
-    """Where a field's values are.
+    """The source of a field's values.
 
-    Of `displacement_mm`: `stiffness_n_per_mm`, over which force is the instrument's own give; or `deflection`, the
-    channel that has it. Either is subtracted. Of `force_n`: `spring_constant_n_per_m`, by which a channel that is a
-    deflection is multiplied, or the property of the file that states it. `tare_percent` is the part of each curve, from
-    its start, over which the mean of the field becomes 0.
+    For `displacement_mm`: `stiffness_n_per_mm` of the instrument (the deflection is force over it), or the channel
+    `deflection`; either deflection is subtracted. For `force_n`: `spring_constant_n_per_m`, by which a deflection
+    channel is multiplied, or the property of the file that states it. `tare_percent` is the initial part of each curve
+    over which the mean of the field is set to 0.
     """
 
     stiffness_n_per_mm: field.Positive | None = None
@@ -132,23 +129,23 @@ SCHEMA = "rig/1"
 LARGEST_BYTES = 64_000
 _READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
-_MOST_UNKNOWN = 20  # fields of one object that are told
+_MOST_UNKNOWN = 20  # unknown fields of one object that are listed
 _TARED = ("force_n", "charge_pc", "displacement_mm")
 _OF_CURVES = ("displacement_mm", "force_n")
-WHOLE_CURVES = ("file", "groups")  # what a curve may be, but for what a channel tells apart
+CURVE_EXTENTS = ("file", "groups")  # what may make one curve, besides values of a channel
 _FIELDS = (
     *("schema", "name", "kind", "skin", "recording", "derived", "channels", "curves", "trim", "estimator"),
     "units_checked",
 )
 _Model = TypeVar("_Model")
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
-MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_deg"  # channels that stand for both parts, together
+MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_deg"  # channels that together give both parts
 
 
 @dataclass(frozen=True)
 class CurveChannel:
-    """A channel that tells the curves of a file apart: each value of `channel` is one, or each new rise of `segments`,
-    which counts the segments of a curve (approach 0, hold 1, way back 2)."""
+    """A channel that separates the curves of a file: each value of `channel` is one curve, or each restart of
+    `segments`, which counts the segments of a curve (approach 0, hold 1, withdrawal 2)."""
 
     channel: field.Name | None = None
     segments: field.Name | None = None
@@ -178,9 +175,9 @@ class Trim:
 
 @dataclass(frozen=True)
 class RigDescription:
-    """A rig: the kind of its recordings, fields common to them, which channel is what, and what a curve is in a file:
-    `"file"`, `"groups"`, the channel that tells curves apart, or None (each part is one). `derived` holds formulas by
-    the names of the channels that they make, in their order. `document` is as given."""
+    """A rig: the kind of its recordings, the fields common to them, the mapping of channels, and what makes one curve:
+    `"file"`, `"groups"`, a channel that separates curves, or None (each block is one). `derived` holds formulas by the
+    names of the channels that they define, in their order. `document` is as given."""
 
     kind: str
     skin: Mapping[str, Any]
@@ -194,15 +191,15 @@ class RigDescription:
     trim: Trim | None = None
 
     def with_recording(self, values: Mapping[str, Any]) -> "RigDescription":
-        """The same for a file of which some fields of the recordings are known; `document` stays as given."""
+        """The rig description with some fields of the recordings set for one file; `document` is unchanged."""
         return dataclasses.replace(self, recording={**self.recording, **values})
 
 
 def parse(data: bytes, file: str) -> RigDescription:
     """The rig description in a YAML or JSON file.
 
-    YAML is parsed in a process of its own, under the limits of reading a file. Raises FileError where the text is
-    neither, or too long, SeveralInvalid with all fields that cannot be used.
+    YAML is parsed in a separate process, under the limits of reading a file. Raises FileError where the text is neither
+    or too long, SeveralInvalid with all invalid fields.
     """
     if len(data) > LARGEST_BYTES:
         raise FileError(file, "", f"has {len(data)} bytes; a rig description may have up to {LARGEST_BYTES}")
@@ -215,18 +212,18 @@ def parse(data: bytes, file: str) -> RigDescription:
 
 
 def from_dict(document: Any) -> RigDescription:
-    """The rig description of a document; raises SeveralInvalid with all fields that cannot be used."""
+    """The rig description of a document; raises SeveralInvalid with all invalid fields."""
     document = field.of_schema("rig description", document, SCHEMA, _FIELDS)
     kind, get = document.get("kind", "frf"), document.get
     if not isinstance(kind, str) or kind not in KINDS:
         raise not_one_of("kind", shown(kind), KINDS)
-    of_skin = {entry.name for entry in fields(SkinDescription)}
-    of_recording = {entry.name for entry in fields(KINDS[kind])} - {"kind", "estimator"}
+    of_skin = {model_field.name for model_field in fields(SkinDescription)}
+    of_recording = {model_field.name for model_field in fields(KINDS[kind])} - {"kind", "estimator"}
     readings: dict[str, Callable[[], Any]] = {
         "name": lambda: field.name("name", get("name", SCHEMA), False),
-        "skin": lambda: _known("skin", get("skin"), of_skin),
-        "recording": lambda: _recording(_known("recording", get("recording", {}), of_recording)),
-        "channels": lambda: _channels(_known("channels", get("channels"), channel_fields(kind))),
+        "skin": lambda: _require_known_fields("skin", get("skin"), of_skin),
+        "recording": lambda: _recording(_require_known_fields("recording", get("recording", {}), of_recording)),
+        "channels": lambda: _channels(_require_known_fields("channels", get("channels"), channel_fields(kind))),
         "units_checked": lambda: field.flag("units_checked", get("units_checked", False), False),
         "curves": lambda: _curves(get("curves")),
         "estimator": lambda: _estimator(get("estimator"), get("channels")),
@@ -236,29 +233,29 @@ def from_dict(document: Any) -> RigDescription:
     values = all_of(readings)
     del values["name"]  # that of the document
     rig = RigDescription(kind=kind, document=document, **values)
-    all_of({name: partial(_require_sign_to_be_told, rig, name) for name in rig.channels})
+    all_of({name: partial(_check_automatic_sign, rig, name) for name in rig.channels})
     return rig
 
 
 def channel_fields(kind: str) -> set[str]:
-    """The fields of a kind that channels may hold; `time_s` of an frf stands for its sample rate."""
-    columns = {entry.name for entry in fields(KINDS[kind])} & set(COLUMNS)
+    """The fields of a kind that channels may hold; `time_s` of an frf defines its sample rate."""
+    columns = {model_field.name for model_field in fields(KINDS[kind])} & set(COLUMNS)
     return columns | {COMPLEX_FRF, MAGNITUDE, PHASE, "time_s"} if kind == "frf" else columns
 
 
 def _built(model: type[_Model], prefix: str, value: Any) -> _Model:
-    """A model of an object; raises SeveralInvalid with all its fields that cannot be used."""
+    """A model of an object; raises SeveralInvalid with all its invalid fields."""
     values, refused = field.check_fields(model, mapping(prefix, value), units_checked=False)
     if refused:
         raise SeveralInvalid([error.at(f"{prefix}.{error.field}") for error in refused])
     return model(**values)
 
 
-def _known(prefix: str, document: Any, known: set[str]) -> Mapping[str, Any]:
-    unknown = [name for name in mapping(prefix, document) if name not in known][:_MOST_UNKNOWN]
+def _require_known_fields(prefix: str, document: Any, field_names: set[str]) -> Mapping[str, Any]:
+    unknown = [name for name in mapping(prefix, document) if name not in field_names][:_MOST_UNKNOWN]
     if unknown:
-        told = [not_one_of(f"{prefix}.{named(name)}", shown(document[name]), sorted(known)) for name in unknown]
-        raise SeveralInvalid(told)
+        errors = [not_one_of(f"{prefix}.{named(name)}", shown(document[name]), sorted(field_names)) for name in unknown]
+        raise SeveralInvalid(errors)
     return mapping(prefix, document)
 
 
@@ -272,10 +269,10 @@ def _recording(given: Mapping[str, Any]) -> Mapping[str, Any | Property]:
 
 
 def _curves(document: Any) -> str | CurveChannel | None:
-    if document is None or document in WHOLE_CURVES:
+    if document is None or document in CURVE_EXTENTS:
         return document
     if not isinstance(document, Mapping):
-        raise not_one_of("curves", shown(document), (*WHOLE_CURVES, "{channel: NAME}", "{segments: NAME}"))
+        raise not_one_of("curves", shown(document), (*CURVE_EXTENTS, "{channel: NAME}", "{segments: NAME}"))
     curves = _built(CurveChannel, "curves", document)
     if (curves.channel is None) == (curves.segments is None):
         raise conflicting("curves", shown(list(document)), "must name either a channel or segments")
@@ -314,44 +311,45 @@ def _estimator(value: Any, channels: Any) -> Estimator | None:
 def _channels(given: Mapping[str, Any]) -> dict[str, ChannelMapping]:
     if not given:
         raise too_few("channels", "none", "must name at least one channel")
-    wrong: list[InvalidInput] = []
-    for one, other in ((MAGNITUDE, PHASE), (PHASE, MAGNITUDE)):
-        if one in given and other not in given:
-            wrong.append(required(f"channels.{other}", Requirement("required beside ", Mention(one))))
+    errors: list[InvalidInput] = []
+    for part, counterpart in ((MAGNITUDE, PHASE), (PHASE, MAGNITUDE)):
+        if part in given and counterpart not in given:
+            errors.append(required(f"channels.{counterpart}", Requirement("required beside ", Mention(part))))
     channels = {}
-    with noting(wrong):
+    with noting(errors):
         channels = all_of({name: partial(_channel, name, value, given.keys()) for name, value in given.items()})
-    if wrong:
-        raise SeveralInvalid(wrong)
+    if errors:
+        raise SeveralInvalid(errors)
     return channels
 
 
 def _channel(name: str, value: Any, fields_given: Collection[str]) -> ChannelMapping:
-    entry = _built(ChannelMapping, f"channels.{name}", value)
-    _require_whole(f"channels.{name}", entry)
-    if entry.deflection is not None:
-        _require_whole(f"channels.{name}.deflection", entry.deflection)
-    _require_of_its_field(name, entry, fields_given)
-    return entry
+    channel_mapping = _built(ChannelMapping, f"channels.{name}", value)
+    _require_complete(f"channels.{name}", channel_mapping)
+    if channel_mapping.deflection is not None:
+        _require_complete(f"channels.{name}.deflection", channel_mapping.deflection)
+    _require_fitting_field(name, channel_mapping, fields_given)
+    return channel_mapping
 
 
-def _require_sign_to_be_told(rig: RigDescription, name: str) -> None:
-    """Refuses an automatic sign where curves cannot tell it, or where turning the whole would be wrong."""
-    entry = rig.channels[name]
-    if AUTOMATIC not in [signal.sign for signal in entry.signals]:
+def _check_automatic_sign(rig: RigDescription, name: str) -> None:
+    """Reject an automatic sign where curves cannot determine it, or where reversing the whole channel would be
+    wrong."""
+    channel_mapping = rig.channels[name]
+    if AUTOMATIC not in [signal.sign for signal in channel_mapping.signals]:
         return
     place = f"channels.{name}.sign"
-    if name not in _OF_CURVES or not all(one in rig.channels for one in _OF_CURVES):
+    if name not in _OF_CURVES or not all(column in rig.channels for column in _OF_CURVES):
         both = Requirement(Mention(_OF_CURVES[0]), " and ", Mention(_OF_CURVES[1]))
         raise conflicting(place, AUTOMATIC, Requirement("is told from curves, which need ", both))
-    formula = rig.derived.get(entry.channel)
+    formula = rig.derived.get(channel_mapping.channel)
     if name == "displacement_mm" and formula is not None and formula.is_sum:
         turned = f"cannot be told of {formula.text}, whose terms have signs of their own: say them in the formula"
         raise conflicting(place, AUTOMATIC, turned)
 
 
-def _require_whole(place: str, signal: SignalMapping) -> None:
-    """Refuses half of what belongs together."""
+def _require_complete(place: str, signal: SignalMapping) -> None:
+    """Reject a sensitivity without its unit, a unit without its sensitivity, or `labelled` without `unit`."""
     if (signal.sensitivity is None) != (signal.sensitivity_unit is None):
         belong = Requirement("needs a ", Mention("sensitivity_unit"), ", and it one")
         raise conflicting(f"{place}.sensitivity", signal.sensitivity, belong)
@@ -359,19 +357,19 @@ def _require_whole(place: str, signal: SignalMapping) -> None:
         raise required(f"{place}.unit", "required where labelled says that the label is wrong")
 
 
-def _require_of_its_field(name: str, entry: ChannelMapping, fields_given: Collection[str]) -> None:
-    """Refuses on one field what is for another."""
-    stiffness, spring = entry.stiffness_n_per_mm, entry.spring_constant_n_per_m
-    if entry.tare_percent is not None and name not in _TARED:
-        known = Requirement(
+def _require_fitting_field(name: str, channel_mapping: ChannelMapping, fields_given: Collection[str]) -> None:
+    """Reject conversions on fields that they do not apply to."""
+    stiffness, spring = channel_mapping.stiffness_n_per_mm, channel_mapping.spring_constant_n_per_m
+    if channel_mapping.tare_percent is not None and name not in _TARED:
+        fields_with_tare = Requirement(
             "is for ", Mention("force_n"), ", ", Mention("charge_pc"), " and ", Mention("displacement_mm")
         )
-        raise conflicting(f"channels.{name}.tare_percent", entry.tare_percent, known)
+        raise conflicting(f"channels.{name}.tare_percent", channel_mapping.tare_percent, fields_with_tare)
     if stiffness is not None and (name != "displacement_mm" or "force_n" not in fields_given):
         raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, _is_for("displacement_mm"))
-    if entry.deflection is not None and name != "displacement_mm":
-        raise conflicting(f"channels.{name}.deflection", entry.deflection.channel, _is_for("displacement_mm"))
-    if entry.deflection is not None and stiffness is not None:
+    if channel_mapping.deflection is not None and name != "displacement_mm":
+        raise conflicting(f"channels.{name}.deflection", channel_mapping.deflection.channel, _is_for("displacement_mm"))
+    if channel_mapping.deflection is not None and stiffness is not None:
         both = "must not stand beside a deflection, which is subtracted already"
         raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, both)
     if spring is not None and name != "force_n":
@@ -389,10 +387,10 @@ _STIFFNESS = "force/length"
 
 
 def common_value(name: str, value: Any | Property, stated: Stated, file: str) -> Any:
-    """A field that the rig says, or that the file says under the rig's name for it, in the field's unit."""
+    """The value of a field from the rig description, or from the property that it names, in the field's unit."""
     if not isinstance(value, Property):
         return value
-    given = _said(value, stated, file)
+    given = _property_value(value, stated, file)
     if name == "recorded_at":
         return _in_zone(given)
     number = _number(given)
@@ -405,8 +403,8 @@ def common_value(name: str, value: Any | Property, stated: Stated, file: str) ->
 
 
 def _in_zone(given: str | float) -> str | float:
-    """A time that an instrument wrote, in the lab's zone where it states none; what is no time as it is, to be
-    refused."""
+    """A time that an instrument wrote, in the lab's zone where it states none; an invalid time unchanged, to be
+    rejected later."""
     try:
         return with_zone(str(given), time_zone())
     except ValueError:
@@ -414,37 +412,37 @@ def _in_zone(given: str | float) -> str | float:
 
 
 def spring_constant(value: float | Property, stated: Stated, file: str) -> float:
-    """A spring constant [N/m] that the rig says, or that the file says, in N/m where no other unit is in its name."""
+    """A spring constant [N/m] from the rig description or a property, in N/m where its name holds no other unit."""
     if not isinstance(value, Property):
         return value
-    place, given = f"property {value.property!r}", _said(value, stated, file)
+    place, given = f"property {value.property!r}", _property_value(value, stated, file)
     number = _number(given)
     if number is None or not 0 < number < float("inf"):
         raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a spring constant")
     label = labelled_unit(value.property)
-    known = unit(label or "N/m")
-    if known is None or known.dimension != _STIFFNESS:
+    constant_unit = unit(label or "N/m")
+    if constant_unit is None or constant_unit.dimension != _STIFFNESS:
         raise FileError(file, place, f"its unit {label!r} is not one of {_STIFFNESS}, such as N/m")
-    return number * known.to_si
+    return number * constant_unit.to_si
 
 
 def _number(given: str | float) -> float | None:
-    """As a file writes it, with a point or a comma; None where a comma may part thousands."""
+    """A number as written, with a decimal point or comma; None where a comma may separate thousands."""
     return text.number(given, text.decimal_mark(lambda _: [[given]], "\t")) if isinstance(given, str) else given
 
 
-def _said(value: Property, stated: Stated, file: str) -> str | float:
+def _property_value(value: Property, stated: Stated, file: str) -> str | float:
     if value.property not in stated:
-        known = ", ".join(list(stated)[:20])
-        raise FileError(file, f"property {value.property!r}", f"is not in the file, which states {known}")
+        stated_names = ", ".join(list(stated)[:20])
+        raise FileError(file, f"property {value.property!r}", f"is not in the file, which states {stated_names}")
     return stated[value.property]
 
 
 def factor(label: str, field: str, file: str, place: str, hint: str = "") -> float:
-    """From a unit to the field's; `hint` goes into the error."""
-    known, wanted = unit(label), field_unit(field)
-    if known is None or known.dimension != wanted.dimension:
-        what = "is not known here" if known is None else f"is one of {known.dimension}"
-        needs = f" needs one of {wanted.dimension}, such as {LAB[field].unit}{hint}"
+    """The conversion factor from a unit to the field's; `hint` is appended to the error."""
+    label_unit, needed_unit = unit(label), field_unit(field)
+    if label_unit is None or label_unit.dimension != needed_unit.dimension:
+        what = "is not known here" if label_unit is None else f"is one of {label_unit.dimension}"
+        needs = f" needs one of {needed_unit.dimension}, such as {LAB[field].unit}{hint}"
         raise FileError(file, place, Requirement(f"its unit {label!r} {what}; ", Mention(field), needs))
-    return known.to_si / LAB[field].to_si
+    return label_unit.to_si / LAB[field].to_si

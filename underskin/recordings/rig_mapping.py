@@ -1,13 +1,8 @@
-"""Values of a campaign's columns in sentences, in the units in which they read well.
+"""From an instrument's channels to a campaign document, by a rig description.
 
-The sample rate that a column of times tells. The part of a curve over which its force is taken for 0: whether it is one
-level, as in the air. The fields of one recording, out of the channels of one block, as a rig description has them.
-Channels that a file says were started at different times, brought to the samples that they have in common.
-
-The curves of a file, where a rig description says what one is: all of the file, a group of rows, or what a channel
-tells apart.
-
-From an instrument's channels to a campaign, by a rig description.
+Channels that were started at different times are cut to their common samples (`aligned`); the blocks of a file are
+split into curves (`curve_parts`); `MappedBlock` converts the channels of one block to the fields of one recording, in
+the fields' units, and says in words what it used; `apply` does all of it for a file.
 """
 
 import math
@@ -65,7 +60,7 @@ def readable(field: str, *values: float) -> str:
 
 
 def range_of(field: str, column: Floats) -> str:
-    """The lowest and the highest of the finite values of a column that has any."""
+    """The range of the finite values of a column with at least one."""
     finite = column[np.isfinite(column)]
     return readable(field, float(finite.min()), float(finite.max()))
 
@@ -74,28 +69,28 @@ _JITTER = 0.01  # of a sample: more is not evenly sampled
 
 
 def mean_step(time: Floats) -> float:
-    """From one sample to the next, on average, in the unit of the times."""
+    """The mean step between samples, in the unit of `time`."""
     with np.errstate(all="ignore"):
         return float((time[-1] - time[0]) / max(len(time) - 1, 1))
 
 
 def even_rate(time: Floats) -> float | None:
-    """Samples in a unit of the times; None where they are not evenly spaced and rising."""
+    """Samples per unit of `time`; None where it is not evenly spaced and rising."""
     step = mean_step(time)
     with np.errstate(all="ignore"):
         jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
     return 1 / step if step > 0 and jitter <= _JITTER * step else None
 
 
-_LEAST_TARED = 16  # samples of which a level and its noise are told
-_NOISES = 8.0  # standard deviations of a sample's noise: more is a rise
-_LEAST_RISE = 3e-3  # of the range of the whole curve: less does not matter
+_LEAST_TARED = 16  # samples needed for a level and its noise
+_NOISES = 8.0  # least rise, in standard deviations of a sample's noise
+_LEAST_RISE = 3e-3  # least rise, of the range of the whole curve
 
 
 @dataclass(frozen=True)
 class Rise:
-    """Where the samples leave their first `level`: from the sample `start` on, counted from 0, by `height` at the
-    tared part's end, both in the column's unit."""
+    """A departure of the tared samples from their initial `level`: from sample `start` (from 0) on, by `height` at the
+    end of the tared part, both in the column's unit."""
 
     start: int
     height: float
@@ -103,8 +98,8 @@ class Rise:
 
 
 def rise_of(column: Floats, count: int) -> Rise | None:
-    """How the first `count` samples of a column leave the level of their first quarter; None where they do not, or
-    are too few to tell."""
+    """The rise of the first `count` samples of a column above the level of their first quarter; None without one, or
+    with too few samples."""
     tared = column[:count]
     if count < _LEAST_TARED or not np.isfinite(column).all():
         return None
@@ -122,12 +117,12 @@ _PERCENT = 100.0
 _OF_UNIT = re.compile(r"unit|einheit|scale|skala|format|amplitude", re.IGNORECASE)
 _SAME_RATE = 1e-3  # relative
 _NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
-_LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
+_LEAST_SAMPLES, _STILL = 16, 1e-9  # samples of a measured force; share of its largest value that is rounding
 
 
 class MappedBlock:
-    """The fields of one recording, out of one block, what was `taken` for each, in words, and the `warnings` on them;
-    `stated` is what the file says about itself."""
+    """The fields of one recording from one block; `taken`: the source of each field in words; `warnings` on them.
+    `stated`: the properties of the file."""
 
     def __init__(self, rig: RigDescription, block: Block, stated: Stated, file: str) -> None:
         self.rig = rig
@@ -151,7 +146,7 @@ class MappedBlock:
         columns = {field: self._tared(field, column) for field, column in columns.items()}
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
-        self._require_known_sign(columns)
+        self._require_stated_sign(columns)
         if self.rig.kind == "frf":
             return self._frf(columns)
         rate = self.block.sample_rate_hz
@@ -160,7 +155,7 @@ class MappedBlock:
         return columns
 
     def _with_parts(self, values: Mapping[str, Values]) -> dict[str, Values]:
-        """The columns, real and imaginary part in the place of magnitude and phase."""
+        """The columns with real and imaginary part instead of magnitude and phase."""
         rest = {field: column for field, column in values.items() if field not in (MAGNITUDE, PHASE)}
         if MAGNITUDE not in values:
             return rest
@@ -174,14 +169,15 @@ class MappedBlock:
         return {**rest, "frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
 
     def _refuse_stated_decibels(self) -> None:
-        """Refuses a magnitude where a line of the file, such as `Y-axis unit: dB`, says that its unit is a decibel."""
+        """Reject a magnitude where a property of the file, such as `Y-axis unit: dB`, states decibels."""
         for name, value in self.stated.items():
-            known = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
-            if known is not None and known.dimension == DECIBEL:
+            stated_unit = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
+            if stated_unit is not None and stated_unit.dimension == DECIBEL:
                 raise self._error(f"property {name!r}", f"is {value!r}: {_NO_DECIBELS}")
 
     def spring(self) -> dict[str, float]:
-        """The stiffness of the spring whose deflection was subtracted: a contact that sticks comes off by it."""
+        """The stiffness of the spring whose deflection was subtracted: it determines the pull-off of adhesive
+        contacts."""
         force = self.rig.channels.get("force_n", ChannelMapping(""))
         displacement = self.rig.channels.get("displacement_mm", ChannelMapping(""))
         spring = force.spring_constant_n_per_m
@@ -207,7 +203,7 @@ class MappedBlock:
         return values - deflection
 
     def _signal(self, field: str, mapping: SignalMapping) -> tuple[Values, str]:
-        """A channel's values in the unit of a field, and in words what was taken."""
+        """A channel's values in the unit of a field, and their source in words."""
         channel = self.block.headed(mapping.channel)
         assert channel is not None
         place = f"channel {channel.name!r}"
@@ -226,8 +222,8 @@ class MappedBlock:
             return channel.values * sign * scale, f"{channel.name!r} in {label}{through}{turned}"
 
     def _automatic_sign(self, mapping: SignalMapping) -> int:
-        """-1 where a channel falls as the curve is pressed: told from the channels as they came, so that a travel less
-        a deflection has both right."""
+        """-1 where a channel falls during loading: determined from the raw channels, so that travel and deflection are
+        both right before their difference is taken."""
         travel = self.block.headed(self.rig.channels["displacement_mm"].channel)
         is_travel = mapping is self.rig.channels["displacement_mm"]
         force = self.block.headed((self.rig.channels["force_n"] if is_travel else mapping).channel)
@@ -240,7 +236,7 @@ class MappedBlock:
         return -1
 
     def _tared(self, field: str, column: Floats) -> Floats:
-        """A column less its mean over the part of the curve that the rig description says."""
+        """A column less its mean over the initial part of the curve, `tare_percent` of the rig description."""
         percent = self.rig.channels[field].tare_percent if field in self.rig.channels else None
         if percent is None:
             return column
@@ -262,7 +258,7 @@ class MappedBlock:
         return column - zero
 
     def _true_unit(self, channel: Channel, mapping: SignalMapping, dimension: str) -> str:
-        """The rig's unit, else the file's label, which must not contradict it unless the rig says that it is wrong."""
+        """The rig's unit, else the file's label. They must agree unless the rig declares the label wrong."""
         label, place = channel.label, f"channel {channel.name!r}"
         if mapping.labelled is not None:
             if mapping.labelled != label:
@@ -286,35 +282,35 @@ class MappedBlock:
 
     def _degrees(self, label: str, place: str) -> float:
         """From the unit of a phase to degrees."""
-        known = unit(label)
-        if known is None or known.dimension != "angle":
+        label_unit = unit(label)
+        if label_unit is None or label_unit.dimension != "angle":
             raise self._error(place, f"its unit {label!r} is none of an angle: a phase is in deg or rad")
-        return math.degrees(known.to_si)
+        return math.degrees(label_unit.to_si)
 
     def _scale(self, field: str, label: str, mapping: SignalMapping, place: str) -> float:
         """From the channel's unit to the field's, through the sensitivity where there is one."""
-        known = unit(label)
-        if known is not None and known.dimension == DECIBEL:
+        label_unit = unit(label)
+        if label_unit is not None and label_unit.dimension == DECIBEL:
             raise self._error(place, _NO_DECIBELS)
         if mapping.sensitivity is None or mapping.sensitivity_unit is None:
             return factor(label, field, self.file, place, "; a signal in volts needs its sensitivity")
         above, _, below = mapping.sensitivity_unit.rpartition("/")
-        given = unit(label)
+        channel_unit = unit(label)
         for signal, quantity, sensitivity in (
             (above, below, 1 / mapping.sensitivity),
             (below, above, mapping.sensitivity),  # nm/V, as those of cantilevers are stated
         ):
             divided, measured = unit(signal), unit(quantity)
-            if given is None or divided is None:
+            if channel_unit is None or divided is None:
                 continue
-            if given.dimension == divided.dimension:
-                return given.to_si / divided.to_si * sensitivity * factor(quantity, field, self.file, place)
+            if channel_unit.dimension == divided.dimension:
+                return channel_unit.to_si / divided.to_si * sensitivity * factor(quantity, field, self.file, place)
             if measured is not None and ratio_of(label, signal, quantity) == exponents(LAB[field].unit):  # V/N by mV/pC
-                return given.to_si / divided.to_si * measured.to_si * sensitivity / LAB[field].to_si
+                return channel_unit.to_si / divided.to_si * measured.to_si * sensitivity / LAB[field].to_si
         raise self._error(place, f"its unit {label!r} is not of the sensitivity's {mapping.sensitivity_unit!r}")
 
     def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """The columns, their displacement without the instrument's own give, force over its stiffness."""
+        """The columns, the displacement corrected for the instrument's compliance (force over its stiffness)."""
         stiffness = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
         if stiffness is None:
             return dict(columns)
@@ -330,17 +326,17 @@ class MappedBlock:
             if field in LAB and field in self.taken and np.isfinite(column).any():
                 self.taken[field] += f": {range_of(field, column)}"
 
-    def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
-        """Force must rise with displacement, unless the rig says a sign for both."""
+    def _require_stated_sign(self, columns: Mapping[str, Any]) -> None:
+        """Raise FileError where force falls with displacement, unless the rig description states both signs."""
         signs = [self.rig.channels[name].sign for name in ("displacement_mm", "force_n") if name in self.rig.channels]
         if len(signs) < 2 or None not in signs or len(columns["displacement_mm"]) != len(columns["force_n"]):
             return
         with np.errstate(all="ignore"):
-            together = np.mean(_centred(columns["displacement_mm"]) * _centred(columns["force_n"]))
-        if together < 0:
+            covariance = np.mean(_centred(columns["displacement_mm"]) * _centred(columns["force_n"]))
+        if covariance < 0:
             reason = "force falls as the displacement grows, and compression is positive here"
-            signs_said = Mention("sign", "sign: 1, -1 or auto")
-            how = (signs_said, " for ", Mention("displacement_mm"), " and ", Mention("force_n"))
+            sign_field = Mention("sign", "sign: 1, -1 or auto")
+            how = (sign_field, " for ", Mention("displacement_mm"), " and ", Mention("force_n"))
             doubt = ""
             depth = self.rig.channels["displacement_mm"].channel
             formula = self.rig.derived.get(depth)
@@ -352,15 +348,15 @@ class MappedBlock:
             raise self._error("channels", Requirement(f"{reason}: say ", *how, doubt))
 
     def _also_used(self, derived: str) -> str:
-        """In words, each channel of a formula that others use too, and these."""
+        """Hints on channels of a formula that other formulas use as well, in words."""
         rest = {name: formula for name, formula in self.rig.derived.items() if name != derived}
-        told = ""
+        hint = ""
         for name in filter(self.block.headed, self.rig.derived[derived].names):
-            others = [one for one, formula in rest.items() if name in formula.names]
+            others = [other for other, formula in rest.items() if name in formula.names]
             if others:
                 of = " and of ".join(others)
-                told += f"; if it is {name!r} that is reversed, turn it in the formula of {of} too"
-        return told
+                hint += f"; if it is {name!r} that is reversed, turn it in the formula of {of} too"
+        return hint
 
     def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""
@@ -384,13 +380,13 @@ class MappedBlock:
         return {**columns, **self._measured_force(columns)}
 
     def _measured_force(self, columns: Mapping[str, Any]) -> dict[str, float]:
-        """The dynamic force of a time series whose rig description tells none: the amplitude of the sine that shakes as
-        strongly as the recorded force does about its drift."""
+        """The dynamic force of a time series whose rig description states none: √2 times the rms of the recorded force
+        about its linear drift."""
         force = columns.get("force_n", np.zeros(0))
         if "dynamic_force_n" in self.rig.recording or len(force) < _LEAST_SAMPLES or not np.isfinite(force).all():
             return {}
-        place = np.linspace(-1.0, 1.0, len(force))
-        shaken = force - force.mean() - place * (place @ force) / (place @ place)
+        position = np.linspace(-1.0, 1.0, len(force))
+        shaken = force - force.mean() - position * (position @ force) / (position @ position)
         amplitude = float(np.sqrt(2) * shaken.std())
         if amplitude <= _STILL * float(np.abs(force).max()):
             return {}
@@ -416,57 +412,59 @@ _LEAST_COMMON = 2  # samples in common
 
 
 def aligned(contents: Contents, names: Collection[str], file: str) -> Contents:
-    """The contents with the channels of some names cut to their common samples in every block, as the file states their
-    starts; a warning says so.
+    """The contents with the named channels cut to their common samples in every block, by the stated start times; with
+    a warning.
 
-    Raises FileError that names both channels where their rates differ, or their starts do so by parts of a sample.
+    Raises FileError that names both channels where their rates differ, or their starts differ by fractions of a sample.
     """
     blocks, warnings = [], list(contents.warnings)
     for block in contents.blocks:
-        used = {one.name: one for name in names if (one := block.headed(name)) is not None}
+        used = {channel.name: channel for name in names if (channel := block.headed(name)) is not None}
         rate = _common_rate(list(used.values()), file)
         with_rate = block if rate is None else replace(block, sample_rate_hz=rate)
-        if len({one.starts_s for one in used.values()}) < 2:
+        if len({channel.starts_s for channel in used.values()}) < 2:
             blocks.append(with_rate)
             continue
-        cut, told = _cut_to_common(with_rate, used, file)
+        cut, cut_warnings = _cut_to_common(with_rate, used, file)
         blocks.append(cut)
-        warnings += told
+        warnings += cut_warnings
     return replace(contents, blocks=tuple(blocks), warnings=tuple(dict.fromkeys(warnings)))
 
 
 def _common_rate(used: list[Channel], file: str) -> float | None:
-    sampled = {one.sample_rate_hz: one for one in used if one.sample_rate_hz is not None}
+    sampled = {channel.sample_rate_hz: channel for channel in used if channel.sample_rate_hz is not None}
     if len(sampled) > 1:
-        (first, one), (second, other), *_ = sampled.items()
-        reason = f"{one.name!r} has {first:g} samples a second, {other.name!r} {second:g}: they must have one rate"
+        (first, channel), (second, later), *_ = sampled.items()
+        reason = f"{channel.name!r} has {first:g} samples a second, {later.name!r} {second:g}: they must have one rate"
         raise FileError(file, "", reason)
     return next(iter(sampled), None)
 
 
 def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[Block, list[str]]:
-    """The block with the used channels cut, and in words how; as it is where they start within one sample."""
+    """The block with the used channels cut, and a warning; unchanged where they start within one sample."""
     first, last = min(used.values(), key=_starts_s), max(used.values(), key=_starts_s)
-    apart = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
+    start_times = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
     if block.sample_rate_hz is None:
-        raise FileError(file, "", f"{apart}, and no sample rate is stated by which to align them")
-    late = {name: (last.starts_s - one.starts_s) * block.sample_rate_hz for name, one in used.items()}
+        raise FileError(file, "", f"{start_times}, and no sample rate is stated by which to align them")
+    late = {name: (last.starts_s - channel.starts_s) * block.sample_rate_hz for name, channel in used.items()}
     skipped = {name: round(samples) for name, samples in late.items()}
     odd = next((name for name in used if abs(late[name] - skipped[name]) > _OFF_SAMPLE), None)
     if odd is not None:
         reason = f"that is {late[odd]:.4g} samples: they can be aligned by whole samples alone"
-        raise FileError(file, "", f"{apart}: {reason}; resample one of them, or correct the times")
+        raise FileError(file, "", f"{start_times}: {reason}; resample one of them, or correct the times")
     if not any(skipped.values()):
         return block, []
-    count = min(len(one.values) - skipped[name] for name, one in used.items())
+    count = min(len(channel.values) - skipped[name] for name, channel in used.items())
     if count < _LEAST_COMMON:
-        raise FileError(file, "", f"{apart}: they have no samples in common")
+        raise FileError(file, "", f"{start_times}: they have no samples in common")
     channels = tuple(
-        replace(one, values=one.values[skipped[one.name] : skipped[one.name] + count]) if one.name in used else one
-        for one in block.channels
+        replace(channel, values=channel.values[skipped[channel.name] : skipped[channel.name] + count])
+        if channel.name in used
+        else channel
+        for channel in block.channels
     )
-    told = f"{apart}: they were aligned, with {count} samples in common"
-    return replace(block, channels=channels), [told]
+    warning = f"{start_times}: they were aligned, with {count} samples in common"
+    return replace(block, channels=channels), [warning]
 
 
 def _starts_s(channel: Channel) -> float:
@@ -474,7 +472,7 @@ def _starts_s(channel: Channel) -> float:
 
 
 def _time(block: Block, channel: Channel) -> str:
-    """When a channel starts, or how long after the first where the file does not say when that was."""
+    """The start time of a channel, or its delay after the first where the file states no time."""
     if block.recorded_at is None:
         return f"{channel.starts_s:g} s"
     try:
@@ -489,10 +487,10 @@ _LEAST_OF_CURVE = 2  # of a curve
 
 
 def curve_parts(blocks: Sequence[Block], curves: str | CurveChannel | None, file: str) -> list[tuple[Block, str]]:
-    """The curves of the blocks that hold a rig's channels, as `curves` of the rig description has it, each with the
-    name of the block that it was in.
+    """The curves of the blocks that hold a rig's channels, by `curves` of the rig description, each with the name of
+    its block.
 
-    Raises FileError where a channel changes too often to tell curves apart.
+    Raises FileError where a channel changes too often to separate curves.
     """
     if curves == "file":
         return [(_joined(blocks), blocks[0].name)]
@@ -523,30 +521,30 @@ def _parts(block: Block, curves: str | CurveChannel | None, file: str) -> list[B
 
 
 def _cut(block: Block, starts: Sequence[int], names: Sequence[str]) -> Iterator[Block]:
-    """The block from each start to the next; named, or else numbered."""
-    for number, start in enumerate(starts):
-        end = starts[number + 1] if number + 1 < len(starts) else None
-        own = names[number] if names else str(number + 1)
-        name = f"{block.name} {own}".strip() if len(starts) > 1 else block.name
+    """The parts of the block from each start to the next; named, or else numbered."""
+    for index, start in enumerate(starts):
+        end = starts[index + 1] if index + 1 < len(starts) else None
+        suffix = names[index] if names else str(index + 1)
+        name = f"{block.name} {suffix}".strip() if len(starts) > 1 else block.name
         channels = tuple(replace(channel, values=channel.values[start:end]) for channel in block.channels)
         yield Block(name, channels, block.sample_rate_hz, block.recorded_at)
 
 
 def _joined(blocks: Sequence[Block]) -> Block:
-    """One block of all, with the channels that every one has in one unit, in their order."""
+    """All blocks as one, with the channels that every block has in the same unit, in their order."""
     first = blocks[0]
     channels = []
     for channel in first.channels:
-        alike = [block.channel(channel.name) for block in blocks]
-        whole = [one for one in alike if one is not None and one.unit == channel.unit]
-        if len(whole) == len(blocks):
-            values = np.concatenate([one.values for one in whole])
+        namesakes = [block.channel(channel.name) for block in blocks]
+        same_unit = [namesake for namesake in namesakes if namesake is not None and namesake.unit == channel.unit]
+        if len(same_unit) == len(blocks):
+            values = np.concatenate([namesake.values for namesake in same_unit])
             channels.append(replace(channel, values=values))
     return Block(first.name, tuple(channels), first.sample_rate_hz, first.recorded_at)
 
 
 def doubts(contents: Contents, curves: str | CurveChannel | None) -> list[str]:
-    """What the user should know of groups of rows that are read as one curve although nobody said so."""
+    """A warning on groups of rows that are read as one curve although `curves` was not stated."""
     most = max((len(block.group_starts) for block in contents.blocks), default=0)
     if curves is not None or most < 2:
         return []
@@ -556,8 +554,8 @@ def doubts(contents: Contents, curves: str | CurveChannel | None) -> list[str]:
 
 @dataclass(frozen=True)
 class MappedFile:
-    """The campaign document of a file, what the user should know, and of each field of the first recording what was
-    taken for it, in words; under no field how the text was read."""
+    """The campaign document of a file, warnings, and the source of each field of the first recording in words; the
+    empty key of `taken` holds how the text was read."""
 
     document: dict[str, Any]
     warnings: list[str]
@@ -572,7 +570,7 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     in_formulas = [name for formula in rig.derived.values() for name in formula.names]
     contents = aligned(contents, dict.fromkeys([*_channel_names(rig), *in_formulas]), file)
     contents = channel_arithmetic.with_derived(
-        contents, rig.derived, lambda one: _stated(contents, one, one.name), file
+        contents, rig.derived, lambda part: _stated(contents, part, part.name), file
     )
     blocks = _with_channels(rig, contents, file)
     warnings = [*contents.warnings, *doubts(contents, rig.curves)]
@@ -582,18 +580,18 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     recordings = []
     taken: dict[str, str] = {"": contents.layout} if contents.layout else {}
     curves = curve_parts(blocks, rig.curves, file)
-    parts = [(_trimmed(block, rig.trim, file), of) for block, of in curves]
+    parts = [(_trimmed(block, rig.trim, file), block_name) for block, block_name in curves]
     if rig.trim is not None:
         warnings.append(_used(rig.trim, [_samples(block) for block, _ in curves]))
-    for number, (block, of) in enumerate(parts, start=1):
+    for number, (block, block_name) in enumerate(parts, start=1):
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
-        stated = _stated(contents, block, of)
+        stated = _stated(contents, block, block_name)
         common = {name: common_value(name, value, stated, file) for name, value in rig.recording.items()}
-        began = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
+        recorded_at = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
         mapped = MappedBlock(rig, block, stated, file)
         estimated = {} if rig.estimator is None else {"estimator": rig.estimator}
-        own = {"id": label, "kind": rig.kind, **began, **estimated}
-        recordings.append({**own, **mapped.spring(), **common, **mapped.fields()})
+        identity = {"id": label, "kind": rig.kind, **recorded_at, **estimated}
+        recordings.append({**identity, **mapped.spring(), **common, **mapped.fields()})
         warnings += mapped.warnings
         taken |= {name: how for name, how in mapped.taken.items() if name not in taken}
     document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
@@ -604,7 +602,7 @@ def has_channels(rig: RigDescription, contents: Contents) -> bool:
     """Whether a part of a file holds every channel that the rig names, or can derive."""
     try:
         derived = channel_arithmetic.with_derived(
-            contents, rig.derived, lambda one: _stated(contents, one, one.name), ""
+            contents, rig.derived, lambda block: _stated(contents, block, block.name), ""
         )
         return bool(_with_channels(rig, derived, ""))
     except FileError:
@@ -624,7 +622,7 @@ def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[B
 
 
 def _trimmed(block: Block, trim: Trim | None, file: str) -> Block:
-    """The samples that are used; those that a short curve lacks are not missed at its end."""
+    """The block cut to the used samples; a curve may end before the last of them."""
     if trim is None:
         return block
     start = (trim.first_sample or 1) - 1
@@ -636,7 +634,7 @@ def _trimmed(block: Block, trim: Trim | None, file: str) -> Block:
 
 
 def _used(trim: Trim, samples: Sequence[int]) -> str:
-    """Which samples are used of curves that have so many each."""
+    """Which samples are used, in words, of curves with these numbers of samples."""
     last = trim.last_sample
     short = [count for count in samples if last is not None and count < last]
     if not short:
@@ -656,14 +654,14 @@ def _samples(block: Block) -> int:
 
 def _channel_names(rig: RigDescription) -> Sequence[str]:
     """Each once, in the order of the description."""
-    names = [signal.channel for entry in rig.channels.values() for signal in entry.signals]
+    names = [signal.channel for mapping in rig.channels.values() for signal in mapping.signals]
     curves = rig.curves
     by = (curves.channel or curves.segments) if isinstance(curves, CurveChannel) else None
     return list(dict.fromkeys([*names, *([] if by is None else [by])]))
 
 
 def _label(stem: str, part: str) -> str:
-    """The file's name and the part's; the file's is cut where both make more than an id may have."""
+    """The file's name and the part's; the file's is cut where an id would be too long."""
     return f"{stem[: max(0, LONGEST_NAME - 1 - len(part))]} {part}".strip()
 
 
@@ -671,9 +669,11 @@ def _printable(name: str) -> str:
     return "".join(letter for letter in name if letter.isprintable())[:LONGEST_NAME].strip()
 
 
-def _stated(contents: Contents, block: Block, of: str) -> dict[str, str | float]:
-    """What the file says about itself; of the block named `of`, in which this one is, its own properties
-    (`run.preload` is `preload`), and this one's name."""
-    own = f"{of}."
-    about_block = {name.removeprefix(own): value for name, value in contents.properties.items() if name.startswith(own)}
+def _stated(contents: Contents, block: Block, block_name: str) -> dict[str, str | float]:
+    """The properties of the file; those of the block `block_name` that this one is a part of without that prefix
+    (`run.preload` is `preload`), and this block's name."""
+    prefix = f"{block_name}."
+    about_block = {
+        name.removeprefix(prefix): value for name, value in contents.properties.items() if name.startswith(prefix)
+    }
     return {BLOCK_NAME: block.name, **contents.properties, **about_block}

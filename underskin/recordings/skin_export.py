@@ -1,12 +1,12 @@
-"""All that a service keeps of a skin in one HDF5 file, `skin-export/1`.
+"""All stored data of a skin in one HDF5 file, `skin-export/1`.
 
 /                     attributes schema, skin
-/skins, /rigs         JSON text: what is kept of skins and their rigs, a list of objects
+/skins, /rigs         JSON text: the stored skins and their rigs, a list of objects
 /diagnoses, /models   JSON text: diagnoses with their reports, and adopted models; absent in older files
-/changes              JSON text: what was changed since, who did it and why; absent in older files
+/changes              JSON text: the log of changes, with author and reason; absent in older files
 /campaigns/<id>       JSON text `about` (an object) and `recordings` (a list of objects, without arrays); for each
-                      array the values of all recordings one behind another in `arrays/<name>`, how many of them
-                      are whose in `lengths/<name>`, 0 for a recording without it
+                      array the concatenated values of all recordings in `arrays/<name>`, and the number of values of
+                      each recording in `lengths/<name>`, 0 for a recording without it
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,23 +34,24 @@ _EXPANSION = 1000.0  # a column of a simulated campaign may hold one value, and 
 
 @dataclass(frozen=True, eq=False)
 class ExportedCampaign:
-    """What is kept of a campaign, of its recordings, and their arrays."""
+    """The stored data of a campaign, of its recordings, and their arrays."""
 
     about: dict[str, Any]
     recordings: list[dict[str, Any]]
     arrays: list[dict[str, Floats]]
 
     def same_as(self, other: "ExportedCampaign") -> bool:
-        """Whether both say the same, to the last digit."""
+        """Whether both are identical, to the last digit."""
         return (self.about, self.recordings) == (other.about, other.recordings) and all(
-            mine.keys() == others.keys() and all(np.array_equal(mine[name], others[name]) for name in mine)
-            for mine, others in zip(self.arrays, other.arrays, strict=True)
+            own_arrays.keys() == other_arrays.keys()
+            and all(np.array_equal(own_arrays[name], other_arrays[name]) for name in own_arrays)
+            for own_arrays, other_arrays in zip(self.arrays, other.arrays, strict=True)
         )
 
 
 @dataclass(frozen=True)
 class Overview:
-    """The skin, what is kept of it and of those joined to it, and ids of their campaigns."""
+    """The skin, the stored data of it and of those joined to it, and the ids of their campaigns."""
 
     skin: str
     skins: list[dict[str, Any]]
@@ -88,7 +89,7 @@ def _limits() -> ParsingLimits:
 
 
 def is_export(stream: BinaryIO, file: str) -> bool:
-    """Whether a file is an export, of whatever version, by its content; one that cannot be read is none."""
+    """Whether a file is an export of any version, by its content; False for an unreadable file."""
     stream.seek(0)
     if stream.read(len(MAGIC)) != MAGIC:
         return False
@@ -99,7 +100,7 @@ def is_export(stream: BinaryIO, file: str) -> bool:
 
 
 def read_overview(stream: BinaryIO, file: str) -> Overview:
-    """What an export holds, read in a child process; raises FileError where it is none, or damaged."""
+    """The overview of an export, read in a child process; raises FileError where it is none, or damaged."""
     return Overview(**call_apart(f"{__name__}:_overview", stream, file, what=SCHEMA, limits=_limits()))
 
 
@@ -148,9 +149,9 @@ def _campaign(group: Any) -> dict[str, Any]:
     for column in group.get("arrays", ()):
         ends = np.cumsum(group["lengths"][column][()])
         parts = np.split(group["arrays"][column][()].astype(np.float64), ends[:-1])
-        for own, part in zip(arrays, parts, strict=True):
+        for recording_arrays, part in zip(arrays, parts, strict=True):
             if len(part):
-                own[column] = part
+                recording_arrays[column] = part
     return {"about": _text(group, "about"), "recordings": recordings, "arrays": arrays}
 
 

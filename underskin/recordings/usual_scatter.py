@@ -1,6 +1,6 @@
-"""The scatter of a usual rig, as far as it is known before any recording: of gains and of positions.
+"""Priors of the scatter of gains and positions of a usual rig, before any recording.
 
-The mixed model of d33 and the likelihood of a diagnosis take these for their priors.
+The mixed model of d33 and the likelihood of a diagnosis use these.
 """
 
 GAIN_RANGE = (0.01, 0.05)  # relative standard deviation of a recording's gain: a good rig and a poor one

@@ -1,13 +1,8 @@
-"""Values of documents checked, and shown where they are wrong.
+"""Checks of single fields of documents, and values as error messages may show them.
 
-Values and names as an error may show them.
-
-Checks of single campaign fields: each takes the field's name and value and returns what the model keeps.
-
-Every check raises InvalidInput that names the field, the value and what is allowed. A model names the check of each
-field in its annotation, by one of the types at the end.
-
-What else a lab noted of a recording: columns of its own, by names that no field or axis has.
+A check takes the field's name and value and returns the value of the model, or raises InvalidInput that names the
+field, the value and what is allowed. A model names the check of each field in its annotation, by one of the types at
+the end. `further` checks a lab's own columns, whose names must not be those of a field or an axis.
 """
 
 import math
@@ -30,15 +25,15 @@ LONGEST_NAME = 200  # characters
 
 
 class CellText(str):
-    """A cell of a text that is not what its field needs, and its `place`, such as "line 3, column 2"."""
+    """The text of an invalid cell, and its `place`, such as "line 3, column 2"."""
 
     place: str
 
     def __new__(cls, cell: str, place: str) -> Self:
-        """Of a cell at a place."""
-        made = super().__new__(cls, cell)
-        made.place = place
-        return made
+        """The text of `cell` at `place`."""
+        instance = super().__new__(cls, cell)
+        instance.place = place
+        return instance
 
 
 def shown(value: Any) -> Any:
@@ -48,8 +43,8 @@ def shown(value: Any) -> Any:
     if isinstance(value, int | float | np.integer | np.floating):
         return _shown_number(value)
     if isinstance(value, str):
-        short = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
-        return short.encode("utf-8", "replace").decode("utf-8")
+        shortened = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
+        return shortened.encode("utf-8", "replace").decode("utf-8")
     if isinstance(value, list | tuple):
         return f"a list of {len(value)}"
     return f"a value of type {type(value).__name__}"
@@ -82,14 +77,14 @@ COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 def check_fields(
     model: Any, document: Mapping[str, Any], *, units_checked: bool
 ) -> tuple[dict[str, Any], list[InvalidInput]]:
-    """The checked values of a document's fields, by the check that `model` annotates each with, and every refusal.
+    """The checked values of a document's fields, by the annotated check of each in `model`, and all errors.
 
-    `model` is a dataclass; a field that has a default may be left out or null.
+    `model` is a dataclass; a field with a default may be absent or null.
     """
-    known = checks_of(model)
-    refused = _unknown_fields(document, known, f"unknown field; known: {', '.join(known)}")
+    checks = checks_of(model)
+    refused = _unknown_fields(document, checks, f"unknown field; known: {', '.join(checks)}")
     values: dict[str, Any] = {}
-    for name, (field_check, default) in known.items():
+    for name, (field_check, default) in checks.items():
         value = document.get(name)
         try:
             if value is None and default is MISSING:
@@ -100,16 +95,16 @@ def check_fields(
     return values, refused
 
 
-def _unknown_fields(document: Mapping[str, Any], known: Collection[str], allowed: str) -> list[InvalidInput]:
-    unknown = islice((name for name in document if name not in known), _MOST_UNKNOWN)
+def _unknown_fields(document: Mapping[str, Any], field_names: Collection[str], allowed: str) -> list[InvalidInput]:
+    unknown = islice((name for name in document if name not in field_names), _MOST_UNKNOWN)
     code = ErrorCode.UNKNOWN_FIELD
     return [InvalidInput(named(name), shown(document[name]), allowed, code=code) for name in unknown]
 
 
-def of_schema(noun: str, value: Any, schema: str, known: Collection[str]) -> Mapping[str, Any]:
-    """A JSON object that has its `schema` and no unknown field; `noun`: what it is called."""
+def of_schema(noun: str, value: Any, schema: str, field_names: Collection[str]) -> Mapping[str, Any]:
+    """A JSON object of this `schema` without unknown fields; `noun` names it in errors."""
     document = mapping(noun, value)
-    if unknown := _unknown_fields(document, known, f"unknown field of a {noun}"):
+    if unknown := _unknown_fields(document, field_names, f"unknown field of a {noun}"):
         raise unknown[0]
     given = shown(document.get("schema"))
     if given != schema:
@@ -125,7 +120,7 @@ def mapping(field: str, value: Any) -> Mapping[str, Any]:
 
 
 def build(model: type[BuiltModel], prefix: str, document: Any, units_checked: bool) -> BuiltModel:
-    """A model of a document; raises InvalidInput at the first field refused, its name led by `prefix`."""
+    """A model of a document; raises InvalidInput for the first invalid field, its name preceded by `prefix`."""
     values, refused = check_fields(model, mapping(prefix, document), units_checked=units_checked)
     if refused:
         raise refused[0].at(f"{prefix}.{refused[0].field}")
@@ -188,7 +183,7 @@ def not_negative(field: str, value: Any, units_checked: bool) -> float:  # noqa:
 
 
 def declared(field: str, value: Any, units_checked: bool) -> float:
-    """A declared geometry, modulus, preload or d33 in lab units: an unlikely magnitude is refused with a guess."""
+    """A declared geometry, modulus, preload or d33 in lab units; an unlikely magnitude is rejected with a guess."""
     result = number(field, value)
     checked(field, result, units_checked=units_checked)
     return result
@@ -203,7 +198,7 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
 
 
 def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
-    """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
+    """A whole number, 0 to 2⁵³, the range in which floats, and so JSON, are exact."""
     result = number(field, value)
     if result < 0 or not result.is_integer() or int(value) > LARGEST_COUNT:
         raise _wrong_type(field, value, f"must be a whole number, 0 to {LARGEST_COUNT}")
@@ -211,7 +206,7 @@ def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
 
 
 def time_of_day(field: str, value: Any, units_checked: bool) -> str:
-    """Date and time as ISO 8601 writes it, kept as written."""
+    """Date and time in ISO 8601, unchanged."""
     text = name(field, value, units_checked)
     try:
         datetime.fromisoformat(text)
@@ -274,7 +269,7 @@ def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
 
 
 def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
-    """A column of times: none before the one above it."""
+    """A column of times that do not decrease."""
     column = series(field, value, units_checked)
     falls = np.diff(column, prepend=-math.inf) < 0
     _refuse_where(field, column, falls, "must not be before the entry above it", ErrorCode.NOT_INCREASING)
@@ -296,9 +291,9 @@ def _column(field: str, value: Any) -> Floats:
         return value.astype(np.float64)
     if not isinstance(value, list | tuple):
         raise _wrong_type(field, value, "must be a list of numbers")
-    for index, entry in enumerate(value):
-        if type(entry) is not float and type(entry) is not int:
-            raise _wrong_type(field, entry, "must be a number", index)
+    for index, item in enumerate(value):
+        if type(item) is not float and type(item) is not int:
+            raise _wrong_type(field, item, "must be a number", index)
     try:
         return np.array(value, dtype=np.float64)
     except OverflowError:
@@ -347,21 +342,21 @@ BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
 
 
 def further(field: str, value: Any, units_checked: bool) -> dict[str, float | str]:
-    """What else a lab noted, by names of its own: numbers or short words; null where it was not noted."""
+    """A lab's own columns by name: numbers or short words; null values are dropped."""
     document = mapping(field, value)
     noted: dict[str, float | str] = {}
     if len(document) > MOST_CONDITIONS:
         raise errors.out_of_range(field, len(document), f"must be at most {MOST_CONDITIONS} columns")
-    for key, entry in document.items():
+    for key, item in document.items():
         place = f"{field}.{named(key)}"
         if not isinstance(key, str) or not CONDITION.fullmatch(key):
             raise InvalidInput(place, shown(key), "must be a name of letters, digits and underscores")
         if key in BUILT_IN_AXES:
             raise InvalidInput(place, shown(key), "is the name of a field or an axis of its own; choose another")
-        if isinstance(entry, str):
-            noted[key] = name(place, entry, units_checked)
-        elif entry is not None:
-            noted[key] = number(place, entry)
+        if isinstance(item, str):
+            noted[key] = name(place, item, units_checked)
+        elif item is not None:
+            noted[key] = number(place, item)
     return noted
 
 

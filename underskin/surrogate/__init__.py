@@ -1,1 +1,1 @@
-"""What reads the finite-element tables."""
+"""Readers of the finite-element tables."""

@@ -1,8 +1,9 @@
-"""What a sphere's contact with the skin is: its radius, and σ(a/h, rT/h, L) with derivatives, error and domain.
+"""Contact models: the radius of a sphere's contact with the skin, and σ(a/h, rT/h, L) with derivatives, error and
+domain.
 
-a/h is that of the contact at small strain, at the given force; L = F/(R² E) stands for what finite strain adds. A cubic
-spline in a/h, rT/h and L^(1/3) passes through σ at nodes; σ is smooth in L^(1/3), which is proportional to the strain
-(a/R, Seminara 2018, equation 16). Rows outside the domain are NaN, never extrapolated.
+a/h is that of the contact at small strain, at the given force; L = F/(R² E) measures finite strain. A cubic spline in
+a/h, rT/h and L^(1/3) interpolates σ at nodes; σ is smooth in L^(1/3), which is proportional to the strain (a/R,
+Seminara 2018, equation 16). Rows outside the domain are NaN, never extrapolated.
 """
 
 import math
@@ -40,9 +41,9 @@ class ContactModel(ABC):
     Attributes
     ----------
     name : str
-        As requests name it.
+        The name in requests.
     sha256 : str
-        Of the table that it is made of.
+        Of its table.
     axes : tuple of ndarray
         a/h, rT/h and L^(1/3) of the nodes.
     """
@@ -61,7 +62,7 @@ class ContactModel(ABC):
         """P/(a/h)³ of the contact at small strain, P = F R (1 − ν²)/(E h³), and d ln a/d ln P."""
 
     def _tabulate(self, data: Mapping[str, Floats]) -> None:
-        """Take σ, its errors and the profile at nodes, by "group/name" as the file of the σ table has them."""
+        """Set up splines of σ, its errors and the profile at nodes, by "group/name" as in the file of the σ table."""
         self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
         self._sigma = _spline(self.axes, data["sigma/sigma"])
         self._point_sigma = PointSpline(self._sigma)
@@ -114,7 +115,7 @@ class ContactModel(ABC):
         return Sigma(sigma.reshape(shape), rel_error.reshape(shape), inside.reshape(shape))
 
     def _sigma_of_many(self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike) -> Sigma:
-        """The same by a compiled function, whose import takes longer than a few rows."""
+        """`sigma` by a compiled function, whose import takes longer than a few rows."""
         from underskin.surrogate.table_kernel import sigma_rows
 
         columns = np.asarray(a_over_h, dtype=float), np.asarray(rt_over_h, dtype=float), np.cbrt(load_parameter)
@@ -136,7 +137,8 @@ class ContactModel(ABC):
 
     @cached_property
     def _cells_of_axes(self) -> list[Array]:
-        """Of the axes what leads from a value to a cell of the table, and the spline's cells with their functions."""
+        """Arguments of `sigma_rows` for the axes: lookup of the table's cells, and the spline's cells with
+        functions."""
         ends, parts = [], []
         for nodes, knots in zip(self.axes, self._sigma.t, strict=True):
             starts, buckets, scale = _buckets(nodes)
@@ -151,7 +153,7 @@ class ContactModel(ABC):
         cell = self._point_sigma.cell(*point)
         if cell is None:
             return None
-        # The spline's cells are not the table's: next to its ends one spans two of them (not-a-knot).
+        # The spline's cells differ from the table's: next to the ends one spans two of them (not-a-knot).
         a, rho, x = map(cell_of, self._point_axes, point)
         return self._point_sigma.value(cell, *point), float(self._cell_error[a, rho, x])
 
@@ -197,7 +199,7 @@ class ContactModel(ABC):
         return np.where(inside, self._profile(points), np.nan).reshape(shape)
 
     def profile_over(self, r_over_h: Floats) -> Floats:
-        """The same at distances inside the domain (r,), for all contacts of `contact_axes`: (a, L^(1/3), r)."""
+        """The profile at distances inside the domain (r,), for all contacts of `contact_axes`: (a, L^(1/3), r)."""
         return np.moveaxis(np.asarray(self._over_radius(r_over_h)), 0, -1)
 
     @property
@@ -238,9 +240,9 @@ def _points(
 
 
 def _buckets(nodes: Floats) -> tuple[Floats, NDArray[np.int64], float]:
-    """Where an axis' cells start, then infinity; the cell before each part of the axis; and how many parts a unit has.
+    """The starts of an axis' cells, then infinity; the cell before each part of the axis; and the parts per unit.
 
-    The parts are half as long as the shortest cell, so that one cell at most starts in each.
+    The parts are half as long as the shortest cell, so that at most one cell starts in each.
     """
     scale = 2 / float(np.diff(nodes).min())
     parts = ((nodes - nodes[0]) * scale).astype(np.int64)
@@ -249,7 +251,7 @@ def _buckets(nodes: Floats) -> tuple[Floats, NDArray[np.int64], float]:
 
 
 def _cells(axes: Sequence[Floats], points: Floats) -> tuple[Indices, ...]:
-    return tuple(np.searchsorted(axis[1:-1], points[:, number], side="right") for number, axis in enumerate(axes))
+    return tuple(np.searchsorted(axis[1:-1], points[:, index], side="right") for index, axis in enumerate(axes))
 
 
 def _largest_at_corners(values: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What finite strain adds to the exact linear layer's contact with a rigid frictionless sphere.
+"""The correction by finite strain to the exact linear layer's contact with a rigid frictionless sphere.
 
 A sphere of radius R is pressed with the force F into the bonded incompressible neo-Hookean layer. Each group of the
 file is a state of the material over α = a/h of the linear layer's frictionless contact at the same F, R, E, h, and
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
-from underskin.physics.sphere_law import WHOLE_OF_LOAD
+from underskin.physics.sphere_law import FULL_SPHERE_OF_LOAD
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA
 from underskin.surrogate.sigma_table import tables_folder
 from underskin.surrogate.table_file import Table
@@ -73,18 +73,18 @@ class ContactTable(Table):
     def softening_coefficients(self, a_over_h: Floats) -> Floats:
         """p0, p1 and p2 (…, 3) of δ/δ_linear − 1 = x (p0 + p1 x + p2 x²) at the same force, x = L^(1/3).
 
-        Within 2e-5 of the table at its nodes; the last a/h stands for wider contacts.
+        Within 2e-5 of the table at its nodes; wider contacts have the value of the last a/h.
         """
         return np.asarray(self._softening(np.minimum(a_over_h, self.axes[0][-1])))
 
-    def softening(self, a_over_h: Floats, cbrt_load: Floats, whole: bool) -> Floats:
-        """δ/δ_linear − 1 at the same force; the last L stands for larger ones.
+    def softening(self, a_over_h: Floats, cbrt_load: Floats, full_sphere: bool) -> Floats:
+        """δ/δ_linear − 1 at the same force; larger L have the value of the last one.
 
-        The linear contact is a paraboloid's, or the `whole` sphere's.
+        The linear contact is that of a paraboloid, or with `full_sphere` of the full sphere.
         """
         x = np.minimum(cbrt_load, self.axes[1][-1])
         p0, p1, p2 = np.moveaxis(self.softening_coefficients(a_over_h), -1, 0)
-        return np.asarray(x * (p0 + x * (p1 - (WHOLE_OF_LOAD if whole else 0.0) + x * p2)))
+        return np.asarray(x * (p0 + x * (p1 - (FULL_SPHERE_OF_LOAD if full_sphere else 0.0) + x * p2)))
 
 
 def load_contact(path: Path | None = None) -> ContactTable:

@@ -1,8 +1,8 @@
-"""The HDF5 file of a table: what it must hold, how it is written whole or not at all, and what is refused on reading.
+"""The HDF5 file of a table: its contents, its atomic writing, and the checks on reading.
 
 A table is self-describing (NeXus style): each group is an NXdata with `@signal` and `@axes`, each dataset carries
-`@units` and `@long_name`; the root carries the schema, the versions and the settings that made it, and the SHA-256 of
-all its datasets. `tables/README.md` describes the format for people.
+`@units` and `@long_name`; the root carries the schema, the versions and settings of its computation, and the SHA-256 of
+all its datasets. `tables/README.md` describes the format.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Dataset:
-    """One dataset of a table: its values, the names of its axes (empty for an axis itself) and what it means."""
+    """One dataset of a table: its values, the names of its axes (empty for an axis itself) and its meaning."""
 
     values: Floats
     meaning: str
@@ -38,7 +38,7 @@ Group = Mapping[str, Dataset]
 
 @dataclass(frozen=True)
 class TableFile:
-    """What was read: datasets by "group/name", the root's attributes, and the hash that names the table."""
+    """A table as read: datasets by "group/name", the root's attributes, and the hash that identifies it."""
 
     data: Mapping[str, Floats]
     attributes: Mapping[str, Any]
@@ -58,7 +58,7 @@ def data_hash(data: Mapping[str, Floats]) -> str:
 def write_table(
     path: Path, schema: str, groups: Mapping[str, Group], signals: Mapping[str, str], about: Mapping[str, Any]
 ) -> str:
-    """Write a table beside `path`, flush it to the disk and move it into place; returns its hash.
+    """Write a table next to `path`, flush it to the disk and move it into place; returns its hash.
 
     Raises TableError, and writes nothing, when a value is not finite.
     """

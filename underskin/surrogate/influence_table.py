@@ -28,8 +28,8 @@ _AXES = ("poisson_ratio", "slip", "rt_over_h", "r_over_h")
 class SensorStress:
     """Mean stress on each sensor, (sensors,).
 
-    `stress` [Pa], tension positive; `error` [Pa], what the table contributes to it, including the forces beyond its
-    reach, which count as 0; `inside`: whether any force is within reach.
+    `stress` [Pa], tension positive; `error` [Pa], the contribution of the table, including the forces beyond its reach,
+    which are neglected; `inside`: whether any force is within reach.
     """
 
     stress: Floats
@@ -69,20 +69,20 @@ class Influence:
         """
         scale = 1.5 / np.pi / thickness**2
         normal, tangential = np.abs(forces[:, 2]), np.hypot(forces[:, 0], forces[:, 1])
-        known = normal * self.normal_error + tangential * self.tangential_error
+        within_reach = normal * self.normal_error + tangential * self.tangential_error
         beyond = normal * self.normal_beyond + tangential * self.tangential_beyond
         stress, error = np.empty((2, len(sensors)))
-        inside = np.full(len(sensors), len(places) == 0)  # no load at all is known to do nothing
-        for number, sensor in enumerate(sensors):
+        inside = np.full(len(sensors), len(places) == 0)  # without any load the stress is exactly 0
+        for index, sensor in enumerate(sensors):
             away = (places - sensor) / thickness
             distance = np.hypot(away[:, 0], away[:, 1])
             near = distance <= self.reach
-            stress[number] = -scale * self._on_one(away[near], distance[near], forces[near])
-            error[number] = scale * np.where(near, known, beyond).sum()
-            inside[number] |= near.any()
+            stress[index] = -scale * self._on_sensor(away[near], distance[near], forces[near])
+            error[index] = scale * np.where(near, within_reach, beyond).sum()
+            inside[index] |= near.any()
         return SensorStress(stress, error, inside)
 
-    def _on_one(self, away: Floats, distance: Floats, forces: Floats) -> float:
+    def _on_sensor(self, away: Floats, distance: Floats, forces: Floats) -> float:
         """Σ F3 γ_n − F_outward γ_t over forces within reach, `away` from the sensor (points, 2) by `distance`."""
         total = float(forces[:, 2] @ self._normal(distance))
         if forces[:, :2].any():
@@ -126,7 +126,7 @@ class InfluenceTable(Table):
             errors = [values[cell : cell + 2].max(axis=0) for values in errors]
         r = self.axes[3]
         normal, tangential = (make_interp_spline(r, curve, k=_DEGREE) for curve in curves)
-        last = r >= r[-1] - 1.0  # both die away, in waves no longer than that
+        last = r >= r[-1] - 1.0  # both decay in waves no longer than that
         normal_beyond, tangential_beyond = (float(np.abs(curve[last]).max()) for curve in curves)
         return Influence(
             rt_over_h=rt_over_h,

@@ -1,6 +1,6 @@
-"""σ beside the sensor's centre, and what a scatter of the sphere's position does to it.
+"""σ for a sphere off the sensor's centre, and the effect of a scatter of its position.
 
-An offset sensor averages the contact model's bottom profile T3(r; a/h, L) over its disc:
+An offset sensor averages the contact model's base profile T3(r; a/h, L) over its disc:
     σ(e) = (1/πρ²) ∫_disc profile(|e + s|) d²s, lengths in units of h.
 """
 
@@ -20,10 +20,10 @@ _SCATTER_NODES = 7  # Gauss–Hermite, in x and y
 
 @dataclass(frozen=True)
 class PositionedSigma:
-    """σ against the offset for each row (contact): `sigma` at the commanded offset, and what scatter makes of it.
+    """σ against the offset for each row (contact): `sigma` at the commanded offset, and the effect of scatter.
 
-    NaN where the table's profile does not reach: at that contact, or so far off. Scatter is followed as far as it does,
-    and beyond that σ, all but gone there, is held.
+    NaN beyond the table's profile, in contact or offset. Beyond its end, where σ is nearly 0, scattered positions take
+    the last value of σ.
     """
 
     sigma: Floats
@@ -42,7 +42,10 @@ class PositionedSigma:
         weights = weights / weights.sum()
         x = self._offset_over_h[:, None, None] + scatter_over_h * nodes[:, None]
         distance = np.hypot(x, scatter_over_h * nodes)
-        ratio = _each_row(self._curve, distance.reshape(len(x), -1)).reshape(distance.shape) / self.sigma[:, None, None]
+        ratio = (
+            _evaluate_rows(self._curve, distance.reshape(len(x), -1)).reshape(distance.shape)
+            / self.sigma[:, None, None]
+        )
         weight = np.outer(weights, weights)
         mean = (ratio * weight).sum(axis=(1, 2))
         return mean, (ratio**2 * weight).sum(axis=(1, 2)) - mean**2
@@ -56,7 +59,7 @@ def positioned_sigma(
     offset_over_h: Floats,
     largest_scatter_over_h: float,
 ) -> PositionedSigma:
-    """σ of contacts beside the centre of a sensor, σ(e) = (1/πρ²) ∫_disc profile(|e + s|) d²s.
+    """σ of contacts off the centre of a sensor, σ(e) = (1/πρ²) ∫_disc profile(|e + s|) d²s.
 
     Parameters
     ----------
@@ -68,10 +71,10 @@ def positioned_sigma(
     rt_over_h
         Sensor radius over thickness, one for all rows.
     largest_scatter_over_h
-        Up to which standard deviation of the position, over the thickness, `scattered` will be asked for.
+        Largest standard deviation of the position, over the thickness, for later calls of `scattered`.
     """
     farthest, largest_disc = contact_model.profile_end, contact_model.domain["rt_over_h"][1]
-    disc_known = rt_over_h <= largest_disc
+    disc_inside = rt_over_h <= largest_disc
     rt_over_h = min(rt_over_h, largest_disc)
     largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
     offsets = _grid(min(largest_offset + 4 * _SPACING, farthest - rt_over_h))
@@ -79,23 +82,23 @@ def positioned_sigma(
     profile = _profiles(contact_model, radii, a_over_h, load_parameter)
     sigma = profile @ _disc_average(radii, offsets, rt_over_h).T
     curve = CubicSpline(offsets, np.nan_to_num(sigma), axis=1, bc_type=((1, np.zeros(len(sigma))), "not-a-knot"))
-    commanded = _each_row(curve, offset_over_h[:, None])[:, 0]
-    seen = disc_known & (offset_over_h <= offsets[-1]) & np.isfinite(sigma).all(axis=1)
-    return PositionedSigma(np.where(seen, commanded, np.nan), offset_over_h, curve)
+    commanded = _evaluate_rows(curve, offset_over_h[:, None])[:, 0]
+    inside = disc_inside & (offset_over_h <= offsets[-1]) & np.isfinite(sigma).all(axis=1)
+    return PositionedSigma(np.where(inside, commanded, np.nan), offset_over_h, curve)
 
 
 def _profiles(contact_model: ContactModel, radii: Floats, a_over_h: Floats, load_parameter: Floats) -> Floats:
-    """The profiles of contacts (rows, radii), some at a time: one evaluation holds up the other threads of a server."""
+    """The profiles of contacts (rows, radii), in parts, since one evaluation blocks the other threads of a server."""
     pieces = (slice(first, first + _AT_ONCE) for first in range(0, max(len(a_over_h), 1), _AT_ONCE))
     return np.concatenate(
         [contact_model.profile(radii, a_over_h[piece, None], load_parameter[piece, None]) for piece in pieces]
     )
 
 
-def sigma_beside(
+def sigma_off_centre(
     contact_model: ContactModel, a_over_h: float, rt_over_h: float, load_parameter: float
 ) -> tuple[Floats, Floats]:
-    """Offsets e/h, from 0 as far as the table's profile reaches, and σ there of one contact; NaN outside the domain."""
+    """Offsets e/h, from 0 to the end of the table's profile, and σ there of one contact; NaN outside the domain."""
     farthest = contact_model.profile_end
     offsets = _grid(farthest - rt_over_h)
     radii = np.minimum(_grid(farthest), farthest)
@@ -107,7 +110,7 @@ def sigma_beside(
 
 
 def _grid(end: float) -> Floats:
-    """0 to the end, which a last point may pass by rounding alone."""
+    """Grid from 0 to `end`, which the last point may exceed by rounding only."""
     return _SPACING * np.arange(np.floor(end / _SPACING + 1e-9) + 1)
 
 
@@ -119,8 +122,8 @@ def _disc_average(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
 
 
 def _over_disc(offsets: Floats, rt_over_h: float) -> tuple[Floats, Floats]:
-    """How far the points of a quadrature over the offset disc are from the contact (offsets, radial, angular), and the
-    weights of those at each radius."""
+    """The distances of quadrature points on the offset disc from the contact (offsets, radial, angular), and the
+    weights of each radius."""
     x, weight = np.polynomial.legendre.leggauss(_RADIAL)
     s = rt_over_h * (x + 1) / 2
     weight = weight * (x + 1) / 2 / _ANGULAR
@@ -129,7 +132,7 @@ def _over_disc(offsets: Floats, rt_over_h: float) -> tuple[Floats, Floats]:
     return np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle)), weight
 
 
-def _each_row(curve: CubicSpline, at: Floats) -> Floats:
+def _evaluate_rows(curve: CubicSpline, at: Floats) -> Floats:
     """Row i of the curve at the points of row i (rows, points); beyond its end, the curve's end."""
     at = np.minimum(at, curve.x[-1])
     cell = np.minimum((at / _SPACING).astype(int), len(curve.x) - 2)

@@ -1,4 +1,4 @@
-"""A tensor-product cubic spline at one point in plain Python, which is faster there than the machinery of arrays.
+"""A tensor-product cubic spline at one point in plain Python, which is faster for a single point than array functions.
 
 s(x, y, z) = Σ c_ijk b_i(x) b_j(y) b_k(z); in each cell four basis functions of each axis differ from 0, and each is a
 cubic in the distance from the cell's lower node. The values agree with scipy's NdBSpline to rounding.
@@ -31,7 +31,7 @@ class PointSpline:
     """
 
     def __init__(self, spline: NdBSpline) -> None:
-        """Take the spline apart: along z into cubics, along x and y into cubic basis functions, cell by cell."""
+        """Decompose the spline: along z into cubics, along x and y into cubic basis functions, cell by cell."""
         self._nodes = [knots[_DEGREE:-_DEGREE].tolist() for knots in spline.t]
         in_x, in_y, in_z = (_basis_functions(np.asarray(knots)) for knots in spline.t)
         self._basis_x, self._basis_y = _of_cells(in_x), _of_cells(in_y)
@@ -40,7 +40,7 @@ class PointSpline:
         self._strides = self.cubics.strides
 
     def cell(self, x: float, y: float, z: float) -> Cell | None:
-        """Where the point lies, or None outside the spline's nodes (NaN included)."""
+        """The cell of the point; None outside the spline's nodes (NaN included)."""
         x_nodes, y_nodes, z_nodes = self._nodes
         inside = x_nodes[0] <= x <= x_nodes[-1] and y_nodes[0] <= y <= y_nodes[-1] and z_nodes[0] <= z <= z_nodes[-1]
         return (cell_of(x_nodes, x), cell_of(y_nodes, y), cell_of(z_nodes, z)) if inside else None
@@ -85,7 +85,8 @@ def _of_cells(functions: Floats) -> list[Basis]:
 
 
 def cell_of(nodes: list[float], value: float) -> int:
-    """Between which two nodes a value inside them lies: at a node above it, at the last one below it."""
+    """The index of the cell of a value inside the nodes: at a node the cell above it, at the last node the last
+    cell."""
     return bisect_right(nodes, value, 1, len(nodes) - 1) - 1
 
 

@@ -43,7 +43,7 @@ class SigmaTable(ContactModel, Table):
 
 
 def tables_folder() -> Path:
-    """Where the tables are: `UNDERSKIN_TABLES`, else inside the installed package, else beside it in a checkout."""
+    """The folder of the tables: `UNDERSKIN_TABLES`, else in the installed package, else next to it in a checkout."""
     override = os.environ.get("UNDERSKIN_TABLES")
     if override:
         return Path(override)

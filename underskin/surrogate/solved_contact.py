@@ -6,7 +6,7 @@ strain adds is in the contact table, over α and L^(1/3), L = F/(R² E):
 
     σ(α, ρ, L) = (1/3) ∫ p̂(k) M(k) [2 J1(kρ)/(kρ)] k dk + (2/ρ²) ∫₀^ρ correction(r; α, L) r dr
 
-Both are put on the nodes of one spline, once in a process. The mechanism `layered_contact` has the same σ, with
+Both are tabulated at the nodes of one spline, once in a process. The mechanism `layered_contact` has the same σ, with
 derivatives by more parameters (underskin/mechanisms/models/sigma_curves.py).
 """
 
@@ -33,7 +33,7 @@ _SPLINE_ERROR = 1e-6  # largest relative one of the linear contact's σ (tests/s
 
 
 class SolvedContact(ContactModel):
-    """The layer's own contact, by its table."""
+    """The contact with the layer itself, by its table."""
 
     name = "solved"
 
@@ -43,7 +43,7 @@ class SolvedContact(ContactModel):
         nodes, cbrt_load, _ = table.axes
         a, r = (np.sort(np.append(axis, (axis[1:] + axis[:-1]) / 2)) for axis in (nodes, table.axes[2]))
         linear, profile = linear_contact(a, _RHO, r)
-        # A spline over the table's nodes is one over these too.
+        # A spline over the table's nodes is also one over these.
         added = make_interp_spline(nodes, _disc_mean(table, _RHO), k=3)(a)
         error = make_interp_spline(nodes, _disc_maximum(table, _RHO), k=1)(a)
         sigma = linear[:, :, None] + added
@@ -75,12 +75,12 @@ class SolvedContact(ContactModel):
         return ContactRadius(a, a * ratio * thickness)
 
     def load_over_cube(self, a_over_h: Floats) -> tuple[Floats, Floats]:
-        """Of the linear layer's contact."""
-        return layered_radius().load_over_cube(a_over_h), layered_radius().growth(a_over_h)
+        """P/(a/h)³ and d ln a/d ln P of the linear layer's contact."""
+        return layered_radius().load_over_cube(a_over_h), layered_radius().log_slope(a_over_h)
 
 
 def contact_model(table: SigmaTable, name: ContactName) -> ContactModel:
-    """The contact of this name: `paper`, the σ table itself, or `solved`, of the contact table beside it.
+    """The contact of this name: `paper`, the σ table itself, or `solved`, of the contact table in the same folder.
 
     Raises TableError where that cannot be read.
     """
@@ -94,7 +94,7 @@ def solved_contact(path: Path | None = None) -> SolvedContact:
 
 
 def linear_contact(a: Floats, rho: Floats, r: Floats) -> tuple[Floats, Floats]:
-    """Of contacts a/h, from 0 on, with the linear layer: stress on discs (a, rho) and on the base (a, r)."""
+    """Stress on discs (a, rho) and on the base (a, r) under contacts a/h, from 0 on, with the linear layer."""
     k, weight = wave_numbers(float(a[-1] + max(rho[-1], r[-1])))
     equation = ContactEquation(a[1:])
     modes = mode_transforms(np.multiply.outer(a[1:], k), equation.modes)

@@ -1,4 +1,4 @@
-"""A table that is read from its file and verified: what σ's, influence and contact have in common."""
+"""A table that is read from its file and verified: the common part of the σ, influence and contact tables."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -28,4 +28,4 @@ class Table(ABC):
 
     @abstractmethod
     def _take(self, data: Mapping[str, Floats]) -> None:
-        """Keep what the table needs of its datasets, by "group/name"."""
+        """Store the datasets that the table needs, by "group/name"."""

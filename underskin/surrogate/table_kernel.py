@@ -12,11 +12,11 @@ _AXIS = "float64[::1], int64[::1], float64[::1]"
 
 @compiled()
 def _cell(starts: Floats, buckets: NDArray[np.int64], scale: float, value: float) -> int:
-    """The cell that a value inside the nodes lies in: at a node the one above it, at the last node the last.
+    """The cell of a value inside the nodes: at a node the one above it, at the last node the last.
 
-    `starts` are those of the cells, then infinity. `buckets` has, for each of so many equal parts of the axis, the last
-    cell that starts in a part before it, or 0; one cell at most starts in a part, which `scale` times the value from
-    the first node on leads to.
+    `starts`: the lower nodes of the cells, then infinity. `buckets`: for each of equal parts of the axis the last cell
+    that starts in an earlier part, or 0; at most one cell starts in a part. The part of a value is `scale` times its
+    distance from the first node.
     """
     cell = buckets[int((value - starts[0]) * scale)]
     return cell + (1 if value >= starts[cell + 1] else 0)
@@ -85,8 +85,8 @@ def sigma_rows(
     """Fill σ and the bound on its relative error (rows,), NaN outside the nodes; an input of one row holds for all.
 
     `cubics` (functions of a, cells of x, functions of rho, powers) are the spline's in x; `ends` (axes, 3) the first
-    and the last node and the scale of the buckets. Of each axis `starts` and `buckets` are as `_cell` has them, `knots`
-    those of the spline's cells, and `basis` (cells, powers, functions) their functions.
+    and the last node and the scale of the buckets. For each axis `starts` and `buckets` are as in `_cell`, `knots` the
+    lower knots of the spline's cells, and `basis` (cells, powers, functions) their functions.
     """
     step_a, step_rho, step_x = min(len(a) - 1, 1), min(len(rho) - 1, 1), min(len(x) - 1, 1)
     for row in range(len(sigma)):

@@ -222,6 +222,7 @@ def drawn_maps(
     radius = both[1].about["skin"].get("sensor_radius_mm")
     figure = array_map(names, x_mm, y_mm, gap, uncertainty, [""] * len(names), quantity, None, radius)
     figure.update_layout(title="Difference of d33")
-    about = f"The second's d33 less the first's, 0 in the middle of the colours. {significance_note(gap, uncertainty, quantity)}"
+    note = significance_note(gap, uncertainty, quantity)
+    about = f"The second's d33 less the first's, 0 in the middle of the colours. {note}"
     csv_address = f"/compare/difference.csv?first={both[0].id}&second={both[1].id}"
     return [*maps, drawn("map-difference", figure, about, csv_address)]

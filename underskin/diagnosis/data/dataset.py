@@ -36,7 +36,7 @@ from underskin.recordings.campaign import (
     offsets,
     samples_of,
 )
-from underskin.recordings.curve_course import Course, course, foot, hidden_samples, roughness
+from underskin.recordings.curve_course import CurveLandmarks, curve_landmarks, foot, hidden_samples, roughness
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Complexes, Floats, Indices, Mask
 
@@ -134,7 +134,7 @@ _DISTINCT = 5.0  # standard deviations by which two displacements differ, betwee
 
 
 def thinned(
-    columns: Sequence[Floats], seen: Course, slow: float, kind: Kind
+    columns: Sequence[Floats], seen: CurveLandmarks, slow: float, kind: Kind
 ) -> tuple[list[Floats], Floats, Floats, Floats]:
     """The means of displacement [mm], force [N] and, if given, time [s] over blocks (blocks,), the deviation of the
     force's [N], the position of each along the curve, 0 to 1, and the number of samples in each; `slow` is the noise
@@ -182,7 +182,7 @@ def _slopes(displacement: Floats, force: Floats, noise: Floats, unloading: Mask)
     return np.where(np.isfinite(least), least, 0.0)
 
 
-def _corners(seen: Course) -> Indices:
+def _corners(seen: CurveLandmarks) -> Indices:
     """The first samples after jumps and corners."""
     samples = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
     return np.unique(np.array([sample for sample in samples if sample is not None], dtype=np.intp))
@@ -246,7 +246,7 @@ def _curvature_excess(force: Floats, noise: float) -> float:
     return float((residual @ residual) / least**2 - freedom) / np.sqrt(2.0 * freedom)
 
 
-def _starts_near_corners(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> Indices:
+def _starts_near_corners(seen: CurveLandmarks, displacement: Floats, force: Floats, kind: Kind) -> Indices:
     """The first samples of blocks near jumps, where single samples determine the size of the contact, near the turning
     point, and where contact begins and ends without a jump: a mean over that kink would be too large."""
     samples = _corners(seen)
@@ -257,7 +257,7 @@ def _starts_near_corners(seen: Course, displacement: Floats, force: Floats, kind
     return np.unique(near[(near >= 0) & (near < len(force))])
 
 
-def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
+def _feet(seen: CurveLandmarks, displacement: Floats, force: Floats) -> Indices:
     """Where contact begins and ends, on the ways without a visible jump."""
     ways = (
         (seen.snap_in, np.arange(seen.arrive + 1)),
@@ -267,7 +267,7 @@ def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
     return np.array([samples[index] for samples, index in feet if index is not None], dtype=np.intp)
 
 
-def _hidden_jumps(seen: Course, force: Floats) -> Indices:
+def _hidden_jumps(seen: CurveLandmarks, force: Floats) -> Indices:
     """The least force of each way without a visible jump, where it lies below the air: contact may begin or end there
     by a jump that noise hides, and means over it would reduce the adhesion."""
     ways = (seen.snap_in, 0, seen.turn), (seen.pull_off, seen.turn, len(force))
@@ -275,7 +275,7 @@ def _hidden_jumps(seen: Course, force: Floats) -> Indices:
     return np.array([sample for sample in least if force[sample] < -_BELOW_AIR_SDS * seen.noise], dtype=np.intp)
 
 
-def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
+def _with_still_hold(columns: Sequence[Floats], seen: CurveLandmarks) -> list[Floats]:
     """With the displacement of a noisy hold replaced by a straight line.
 
     Noise of the displacement moves no contact, but a law would respond to it, the more the steeper it is.
@@ -540,7 +540,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         columns = finite_samples(curve)
         if len(columns[0]) < _LEAST_SAMPLES:
             continue
-        seen = course(*columns)
+        seen = curve_landmarks(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0
         slow = _slow_noise(seen, columns[1]) if kind == "indentation" else 0.0
         columns[1] = columns[1] - force_zero
@@ -591,7 +591,7 @@ def finite_samples(curve: CurveRecording) -> list[Floats]:
     return [column[finite] for column in columns]
 
 
-def _slow_noise(seen: Course, force: Floats) -> float:
+def _slow_noise(seen: CurveLandmarks, force: Floats) -> float:
     """The standard deviation of noise that neighbouring samples share, which second differences do not show.
 
     The scatter of means over blocks in the air, away from the contact, about a parabola (a drift), beyond that by the
@@ -620,7 +620,7 @@ def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floa
     return counts, slope, np.add.reduceat((about - slope[block] * offset) ** 2, starts)
 
 
-def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
+def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None) -> float:
     """The drift [N] of the cell over the whole curve, extrapolated from the air; 0 without a significant drift, or
     without a snap-in to separate the air from the beginning of contact.
 
@@ -641,7 +641,7 @@ def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
 
 def _error(
     kind: Kind,
-    seen: Course,
+    seen: CurveLandmarks,
     displacement: Floats,
     force: Floats,
     time: Floats | None,

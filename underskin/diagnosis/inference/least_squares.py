@@ -18,7 +18,7 @@ from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_pr
 from underskin.diagnosis.noise import START_GAIN, USUAL_DRIFT
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.campaign import CurveConditions, CurveRecording, curves_of
-from underskin.recordings.curve_course import course, touch
+from underskin.recordings.curve_course import curve_landmarks, touch
 from underskin.units import Floats, Mask
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
@@ -147,7 +147,11 @@ def _distinct(travel: Floats) -> Floats:
 def _snap_in_interval(curve: CurveConditions) -> tuple[float, float, float] | None:
     """The displacements [mm] of the samples before and after a snap-in, with the estimated contact point as the middle
     one; None where no snap-in is seen."""
-    seen = course(curve.displacement_mm, curve.force_n, curve.time_s) if isinstance(curve, CurveRecording) else None
+    seen = (
+        curve_landmarks(curve.displacement_mm, curve.force_n, curve.time_s)
+        if isinstance(curve, CurveRecording)
+        else None
+    )
     if seen is None or not seen.snap_in:
         return None
     before, after = curve.displacement_mm[seen.snap_in - 1 : seen.snap_in + 1].tolist()
@@ -159,7 +163,7 @@ def _visible_contact(curve: CurveConditions) -> Mask | None:
     """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
     if not isinstance(curve, CurveRecording):
         return None
-    seen = course(curve.displacement_mm, curve.force_n, curve.time_s)
+    seen = curve_landmarks(curve.displacement_mm, curve.force_n, curve.time_s)
     number = np.arange(len(curve.force_n))
     retraction = float(curve.displacement_mm[seen.turn] - curve.displacement_mm[-1])
     if seen.snap_in is None or (seen.pull_off is None and retraction > _RETURN * float(np.ptp(curve.displacement_mm))):

@@ -24,7 +24,7 @@ from underskin.diagnosis.localisation import axis_values
 from underskin.diagnosis.reporting.numbers import parameter_index
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, frf_recordings
-from underskin.recordings.curve_course import course
+from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
 MOST_SAMPLES = 600  # drawn of a curve
@@ -145,7 +145,7 @@ def _shown(
     raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
 ) -> ShownCurve:
     sample_mm, measured, *times = finite_samples(raw)
-    landmarks = course(sample_mm, measured, *times)
+    landmarks = curve_landmarks(sample_mm, measured, *times)
     jumps: list[int | None] = [None, None]
     if raw.kind == "indentation":
         measured = measured - landmarks.zero

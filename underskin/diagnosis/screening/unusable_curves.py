@@ -10,7 +10,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
-from underskin.recordings.curve_preparation import require_own_columns
+from underskin.recordings.curve_preparation import reject_exchanged_columns
 from underskin.recordings.modulus import estimate, of_compression, require_depth, tip_of
 from underskin.units import Floats, to_si
 
@@ -41,7 +41,7 @@ def _exchanged(recording: object) -> InvalidInput | None:
     """The refusal of a curve whose columns look exchanged, from its raw samples."""
     try:
         if isinstance(recording, IndentationRecording | CompressionRecording):
-            require_own_columns(recording)
+            reject_exchanged_columns(recording)
     except InvalidInput as refusal:
         return refusal
     return None

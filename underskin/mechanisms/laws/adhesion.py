@@ -10,7 +10,7 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
-from underskin.recordings.curve_course import course
+from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import to_si
 
 _REASON = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²"
@@ -100,7 +100,7 @@ def _comes_back(recording: IndentationConditions) -> bool:
 
 def _works(recording: IndentationRecording) -> tuple[float, float]:
     """Works of adhesion and separation [J/m²] for which the least forces on both ways are -4πwR/3 and -3πwR/2."""
-    features = course(recording.displacement_mm, recording.force_n, recording.time_s)
+    features = curve_landmarks(recording.displacement_mm, recording.force_n, recording.time_s)
     force = recording.force_n - features.zero
     radius = float(to_si("indenter_radius_mm", recording.indenter_radius_mm))
     least = [-float(part.min()) / (np.pi * radius) for part in (force[: features.turn + 1], force[features.turn :])]

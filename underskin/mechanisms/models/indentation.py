@@ -73,7 +73,7 @@ from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
-from underskin.recordings.curve_course import course, touch
+from underskin.recordings.curve_course import curve_landmarks, touch
 from underskin.recordings.modulus import estimate
 from underskin.surrogate.contact_table import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
@@ -572,7 +572,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
         span = float(np.ptp(to_si("displacement_mm", recording.displacement_mm)))
         contact = 0.0
         if isinstance(recording, IndentationRecording):
-            features = course(recording.displacement_mm, recording.force_n, recording.time_s)
+            features = curve_landmarks(recording.displacement_mm, recording.force_n, recording.time_s)
             force = recording.force_n - features.drift * times_of(recording)
             columns = [np.asarray(column, dtype=float).tobytes() for column in (recording.displacement_mm, force)]
             try:

@@ -16,7 +16,7 @@ import numpy as np
 
 from underskin.compiled import compiled
 from underskin.physics.contact_curves import LARGEST_A_OVER_H
-from underskin.physics.sphere_law import LOAD_OF_REDUCED, WHOLE_OF_LOAD
+from underskin.physics.sphere_law import FULL_SPHERE_OF_LOAD, LOAD_OF_REDUCED
 from underskin.units import Floats, Indices, Mask
 
 _STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and its upper limit
@@ -94,7 +94,7 @@ def _strain_ratio(
     by_x = by_load * x / 3.0 if x < LARGEST_CBRT_LOAD else 0.0
     c3, c2, c1, c0 = cubics[0], cubics[1], cubics[2], cubics[3]
     p0 = ((c3[4] * u + c2[4]) * u + c1[4]) * u + c0[4]
-    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - deep * WHOLE_OF_LOAD
+    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - deep * FULL_SPHERE_OF_LOAD
     p2 = ((c3[6] * u + c2[6]) * u + c1[6]) * u + c0[6]
     by_p0 = (3.0 * c3[4] * u + 2.0 * c2[4]) * u + c1[4]
     by_p1 = (3.0 * c3[5] * u + 2.0 * c2[5]) * u + c1[5]

@@ -1,25 +1,18 @@
-"""FRFs estimated from time series.
+"""FRFs (charge over force) estimated from time series, with the delay between channels, and checks of both.
 
-The delay between force and charge: of two signals, and of the phases of FRFs.
-
-Channels of two recorders, filters and the ends of converters' pipelines delay one of them by anything from a sample to
-tenths of a second. Then Re FRF is no measure of the response, cos(ωτ) of it, and may have any sign.
-
-The FRF, charge over force, from time series: for stepped sine, periodic and broadband forces.
-
-Convention e^(+iωt): a charge that lags the force has a negative phase. Spectra are averaged over n blocks, and the FRF
-is H1, H2 or Hv of them (`estimators` has the equations), with the coherence γ² and (Bendat and Piersol, Random Data,
-chapter 9)
+Convention e^(+iωt): a charge that lags the force has a negative phase. Spectra are averaged over n blocks; the FRF is
+their H1, H2 or Hv (equations in `estimators`), with the coherence γ² and (Bendat and Piersol, Random Data, chapter 9)
     var log|H| = var phase = (1 − γ²)/(2 n γ²)    var γ² = 2 γ² (1 − γ²)²/n.
 
-The resonance that the magnitude of an FRF shows.
+Two recorders, filters and converter pipelines delay a channel by a sample to tenths of a second; then Re FRF is
+multiplied by cos(ωτ) and may have any sign.
 
-Of a mass on a spring, 1/(1 − r² + 2iζr) with r = f/f0, the inverse square magnitude (1 − r²)² + 4ζ²r² is quadratic in
-f²: a line through three unknowns, whatever turns the phase beside the resonance (Ewins, Modal Testing, 2nd ed., 2000,
-section 4.2, has the same of the complex inverse).
+Resonance: for a mass on a spring, 1/(1 − r² + 2iζr) with r = f/f0, the inverse squared magnitude (1 − r²)² + 4ζ²r² is
+quadratic in f², a linear fit of three unknowns, independent of the phase (Ewins, Modal Testing, 2nd ed., 2000, section
+4.2, for the complex inverse).
 
-Time series whose channels of force and charge look exchanged: the charge has the mean and the oscillation that are
-declared of the force, and the force has not.
+Force and charge look exchanged where the charge has the declared mean and oscillation of the force, and the force has
+not.
 """
 
 from collections.abc import Iterator, Sequence
@@ -49,24 +42,24 @@ from underskin.recordings.frf.spectra import (
 )
 from underskin.units import Complexes, Floats, Mask, to_si
 
-_LARGEST = 0.25  # of a record, that a lag may be
-_STANDS_OUT = 8.0  # times the rms of a correlation: noise alone reaches that once in 1e15
-_AS_HIGH = 0.9  # of the highest peak: of a force that repeats itself the nearest of several
-# Of a block: a lag takes (2π²/3)(lag/block)² from γ² by Hann's window, as noise of a sample in 1e5 does
+_LARGEST = 0.25  # largest lag, of a record
+_STANDS_OUT = 8.0  # least peak, over the rms of the correlation: noise alone reaches it once in 1e15
+_AS_HIGH = 0.9  # of the highest peak: with a periodic force the nearest of several peaks is used
+# Of a block: with Hann's window a lag lowers γ² by (2π²/3)(lag/block)², as noise of 1e-5 of the power does
 _UNHARMED = 1e-3
-# Of the lines' power that is in phase at the best delay: as much as this without one, and there is none
+# Share of the in-phase power at the best delay that is reached without a delay: above it there is none
 _IN_PHASE = 0.9
-_EXPLAINED = 0.5  # of the lines' power, in phase at the best delay: a turn by half past a resonance leaves 0.4
-_STEPS = 6  # delays that are tried for each by which the highest line turns once
+_EXPLAINED = 0.5  # least in-phase share of the power at the best delay: half a turn past a resonance leaves 0.4
+_STEPS = 6  # delays tried for one turn of the highest line
 _MOST_DELAYS = 8192
 _CHUNK = 256  # delays at a time
 
 
 def lag_between(force: Floats, charge: Floats, block: int) -> int:
-    """The samples by which the charge comes late, negative where the force does.
+    """The lag of the charge behind the force in samples, negative where the force is late.
 
-    It is where their cross-correlation is highest, drift and preload removed; 0 where no peak stands out, and where the
-    lag is so small beside a `block` (samples) that spectra over blocks do not suffer.
+    The position of the highest peak of their cross-correlation, drift and preload removed; 0 where no peak is
+    significant, or where the lag is too small compared with a `block` (samples) to affect the spectra.
 
     Source
     ------
@@ -87,24 +80,24 @@ def lag_between(force: Floats, charge: Floats, block: int) -> int:
 
 
 def common_delay(stacks: Sequence[Stack]) -> float:
-    """The delay [s] of the charge that all recordings share, negative where the force is late.
+    """The delay [s] of the charge common to all recordings, negative where the force is late.
 
-    That which brings most lines in phase with the force, or in antiphase: the largest Σ (Re Σ w u e^(iωτ))² of the
-    lines' phase factors u with weights w. It is 0 where the lines are in phase without one, but for the sign of a
-    recording, or where none brings most of them in phase, as above a resonance, and of noise.
+    It maximises Σ (Re Σ w u e^(iωτ))² of the lines' phase factors u with weights w, so that most lines are in phase or
+    in antiphase with the force. It is 0 where the lines are in phase without a delay (but for the sign of a recording),
+    and where no delay brings most of them in phase, as above a resonance and for noise.
     """
     parts = [(stack, stack.weights * _phase_factors(stack.values)) for stack in stacks if len(stack.frequency) > 1]
-    whole = sum(float((stack.weights.sum(axis=1) ** 2).sum()) for stack, _ in parts)
-    if not whole > 0:
+    total = sum(float((stack.weights.sum(axis=1) ** 2).sum()) for stack, _ in parts)
+    if not total > 0:
         return 0.0
 
     def in_phase(delays: Floats) -> Floats:
         return (
-            sum((_power(stack.frequency, factors, delays) for stack, factors in parts), np.zeros(len(delays))) / whole
+            sum((_power(stack.frequency, factors, delays) for stack, factors in parts), np.zeros(len(delays))) / total
         )
 
-    without = float(in_phase(np.zeros(1))[0])
-    if without >= _IN_PHASE:
+    undelayed = float(in_phase(np.zeros(1))[0])
+    if undelayed >= _IN_PHASE:
         return 0.0
     highest = max(float(stack.frequency.max()) for stack, _ in parts)
     spacing = max(float(np.median(np.diff(stack.frequency))) for stack, _ in parts)
@@ -117,30 +110,33 @@ def common_delay(stacks: Sequence[Stack]) -> float:
         delays = np.asarray(best + np.arange(-_STEPS, _STEPS + 1) * (step / _STEPS), dtype=np.float64)
         step /= _STEPS
     explained = float(power.max())
-    return float(best) if explained > _EXPLAINED and without < _IN_PHASE * explained else 0.0
+    return float(best) if explained > _EXPLAINED and undelayed < _IN_PHASE * explained else 0.0
 
 
 def without_delay(stacks: Sequence[Stack], delay: float) -> list[Stack]:
-    """The FRFs with that delay of the charge [s] taken off."""
+    """The FRFs corrected for a delay of the charge [s]."""
     if delay == 0.0:
         return list(stacks)
     return [replace(stack, values=advanced(stack.values, stack.frequency, delay)) for stack in stacks]
 
 
 def advanced(values: Complexes, frequency: Floats, delay: float) -> Complexes:
-    """An FRF (…, lines) with a delay of the charge [s] taken off."""
+    """An FRF (…, lines) corrected for a delay of the charge [s]."""
     return np.asarray(values * np.exp(2j * np.pi * frequency * delay))
 
 
 def _phase_factors(values: Complexes) -> Complexes:
-    known = np.isfinite(values) & (values != 0)
-    return np.where(known, np.exp(1j * np.angle(np.where(known, values, 1.0))), 0.0)
+    valid = np.isfinite(values) & (values != 0)
+    return np.where(valid, np.exp(1j * np.angle(np.where(valid, values, 1.0))), 0.0)
 
 
 def _power(frequency: Floats, factors: Complexes, delays: Floats) -> Floats:
     """Σ over recordings of (Re Σ over lines of factors · e^(2πifτ))² at each delay."""
     return np.concatenate(
-        [((factors @ np.exp(2j * np.pi * np.outer(frequency, some))).real ** 2).sum(axis=0) for some in _chunks(delays)]
+        [
+            ((factors @ np.exp(2j * np.pi * np.outer(frequency, chunk))).real ** 2).sum(axis=0)
+            for chunk in _chunks(delays)
+        ]
     )
 
 
@@ -150,16 +146,16 @@ def _chunks(delays: Floats) -> Iterator[Floats]:
 
 
 def _nearest_peak(delays: Floats, power: Floats) -> int:
-    """Of those nearly as high as the highest the nearest to 0: a band of few lines does not tell them apart."""
+    """The index of the peak nearest to 0 among those nearly as high as the highest: few lines cannot resolve them."""
     peaks = np.flatnonzero(power >= power.max() * (1 - 1e-9))
     return int(peaks[np.argmin(np.abs(delays[peaks]))])
 
 
-_BLOCKS = 15  # of a broadband record, half overlapping, where no resolution is asked for: 8 / its length
+_BLOCKS = 15  # half-overlapping blocks of a broadband record by default: a resolution of 8 / its length
 
 
 def lines_of(recording: FrfRecording) -> Frf:
-    """The FRF of a recording: its own lines, or the estimate from its time series by its estimator, H1 without one."""
+    """The FRF of a recording: its lines, or the estimate from its time series by its estimator (default H1)."""
     if recording.sample_rate_hz is not None:
         assert recording.force_n is not None
         assert recording.charge_pc is not None
@@ -217,8 +213,8 @@ def broadband(
     """The FRF of a broadband force: Welch's average over blocks.
 
     The straight line through each block (preload, DC and drift) is removed. The lines at 0 Hz and at half the sample
-    rate, which carry no phase, are left out, as are the blocks that a defect touches. Where γ² rises by it, a lag of
-    one signal behind the other is taken off first and put back into the phase: beside a block it would lower H1.
+    rate, which carry no phase, are left out, as are blocks with a defect. A lag between the signals, which would lower
+    H1, is removed first and restored in the phase, where that raises γ².
 
     Parameters
     ----------
@@ -276,14 +272,16 @@ def _coherence(frf: Frf) -> float:
 
 
 def _aligned(force: Floats, charge: Floats, lag: int) -> tuple[Floats, Floats]:
-    """Both without a lag of the charge by so many samples."""
+    """Both signals without a lag of the charge by `lag` samples."""
     return (force[: len(force) - lag], charge[lag:]) if lag >= 0 else (force[-lag:], charge[:lag])
 
 
 def _as_recorded(aligned: Frf, lag: int, sample_rate: float) -> Frf:
-    """The FRF of signals that were aligned with their lag in its phase, and their defects where they were recorded."""
+    """The FRF of aligned signals with the lag restored in its phase, and defects at their recorded samples."""
     cut = {"charge_pc": max(lag, 0), "force_n": max(-lag, 0)}
-    defects = tuple(replace(one, first_sample=one.first_sample + cut[one.channel]) for one in aligned.defects)
+    defects = tuple(
+        replace(defect, first_sample=defect.first_sample + cut[defect.channel]) for defect in aligned.defects
+    )
     return replace(aligned, values=advanced(aligned.values, aligned.frequency, -lag / sample_rate), defects=defects)
 
 
@@ -375,7 +373,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
 
 
 def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Complexes]]]) -> float:
-    """The line already seen that this frequency repeats, or itself."""
+    """The earlier line that this frequency repeats, or the frequency itself."""
     return next((line for line in lines if abs(line - frequency) < 1e-3 * frequency), frequency)
 
 
@@ -411,7 +409,7 @@ class Resonance(NamedTuple):
 
 
 def resonance(frf: Frf) -> Resonance | None:
-    """That of the highest finite line, where one stands out within the band; None where none does."""
+    """The resonance at the highest finite line, where a peak stands out within the band; else None."""
     finite = np.isfinite(frf.values)
     if not finite.any():
         return None
@@ -434,22 +432,22 @@ def resonance(frf: Frf) -> Resonance | None:
 
 
 _AS_DECLARED = float(np.log(1.4))
-_PARTS = 8  # of a record, of which drift is taken off; its analysis has blocks of that length
+_PARTS = 8  # parts of a record that are detrended; blocks of its analysis have that length
 _TINY = 1e-300
 
 
-def exchanged_channels(entry: FrfRecording) -> Finding | None:
-    """That the two channels of a recording look exchanged, if they do."""
-    if entry.force_n is None or entry.charge_pc is None:
+def exchanged_channels(recording: FrfRecording) -> Finding | None:
+    """A finding where the two channels of a recording look exchanged."""
+    if recording.force_n is None or recording.charge_pc is None:
         return None
-    if not _declared(entry.charge_pc, entry) or _declared(entry.force_n, entry):
+    if not _declared(recording.charge_pc, recording) or _declared(recording.force_n, recording):
         return None
-    means = {"force_mean_n": float(np.mean(entry.force_n)), "charge_mean_pc": float(np.mean(entry.charge_pc))}
-    return Finding(Reason.CHANNELS_SWAPPED, entry.id, "force_n", {**means, "preload_n": entry.preload_n})
+    means = {"force_mean_n": float(np.mean(recording.force_n)), "charge_mean_pc": float(np.mean(recording.charge_pc))}
+    return Finding(Reason.CHANNELS_SWAPPED, recording.id, "force_n", {**means, "preload_n": recording.preload_n})
 
 
 def oscillation_of(force: Floats) -> Floats:
-    """√2 times the deviation of a force less its drift, and its peak [N]."""
+    """√2 times the standard deviation of a force without its drift, and its peak [N]."""
     parts = np.arange(0, len(force), max(len(force) // _PARTS, _PARTS))
     from scipy.signal import detrend  # takes 0.3 s to load, which few need
 
@@ -457,8 +455,8 @@ def oscillation_of(force: Floats) -> Floats:
     return np.array([np.sqrt(2.0) * np.std(drift_free), np.max(np.abs(drift_free))])
 
 
-def _declared(signal: Floats, entry: FrfRecording) -> bool:
-    """Whether the mean of a signal is the declared preload, and what shakes it the declared dynamic force."""
-    ratios = np.append(oscillation_of(signal) / entry.dynamic_force_n, np.mean(signal) / entry.preload_n)
+def _declared(signal: Floats, recording: FrfRecording) -> bool:
+    """Whether a signal has the declared preload as its mean and the declared dynamic force as its oscillation."""
+    ratios = np.append(oscillation_of(signal) / recording.dynamic_force_n, np.mean(signal) / recording.preload_n)
     near = np.abs(np.log(np.maximum(ratios, _TINY))) < _AS_DECLARED
     return bool(near[:-1].any() and near[-1])

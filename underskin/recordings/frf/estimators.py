@@ -11,10 +11,10 @@ S_fq the mean of conj(F) Q (Bendat and Piersol, Random Data, chapters 6 and 7):
 Hv is the total least-squares line through (F, Q): unbiased where the noise powers have the ratio S_kk/S_mm = κ, and
 always between H1 and H2 in magnitude (Rocklin, Crowley and Vold, A Comparison of H1, H2, and Hv Frequency Response
 Functions, IMAC 3, 1985). κ is taken to be the ratio of the signals' own powers over all lines, so that Hv does not
-depend on units, and assumes that both channels have the same signal-to-noise ratio over the band. It is one number for
-all lines, tones of a stepped sine too: noise of an amplifier has one power at all frequencies, or nearly, while the
-signals rise and fall with the FRF. With a κ for each line S_qq = κ S_ff there, and Hv would be the geometric mean of H1
-and H2 at each, too large where the charge is small beside that of other lines, and too small where it is large.
+depend on units; this assumes that both channels have the same signal-to-noise ratio over the band. It is one number for
+all lines, also of a stepped sine, since noise of an amplifier is nearly white while the signals vary with the FRF. With
+a κ for each line, S_qq = κ S_ff there, and Hv would be the geometric mean of H1 and H2 at each line, too large where
+the charge is smaller than at other lines, and too small where it is larger.
 """
 
 from collections.abc import Iterable
@@ -32,9 +32,9 @@ _TINY = float(np.finfo(float).tiny)
 
 def checked_estimator(field: str, value: Any) -> Estimator:
     """The estimator of that name; raises InvalidInput."""
-    for known in ESTIMATORS:
-        if value == known:
-            return known
+    for estimator in ESTIMATORS:
+        if value == estimator:
+            return estimator
     raise not_one_of(field, value, ESTIMATORS)
 
 

@@ -1,31 +1,19 @@
-"""The band in which an FRF is flat.
+"""The flat zone: the band of a campaign in which no recording shows a resonance (Seminara 2018, section 3.2.2).
 
-Why a flat zone ends where it does, in words that a lab checks against its own plots.
+Re FRF of each recording over its own level is gathered in bins of equal width in log f and averaged over the recordings
+of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of bins in
+which no condition departs, beyond its noise, from a power law common to all (a sensor's relaxation, no resonance) by
+more than `FLATNESS`. Outstanding lines at the mains and its harmonics and unused lines (`line_choice`) are left out. A
+delay common to all recordings is removed before (`estimation.common_delay`): Re FRF is the response where the charge is
+in phase with the force. `reason_of` words why the zone ends where it does.
 
-The flat zone: the band of a campaign in which no recording shows a resonance (Seminara 2018, section 3.2.2).
+`roll_off` decides whether the band lies behind a high-pass or a low-pass. The magnitude over frequency, in bins over
+all recordings and up to where a resonance lifts it, is fitted by a plateau with a slight power law and two filters,
+    ln |FRF| = a − n ln f − ½ ln(1 + (f1/f)²) − (m/2) ln(1 + (f/f2)^(2k)),   0 ≤ n ≤ `STEEPEST`.
+A filter counts where it explains the fall and the plateau lies beyond the band: then the band's average is no d33.
 
-Re FRF of each recording, over its own level, is gathered in bins of equal width in log f and averaged over the
-recordings of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of
-bins in which no condition leaves, beyond its noise, a power law common to all of them (a sensor's relaxation falls
-slowly over the whole band and is no resonance) by more than `FLATNESS`. Lines at the mains and its harmonics that
-stand out of their neighbours are left out, and so are lines that are not used (`line_choice`): noise that was not
-excited there may be flat, too. A delay that all recordings share is taken off before (`delay`): Re FRF is the response
-where the charge is in phase with the force.
-
-Whether the band that d33 is averaged over lies behind a high-pass or a low-pass: what its level is of the plateau's.
-
-The magnitude over frequency, gathered in bins over all recordings, is fitted by a plateau with a slight power law (a
-sensor's relaxation) and two filters,
-    ln |FRF| = a − n ln f − ½ ln(1 + (f1/f)²) − (m/2) ln(1 + (f/f2)^(2k)),   0 ≤ n ≤ `STEEPEST`,
-up to where a resonance lifts it. A filter counts where it explains the fall and the plateau lies beyond the band: then
-the band's average is no d33, however flat the band is.
-
-Whether the band that d33 is averaged over is flat enough for the interval that is told.
-
-FRFs of a campaign as a figure can show them: lines of single recordings, and the spread over recordings alike.
-
-A figure has fewer pixels than a recording lines: lines are gathered in bins of equal width in log f, of which the
-extremes are kept, so that no resonance is lost. Of a force of a few sines the lines between those are no part of it.
+`lines_of` and `spreads` thin FRFs for figures: bins of equal width in log f, of which the extremes are kept, so that no
+resonance is lost; only excited lines of a force of a few sines.
 """
 
 import warnings
@@ -54,7 +42,7 @@ _NOT_EXCITED = "it was not excited: the charge hardly follows the force (low coh
 
 @dataclass(frozen=True)
 class Idle:
-    """Whether lines below a zone and above it were not excited, and how many inside it."""
+    """Whether lines below and above a zone were not excited, and how many inside it."""
 
     below: bool
     above: bool
@@ -96,7 +84,7 @@ def reason_of(
 
 
 def levels_of(curves: Floats) -> Floats:
-    """The mean of each curve over the bins that it has, (curves, 1); NaN where it has none."""
+    """The mean of each curve over its bins, (curves, 1); NaN without any."""
     filled = np.isfinite(curves).sum(axis=1, keepdims=True)
     return np.nansum(curves, axis=1, keepdims=True) / np.where(filled, filled, np.nan)
 
@@ -106,12 +94,12 @@ def _above(
 ) -> str:
     beyond = departure[:-1, last + 1 :]
     peaks = {
-        number: float(middle_hz[last + 1 + int(np.nanargmax(row))])
-        for number, row in enumerate(beyond)
+        index: float(middle_hz[last + 1 + int(np.nanargmax(row))])
+        for index, row in enumerate(beyond)
         if np.isfinite(row).any() and np.nanmax(row) > _PEAK - 1
     }
     if peaks:
-        lowest, highest = min(peaks, key=lambda number: peaks[number]), max(peaks.values())
+        lowest, highest = min(peaks, key=lambda index: peaks[index]), max(peaks.values())
         radius, preload = conditions[lowest]
         where = f"{peaks[lowest]:.3g} Hz" + (
             f" to {highest:.3g} Hz, moving with the contact" if highest > 1.2 * peaks[lowest] else ""
@@ -141,8 +129,8 @@ Condition = tuple[float, float]  # indenter radius [mm], preload [N]
 
 @dataclass(frozen=True)
 class FlatZone:
-    """A band, limits included, the reason for it in words, and the lines inside it that are left out: those that mains
-    spoil, and those that were not excited."""
+    """A band, limits included, the reason for it in words, and the lines left out inside it: `left_out_hz` near mains,
+    `idle_hz` not excited."""
 
     low_hz: float
     high_hz: float
@@ -187,16 +175,16 @@ def flat_zone(
     """
     frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
     edges = edges_over(frequencies)
-    followed = [stack.at(np.asarray(stack.used.any(axis=0))) for stack in stacks]
-    excited = np.isin(frequencies, np.concatenate([stack.frequency for stack in followed]))
-    mains = _mains_lines(followed)
+    excited_stacks = [stack.at(np.asarray(stack.used.any(axis=0))) for stack in stacks]
+    excited = np.isin(frequencies, np.concatenate([stack.frequency for stack in excited_stacks]))
+    mains = _mains_lines(excited_stacks)
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
         if not inside.any():
             allowed = f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz"
             raise too_few("band_hz", list(band_hz), allowed)
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
-    ratio = _binned(followed, edges, mains)
+    ratio = _binned(excited_stacks, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
     if len(filled) < 2:
@@ -208,20 +196,20 @@ def flat_zone(
     followed_hz = frequencies[excited]
     low = followed_hz[followed_hz >= edges[filled[first]] * (1 - 1e-12)][0]
     high = followed_hz[followed_hz <= edges[filled[last] + 1] * (1 + 1e-12)][-1]
-    left_out = tuple(line for line in mains if low <= line <= high)
+    mains_in_band = tuple(line for line in mains if low <= line <= high)
     idle_hz = frequencies[~excited]
     idle = Idle(
         bool((idle_hz < low).any()), bool((idle_hz > high).any()), int(((idle_hz > low) & (idle_hz < high)).sum())
     )
-    reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out, idle)
-    return FlatZone(float(low), float(high), reason, left_out, tuple(np.round(idle_hz, 6).tolist()))
+    reason = reason_of(low, high, middle, curves, names, (first, last), slope, mains_in_band, idle)
+    return FlatZone(float(low), float(high), reason, mains_in_band, tuple(np.round(idle_hz, 6).tolist()))
 
 
 def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:
     """Re FRF averaged over the zone.
 
-    Lines weigh by γ²/(1 − γ²) where their coherence γ² is known; of each recording those that stand out by 6 times its
-    scatter are left out. The gain error that the lines share is not in the uncertainty: it belongs to the mixed model.
+    Lines are weighted by γ²/(1 − γ²) where the coherence γ² is known; lines of a recording beyond 6 times its scatter
+    are left out. The common gain error of the lines is not in the uncertainty: it belongs to the mixed model.
 
     Parameters
     ----------
@@ -254,21 +242,21 @@ def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Float
             effective = total**2 / (weight**2).sum(axis=1)
             unbiased = effective / (effective - 1)
             mean[stack.rows] = value
-            # From the scatter itself, so that weights that are off cost accuracy and not honesty.
+            # From the observed scatter, so that wrong weights cost accuracy but the uncertainty stays valid.
             uncertainty[stack.rows] = np.sqrt((weight**2 * rest**2).sum(axis=1) * unbiased) / total
             scatter[stack.rows] = np.sqrt((weight * rest**2).sum(axis=1) / total * unbiased) / np.abs(value)
-    return mean, _where_one_line(mean, uncertainty, scatter), scatter
+    return mean, _with_usual_scatter(mean, uncertainty, scatter), scatter
 
 
-def _where_one_line(mean: Floats, uncertainty: Floats, scatter: Floats) -> Floats:
-    """A recording of one line has no scatter of its own: it is given the others'."""
-    alone = np.isfinite(mean) & ~np.isfinite(uncertainty)
+def _with_usual_scatter(mean: Floats, uncertainty: Floats, scatter: Floats) -> Floats:
+    """The uncertainty, for a recording of one line, which has no scatter, by the median scatter of the others."""
+    single_line = np.isfinite(mean) & ~np.isfinite(uncertainty)
     usual = float(np.nanmedian(scatter)) if np.isfinite(scatter).any() else 0.0
-    return np.where(alone, usual * np.abs(mean), uncertainty)
+    return np.where(single_line, usual * np.abs(mean), uncertainty)
 
 
 def _medians(values: Floats, used: Mask) -> Floats:
-    """The median over the lines that are used of each recording (recordings, 1); NaN where there are none."""
+    """The median over the used lines of each recording (recordings, 1); NaN without any."""
     if used.all():
         return np.asarray(np.median(values, axis=1, keepdims=True))
     with warnings.catch_warnings():
@@ -277,8 +265,8 @@ def _medians(values: Floats, used: Mask) -> Floats:
 
 
 def _of_the_largest(real: Floats, used: Mask) -> Floats:
-    """The median of the largest quarter of each recording's lines (recordings,): of those behind a low-pass most have
-    none; NaN where no line is used."""
+    """The median of the largest quarter of each recording's lines (recordings,), since behind a low-pass most lines
+    show no response; NaN without a used line."""
     largest = np.full(len(real), np.nan)
     for row, lines in enumerate(used):
         if lines.any():
@@ -288,7 +276,7 @@ def _of_the_largest(real: Floats, used: Mask) -> Floats:
 
 
 def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
-    """Lines at mains harmonics that scatter far more about their neighbours than those do."""
+    """Lines at mains harmonics whose scatter about their neighbours is outstanding."""
     harmonics = np.outer(MAINS_HZ, HARMONICS).ravel()
     lines_hz: set[float] = set()
     for stack in stacks:
@@ -299,9 +287,9 @@ def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
             median_filter(part, (1, _NEIGHBOURS), mode="nearest") for part in (stack.values.real, stack.values.imag)
         )
         scatter = np.median(np.abs(stack.values - (real + 1j * imaginary)), axis=0)
-        beside = median_filter(np.where(near, np.median(scatter[~near]), scatter), _NEIGHBOURS, mode="nearest")
+        usual = median_filter(np.where(near, np.median(scatter[~near]), scatter), _NEIGHBOURS, mode="nearest")
         few = 1 + 1.5 / np.sqrt(len(stack.rows))  # scatter over few recordings is itself unsure
-        lines = stack.frequency[near & (scatter > _OUTSTANDING * few * beside)]
+        lines = stack.frequency[near & (scatter > _OUTSTANDING * few * usual)]
         lines_hz.update(np.round(lines, 6).tolist())
     return tuple(sorted(lines_hz))
 
@@ -318,11 +306,11 @@ def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) ->
             noise = _medians(np.abs(np.diff(real, axis=1)), used[:, 1:] & used[:, :-1])[:, 0]
         level = np.where(np.abs(level) > 2 * noise, level, _of_the_largest(real, used))
         plain = np.abs(level) > 2 * noise  # a dead sensor has no level
-        kept = ~np.isin(np.round(stack.frequency, 6), mains)
+        not_mains = ~np.isin(np.round(stack.frequency, 6), mains)
         bins = bin_of(stack.frequency, edges)
-        for number in np.unique(bins[kept]):
-            lines = np.ix_(plain, kept & (bins == number))
-            ratio[stack.rows[plain], number] = _medians(real[lines] / level[plain, None], used[lines])[:, 0]
+        for bin_index in np.unique(bins[not_mains]):
+            lines = np.ix_(plain, not_mains & (bins == bin_index))
+            ratio[stack.rows[plain], bin_index] = _medians(real[lines] / level[plain, None], used[lines])[:, 0]
     return ratio
 
 
@@ -330,7 +318,7 @@ def _by_condition(ratio: Floats, conditions: Sequence[Condition]) -> tuple[list[
     """The conditions, the median curve of each (conditions, bins) and its noise; the last row is that of all."""
     names = sorted(set(conditions))
     member = np.array([names.index(condition) for condition in conditions])
-    groups = [ratio[member == number] for number in range(len(names))]
+    groups = [ratio[member == index] for index in range(len(names))]
     sigma = _noise(ratio)
     curves, noise = [], []
     for group in [*groups, ratio]:
@@ -343,17 +331,17 @@ def _by_condition(ratio: Floats, conditions: Sequence[Condition]) -> tuple[list[
 
 
 def _noise(ratio: Floats) -> Floats:
-    """Noise of one recording in each bin, from how far a bin lies from the middle of its neighbours."""
+    """Noise of one recording in each bin, from its departure from the mean of its neighbours."""
     filled = np.isfinite(ratio).any(axis=0)
-    known = ratio[:, filled]
+    filled_ratio = ratio[:, filled]
     sigma = np.zeros(ratio.shape[1])
-    if known.shape[1] < 3:
+    if filled_ratio.shape[1] < 3:
         return sigma
-    bend = np.abs(known[:, 1:-1] - (known[:, :-2] + known[:, 2:]) / 2)
-    bend = bend[np.isfinite(bend).all(axis=1)]
-    if len(bend) == 0:
+    departure = np.abs(filled_ratio[:, 1:-1] - (filled_ratio[:, :-2] + filled_ratio[:, 2:]) / 2)
+    departure = departure[np.isfinite(departure).all(axis=1)]
+    if len(departure) == 0:
         return sigma
-    inner = 1.4826 * np.median(bend, axis=0) / np.sqrt(1.5)
+    inner = 1.4826 * np.median(departure, axis=0) / np.sqrt(1.5)
     inner = median_filter(inner, 3, mode="nearest")
     sigma[filled] = np.concatenate([inner[:1], inner, inner[-1:]])
     return sigma
@@ -393,23 +381,23 @@ def _is_flat(log_frequency: Floats, curves: Floats, noise: Floats, slope: float)
 
 
 _FEWEST_BINS = 6
-_CORNERS = 60  # of each filter, that are tried
-_BELOW, _ABOVE = 30.0, 10.0  # times the band's ends: how far off corners are tried
+_CORNERS = 60  # corner frequencies tried for each filter
+_BELOW, _ABOVE = 30.0, 10.0  # range of corner frequencies, as factors on the ends of the band
 _LOW_PASSES = ((1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (1, 4))  # k and m: Butterworth's of order k, m times in a row
-_ONE_POLE = (1, 1)
+_FIRST_ORDER = (1, 1)
 _SLOPES = np.linspace(0.0, STEEPEST, 6)
 _LEAST_NOISE = 0.003  # of a bin's magnitude
-_SEVERAL, _USUAL_NOISE = 4, 0.02  # lines of a bin that tell their scatter, and one where none does
+_SEVERAL, _USUAL_NOISE = 4, 0.02  # lines of a bin that determine its scatter, and the default scatter
 _LIFTED = 1.05  # of the plateau: a resonance
-_LEAST_SHARE = 0.02  # of the plateau, that is worth saying
-_SPEAKS = 25.0  # χ² that a filter must explain
-_EXPLAINED = 0.2  # of the rms about a plateau, that may be left
+_LEAST_SHARE = 0.02  # least reported loss, of the plateau
+_SPEAKS = 25.0  # least reduction of χ² by a filter
+_EXPLAINED = 0.2  # largest remaining rms, of that about a plateau
 
 
 @dataclass(frozen=True)
 class RollOff:
-    """The corners [Hz] of the filters, 0 and ∞ where there is none, and by how much the band's level lies below the
-    plateau, as a share of that."""
+    """The corner frequencies [Hz] of the filters, 0 and ∞ without one, and the loss of the band's level relative to
+    the plateau."""
 
     high_pass_hz: float
     low_pass_hz: float
@@ -417,8 +405,8 @@ class RollOff:
 
 
 def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff | None:
-    """The filters that the band lies behind; None where it reaches their plateau. `level` (recordings,) is the average
-    over the zone [C/N]."""
+    """The filters that attenuate the band; None where it reaches their plateau. `level` (recordings,): the average over
+    the zone [C/N]."""
     frequency, magnitude, noise = _curve(stacks, level)
     inside = (frequency >= zone.low_hz) & (frequency <= zone.high_hz)
     lifted = np.flatnonzero(magnitude > _LIFTED * np.median(magnitude[inside])) if inside.any() else np.zeros(0, int)
@@ -434,12 +422,12 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
         return None
     highs = [0.0, *np.geomspace(frequency[0] / _BELOW, frequency[end - 1] * _ABOVE, _CORNERS).tolist()]
     lows = [np.inf, *np.geomspace(frequency[0] / _ABOVE, frequency[end - 1] * _BELOW, _CORNERS).tolist()]
-    single = [(high, np.inf, _ONE_POLE) for high in highs] + [
+    single = [(high, np.inf, _FIRST_ORDER) for high in highs] + [
         (0.0, low, order) for low in lows for order in _LOW_PASSES
     ]
-    best = min(single, key=lambda one: _fitted(x, y, weight, *one)[0])
-    in_order = [(high, low, _ONE_POLE) for high, low in product(highs[1::2], lows[1::2]) if high < low]
-    both = min(in_order, key=lambda one: _fitted(x, y, weight, *one)[0])
+    best = min(single, key=lambda corners: _fitted(x, y, weight, *corners)[0])
+    in_order = [(high, low, _FIRST_ORDER) for high, low in product(highs[1::2], lows[1::2]) if high < low]
+    both = min(in_order, key=lambda corners: _fitted(x, y, weight, *corners)[0])
     if _fitted(x, y, weight, *best)[0] - _fitted(x, y, weight, *both)[0] > _SPEAKS:
         best = both
     misfit, plateau = _fitted(x, y, weight, *best)
@@ -448,16 +436,16 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
     return RollOff(best[0], best[1], share) if is_explained and share >= _LEAST_SHARE else None
 
 
-def _falls_after(magnitude: Floats, place: int) -> bool:
-    """Whether the magnitude has a peak beyond a place rather than a plateau."""
-    return bool(magnitude[-1] < 0.8 * magnitude[place:].max())
+def _falls_after(magnitude: Floats, index: int) -> bool:
+    """Whether the magnitude has a peak, not a plateau, from `index` on."""
+    return bool(magnitude[-1] < 0.8 * magnitude[index:].max())
 
 
 def _fitted(
-    x: Floats, y: Floats, weight: Floats, high: float, low: float, kind: tuple[int, int] = _ONE_POLE
+    x: Floats, y: Floats, weight: Floats, high: float, low: float, kind: tuple[int, int] = _FIRST_ORDER
 ) -> tuple[float, float]:
     """χ² of the best plateau and slope with these corners and this kind of low-pass (k, m), and the logarithm of the
-    plateau where the slope is that of none: at the band's middle."""
+    plateau at the middle of the band, where the slope has no effect."""
     frequency = np.exp(x)
     order, times = kind
     filters = -0.5 * (np.log1p((high / frequency) ** 2) + times * np.log1p((frequency / low) ** (2 * order)))
@@ -469,36 +457,36 @@ def _fitted(
 
 
 def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of bins of equal width in ln f that hold lines with a magnitude: the middle [Hz], the median over recordings of
-    the magnitude over their level, and its relative noise."""
+    """For non-empty bins of equal width in ln f: the middle [Hz], the median over recordings of the magnitude over
+    their level, and its relative noise."""
     lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
     edges = edges_over(np.unique(np.concatenate(lines)))
     ratios: list[list[float]] = [[] for _ in edges[1:]]
-    spreads: list[list[tuple[float, int]]] = [[] for _ in edges[1:]]
+    bin_scatters: list[list[tuple[float, int]]] = [[] for _ in edges[1:]]
     for stack in stacks:
         bins = bin_of(stack.frequency, edges)
         for row, number in enumerate(stack.rows.tolist()):
             if not (np.isfinite(level[number]) and level[number] != 0):
                 continue
             size = np.abs(stack.values[row]) / abs(level[number])
-            for place in np.unique(bins[stack.used[row]]).tolist():
-                of_bin = size[stack.used[row] & (bins == place)]
-                ratios[place].append(float(np.median(of_bin)))
-                spreads[place].append((float(np.std(of_bin)), len(of_bin)))
-    known = [place for place, of_bin in enumerate(ratios) if of_bin and np.median(of_bin) > 0]
-    middle = np.sqrt(edges[1:] * edges[:-1])[known]
-    magnitude = np.array([float(np.median(ratios[place])) for place in known])
-    several = [deviation for of_bin in spreads for deviation, count in of_bin if count >= _SEVERAL]
+            for bin_index in np.unique(bins[stack.used[row]]).tolist():
+                of_bin = size[stack.used[row] & (bins == bin_index)]
+                ratios[bin_index].append(float(np.median(of_bin)))
+                bin_scatters[bin_index].append((float(np.std(of_bin)), len(of_bin)))
+    filled_bins = [bin_index for bin_index, of_bin in enumerate(ratios) if of_bin and np.median(of_bin) > 0]
+    middle = np.sqrt(edges[1:] * edges[:-1])[filled_bins]
+    magnitude = np.array([float(np.median(ratios[bin_index])) for bin_index in filled_bins])
+    several = [deviation for of_bin in bin_scatters for deviation, count in of_bin if count >= _SEVERAL]
     usual = float(np.median(several)) if several else _USUAL_NOISE
-    noise = np.array([_noise_of(spreads[place], usual) for place in known])
+    noise = np.array([_noise_of(bin_scatters[bin_index], usual) for bin_index in filled_bins])
     return middle, magnitude, np.maximum(noise / magnitude, _LEAST_NOISE)
 
 
-def _noise_of(spreads: Sequence[tuple[float, int]], usual: float) -> float:
-    """Of a median over recordings, by the standard deviation and number of their lines in a bin; a bin of few lines has
-    the `usual` deviation at least."""
-    each = [max(deviation, usual if count < _SEVERAL else 0.0) / count**0.5 for deviation, count in spreads]
-    return 1.25 * float(np.median(each)) / len(each) ** 0.5
+def _noise_of(bin_scatters: Sequence[tuple[float, int]], usual: float) -> float:
+    """The noise of a median over recordings from the standard deviations and numbers of their lines in a bin; with few
+    lines at least the `usual` deviation."""
+    errors = [max(deviation, usual if count < _SEVERAL else 0.0) / count**0.5 for deviation, count in bin_scatters]
+    return 1.25 * float(np.median(errors)) / len(errors) ** 0.5
 
 
 _HALVES_BEYOND_NOISE = 3.0
@@ -507,7 +495,7 @@ _OF_A_MEDIAN = 1.25  # its standard error over that of a mean
 
 
 def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Floats) -> str:
-    """In words, by how much d33 would differ if it were of the zone's lower half, in log f; empty within the noise.
+    """The difference of d33 over the lower half of the zone, in log f, in words; empty within the noise.
 
     A contact resonance above the zone raises its upper end first, and a high-pass lowers its lower end. `level` and
     `noise` (recordings,) are those of the whole zone, as `band_average` has them.
@@ -515,16 +503,16 @@ def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Fl
     half = replace(zone, high_hz=float(np.sqrt(zone.low_hz * zone.high_hz)))
     lower, lower_noise, _ = band_average(stacks, half)
     with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
-        change, unsure = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)
-    known = np.isfinite(change) & np.isfinite(unsure)
-    if not known.any():
+        change, relative_noise = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)
+    valid = np.isfinite(change) & np.isfinite(relative_noise)
+    if not valid.any():
         return ""
-    typical = float(np.median(change[known]))
-    by_noise = _OF_A_MEDIAN * float(np.median(unsure[known])) / np.sqrt(known.sum())
+    typical = float(np.median(change[valid]))
+    by_noise = _OF_A_MEDIAN * float(np.median(relative_noise[valid])) / np.sqrt(valid.sum())
     if abs(typical) < max(_HALVES_BEYOND_NOISE * by_noise, _LEAST_CHANGE):
         return ""
-    way = "higher" if typical > 0 else "lower"
-    return f"; averaged over its lower half alone, d33 would be {100 * abs(typical):.1f} % {way}"
+    direction = "higher" if typical > 0 else "lower"
+    return f"; averaged over its lower half alone, d33 would be {100 * abs(typical):.1f} % {direction}"
 
 
 MOST_LINES = 240  # of one recording
@@ -556,7 +544,7 @@ class FrfSpread:
 
 
 def lines_of(name: str, frf: Frf) -> FrfLines:
-    """A recording's lines, thinned to MOST_LINES: of each bin those of the smallest and the largest magnitude."""
+    """A recording's lines, thinned to MOST_LINES: the smallest and the largest magnitude of each bin."""
     (stack,) = stacked([frf])
     stack = _of_sines(stack.at(stack.frequency > 0))
     magnitude, phase = _polar(stack.values[0])
@@ -565,26 +553,26 @@ def lines_of(name: str, frf: Frf) -> FrfLines:
 
 
 def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpread]:
-    """The spread over the recordings of each condition, by indenter and preload; one more for each grid of lines."""
-    every = []
+    """The spread over the recordings of each condition (indenter and preload), separately for each grid of lines."""
+    bands = []
     keys = np.array(conditions)
-    for whole in stacked(frfs):
-        stack = _of_sines(whole.at(whole.frequency > 0))
+    for grid in stacked(frfs):
+        stack = _of_sines(grid.at(grid.frequency > 0))
         for condition in np.unique(keys[stack.rows], axis=0):
-            alike = (keys[stack.rows] == condition).all(axis=1)
-            every.append(_spread(stack, alike, condition))
-    return sorted(every, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
+            of_condition = (keys[stack.rows] == condition).all(axis=1)
+            bands.append(_spread(stack, of_condition, condition))
+    return sorted(bands, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
 
 
-def _spread(stack: Stack, alike: Mask, condition: Floats) -> FrfSpread:
+def _spread(stack: Stack, of_condition: Mask, condition: Floats) -> FrfSpread:
     frequency, start = _bins(stack.frequency, MOST_BINS)
-    magnitude, phase = _polar(stack.values[alike])
-    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[alike])]
-    return FrfSpread(float(condition[0]), float(condition[1]), int(alike.sum()), frequency, *columns)
+    magnitude, phase = _polar(stack.values[of_condition])
+    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[of_condition])]
+    return FrfSpread(float(condition[0]), float(condition[1]), int(of_condition.sum()), frequency, *columns)
 
 
 def _of_sines(stack: Stack) -> Stack:
-    """Where the force excited fewer than half of the lines from its first to its last, those; else all lines."""
+    """The excited lines where they are fewer than half of those from the first to the last; else all lines."""
     if len(stack.frequency) < 2:
         return stack
     excited = excited_lines([stack], stack.frequency)

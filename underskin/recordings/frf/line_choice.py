@@ -1,51 +1,37 @@
-"""Which lines of an estimated FRF count.
+"""Which lines of an estimated FRF count, and the bias of its estimator by noise.
 
-Where mains put charge on the leads of a sensor: at their frequency and its harmonics.
+Excitation. Lines are gathered in bins of equal width in log f. Those of a bin with a low median coherence γ² were not
+excited, except single lines with a high one: a force of a few sines excites one line in many.
 
-Which lines of FRFs the force excited: those at which the charge follows it, as the coherence tells.
+Mains on the charge. Where mains are not synchronous with the force, the incoherent power of the charge, 1 − γ², stands
+out at their multiples. Where they are synchronous (both start together), γ² shows nothing; then one line of the FRF
+departs from its neighbours by the charge of the mains over the force, and no law of a skin is as narrow as one line.
+Outside the band of such a force, power of the charge beyond the response to the force counts.
 
-Lines are gathered in bins of equal width in log f. Those of a bin whose median coherence is low were not excited, but
-for the few among them whose own is high: a force of a few sines excites one line in many.
-
-Mains on the charge of a time series: how much, and the lines that they spoil.
-
-Where mains are not synchronous with the force, the part of the charge that is not coherent with it, 1 − γ² of its
-power, stands out at their multiples. Where they are synchronous, because both start anew together, charge is coherent
-with force there all the same and γ² shows nothing. Then only the FRF does: one line is off the course of its
-neighbours, by the charge of the mains over the force at this line. No law of a skin is as narrow as one line. Outside
-the band of such a force, power of the charge beyond the response to the force counts.
-
-Noise in the channels of force and charge, and what it makes of an FRF: an error-in-variables estimate.
-
-With white noise of power m in the force and k in the charge, uncorrelated with all else, each line has (Bendat and
-Piersol, Random Data, chapters 6 and 7)
+Bias by noise (errors in variables). With white noise of power m in the force and k in the charge, uncorrelated with all
+else, each line has (Bendat and Piersol, Random Data, chapters 6 and 7)
     γ² = (1 − m/S_ff) (1 − k/S_qq)    H1 = H (1 − m/S_ff)    H2 = H/(1 − k/S_qq).
-m and k are no larger than the least of S_ff and S_qq over the lines, and of many lines with different S_ff and S_qq γ²
-tells which is which: where the force was not excited S_ff is m itself. Both have a uniform prior up to these bounds.
-The FRF is then the total least-squares line with κ = k/m, and what the posterior leaves open is in its uncertainty; H2,
-which somebody chose who knows the force to be noisy, is H2 (1 − k/S_qq). Where the lines' loss of coherence is more
-than white noise explains (a disturbance inside the band), it may lie in either channel, so that H lies from H1 to H2.
+m and k are at most the least S_ff and S_qq over the lines; lines of different S_ff and S_qq separate them: where the
+force was not excited, S_ff is m itself. Both have a uniform prior up to these bounds. The FRF is the total
+least-squares line with κ = k/m, and the posterior's width enters its uncertainty; H2, chosen where the force is known
+to be noisy, is H2 (1 − k/S_qq). A loss of coherence beyond white noise (a disturbance inside the band) may lie in
+either channel, so that H lies between H1 and H2.
 
-Which lines of an FRF say something of the response, for d33 and for a diagnosis alike.
-
-Of the FRF of a time series:
-- Lines where the force has little power (outside the excited band, between the lines of a periodic sweep) are idle:
-  less than a 25th of the power of those lines that hold most of it (the noise of an FRF goes as 1/√power), or less than
-  is expected to give a relative standard uncertainty √((1 − γ²)/(2nγ²)) below a fifth. They are used where charge
-  follows force well all the same: to a twentieth, to five times the best, and not by chance. The expected uncertainty
-  decides, since choosing by the observed one would prefer lines that came out too large.
-- So are lines where the force has power, but none that the charge follows: its own noise, or a disturbance. There γ² of
-  the lines around tells the uncertainty to be expected, for the same reason.
-- Lines that mains spoil are left out.
-- The two lines next to 0 Hz are left out where enough others remain: the straight line removed from each block is a
-  part of them and the window mixes them with 0 Hz, so that their FRF is wrong beside the high-pass of an amplifier.
-- Of a force that acts once (a single sweep or blow) hardly more than one block holds a line, which the taper cuts
-  short where a sweep begins: the first sixteen lines are left out, but not more than half. Lines of a periodic force
-  have none of this.
-What is left is without the bias that noise of the force or the charge gives its estimator.
-
-Of FRFs that were imported, with γ², the lines that the force did not excite in most recordings are idle (`excitation`),
-and so are those that are exactly 0.
+Lines used for d33 and for a diagnosis, of the FRF of a time series:
+- Idle lines have little force power (outside the band, or between the lines of a periodic sweep): below 1/25 of the
+  power of the lines that hold most of it (the noise of an FRF goes as 1/√power), or below what gives an expected
+  relative standard uncertainty √((1 − γ²)/(2nγ²)) of 1/5. They are used where charge follows force well all the same:
+  an uncertainty below 1/20 and below five times the best, and not by chance. The expected uncertainty decides, since
+  the observed one would select lines that came out too large.
+- Lines with force power that the charge does not follow (noise, a disturbance) are idle too; γ² of the lines around
+  gives their expected uncertainty, for the same reason.
+- Lines near mains are left out.
+- The two lines next to 0 Hz are left out where enough others remain: the straight line removed from each block is part
+  of them, and the window mixes them with 0 Hz.
+- With a force that acts once (a single sweep or blow) hardly more than one block holds a line, and the taper cuts the
+  start of a sweep: the first sixteen lines are left out, at most half. Lines of a periodic force are unaffected.
+The rest is corrected for the bias of the estimator. For imported FRFs with γ², lines that the force did not excite in
+most recordings, and lines that are exactly 0, are idle.
 """
 
 from collections.abc import Sequence
@@ -64,8 +50,8 @@ HARMONIC_WIDTH_HZ = 3.0  # from a harmonic: windows and the drift of mains make 
 
 
 _BINS_PER_DECADE = 12
-_LEAST_COHERENCE = 0.5  # of bins whose lines count as excited
-_CLEAR_COHERENCE = 0.9  # of a line that does among others that do not: noise alone hardly reaches it
+_LEAST_COHERENCE = 0.5  # least median γ² of a bin whose lines count as excited
+_CLEAR_COHERENCE = 0.9  # least γ² of an excited line in another bin: noise alone hardly reaches it
 
 
 def excited_lines(stacks: Sequence[Stack], frequencies: Floats) -> Mask:
@@ -81,14 +67,16 @@ def excited_lines(stacks: Sequence[Stack], frequencies: Floats) -> Mask:
     Returns
     -------
     (lines,) mask
-        By the median γ² of a line's bin, or clearly by that of its own; also where none is known, and at all lines
-        where it follows at none. Of an even number of γ² the lower middle one counts: a bin of which half was excited
-        is judged line by line.
+        By the median γ² of a line's bin, or its own median γ² where that is high; True where γ² is not known, and at
+        all lines where no line is excited. The lower median is used: a half-excited bin is judged line by line.
     """
     line = np.concatenate(
-        [np.broadcast_to(np.searchsorted(frequencies, one.frequency), one.coherence.shape).ravel() for one in stacks]
+        [
+            np.broadcast_to(np.searchsorted(frequencies, stack.frequency), stack.coherence.shape).ravel()
+            for stack in stacks
+        ]
     )
-    coherence = np.concatenate([one.coherence.ravel() for one in stacks])
+    coherence = np.concatenate([stack.coherence.ravel() for stack in stacks])
     line, coherence = line[np.isfinite(coherence)], coherence[np.isfinite(coherence)]
     edges = edges_over(frequencies)
     bins = bin_of(frequencies, edges)
@@ -105,31 +93,31 @@ def edges_over(frequencies: Floats) -> Floats:
 
 
 def bin_of(frequency: Floats, edges: Floats) -> Indices:
-    """The number of each frequency's bin, of the same shape."""
+    """The index of each frequency's bin, of the same shape."""
     return np.asarray(np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2))
 
 
 def _lower_medians(group: Indices, values: Floats, groups: int) -> Floats:
-    """The lower median of the values of each group (groups,); NaN of those without any."""
+    """The lower median of the values of each group (groups,); NaN for an empty one."""
     medians = np.full(groups, np.nan)
     order = np.argsort(group, kind="stable")
-    known, first = np.unique(group[order], return_index=True)
+    filled, first = np.unique(group[order], return_index=True)
     parts = np.split(values[order], first[1:])
-    medians[known] = [np.sort(part)[(len(part) - 1) // 2] for part in parts] if len(known) else []
+    medians[filled] = [np.sort(part)[(len(part) - 1) // 2] for part in parts] if len(filled) else []
     return medians
 
 
-_BETWEEN, _AROUND = 2.5, 12.5  # lines from a multiple of the mains: what is usual there
+_BETWEEN, _AROUND = 2.5, 12.5  # distances in lines from a multiple of the mains: the neighbourhood compared with it
 _LEAST_AROUND = 10
-_RESPONSE = 4.0  # times the power that the usual FRF gives: a response to the force
+_RESPONSE = 4.0  # times the power by the median FRF: up to it a response to the force
 _STANDS_OUT = 25.0  # times the median around; a line's noise reaches that once in a million
-_SPREAD = 3.0  # lines to each side that the window of neighbouring lines spreads mains over
+_SPREAD = 3.0  # lines to each side over which the window spreads mains
 
 
 @dataclass(frozen=True)
 class MainsOnCharge:
     """Mains at `mains_hz`: the largest `charge` at one of their multiples (peak) [C], and the lines near any multiple,
-    which they may have `spoilt` (lines,)."""
+    `spoilt` (lines,)."""
 
     mains_hz: float
     charge: float
@@ -138,8 +126,8 @@ class MainsOnCharge:
 
 @dataclass(frozen=True)
 class _Indicator:
-    """A quantity of each line (lines,) that mains raise: its `value`, the `power` of charge [C²] that it stands for,
-    and what `noise` alone makes of it."""
+    """A quantity of each line (lines,) that mains raise: its `value`, the equivalent `power` of charge [C²], and its
+    value for `noise` alone."""
 
     value: Floats
     power: Floats
@@ -149,8 +137,8 @@ class _Indicator:
 def mains_on_charge(measured: Frf, powerful: Mask) -> MainsOnCharge | None:
     """The mains at a multiple of which the charge stands out and the force does not.
 
-    None where there are none, or the lines are too coarse to distinguish 50 from 60 Hz. `powerful` (lines,) are the
-    lines where the force has its power.
+    None without mains, or where the lines are too coarse to distinguish 50 from 60 Hz. `powerful` (lines,): the lines
+    where the force has its power.
     """
     assert measured.coherence is not None
     assert measured.force_power is not None
@@ -163,16 +151,18 @@ def mains_on_charge(measured: Frf, powerful: Mask) -> MainsOnCharge | None:
         beyond = np.where(measured.charge_power < response, incoherent, measured.charge_power)
         outside = np.where(powerful, 0.0, beyond)
         indicators += [
-            _Indicator(*_off_course(measured, np.flatnonzero(powerful)), noise=incoherent / measured.averages),
+            _Indicator(
+                *_departure_from_neighbours(measured, np.flatnonzero(powerful)), noise=incoherent / measured.averages
+            ),
             _Indicator(outside, outside, incoherent),
         ]
     candidates = [_of_mains(measured, mains, indicators) for mains in MAINS_HZ]
-    outstanding, strongest = max(candidates, key=lambda one: one[0])
+    outstanding, strongest = max(candidates, key=lambda candidate: candidate[0])
     return strongest if outstanding >= _STANDS_OUT else None
 
 
 def _of_mains(measured: Frf, mains: float, indicators: Sequence[_Indicator]) -> tuple[float, MainsOnCharge]:
-    """The largest indicator at a multiple of the mains over what is usual around it, and the lines that are spoilt."""
+    """The largest ratio of an indicator at a multiple of the mains to its neighbourhood, and the spoilt lines."""
     assert measured.force_power is not None
     spacing = measured.frequency[0]
     at, spread = (0.999, 0.999) if measured.independent else (1.0, _SPREAD)
@@ -184,66 +174,64 @@ def _of_mains(measured: Frf, mains: float, indicators: Sequence[_Indicator]) -> 
         if not near.any() or not around.any() or (_BETWEEN * spacing >= np.ptp(MAINS_HZ) and away.min() > 0.01):
             continue
         of_force = max(float(measured.force_power[near].max() / np.median(measured.force_power[around])), 1.0)
-        outstanding = max(_over_usual(one, near, around) for one in indicators) / of_force
+        outstanding = max(_over_usual(indicator, near, around) for indicator in indicators) / of_force
         if outstanding >= _STANDS_OUT:
-            power = max([power, *(float(one.power[near].max()) for one in indicators)])
+            power = max([power, *(float(indicator.power[near].max()) for indicator in indicators)])
         highest = max(highest, outstanding)
     return highest, MainsOnCharge(mains, float(np.sqrt(power)), spoilt)
 
 
 def _over_usual(indicator: _Indicator, near: Mask, around: Mask) -> float:
-    """The largest near a multiple over its median around, or over that of its noise; 0 where too few lines have it."""
+    """The largest value near a multiple over the median around, or over that of its noise; 0 with too few lines."""
     usual = indicator.value[around & (indicator.value > 0)]
     if len(usual) < _LEAST_AROUND:
         return 0.0
     return float(indicator.value[near].max() / max(np.median(usual), np.median(indicator.noise[around])))
 
 
-def _off_course(measured: Frf, rows: Indices) -> tuple[Floats, Floats]:
-    """How far each of these lines is off what the two to each side of it predict, as powers of charge [C²].
+def _departure_from_neighbours(measured: Frf, rows: Indices) -> tuple[Floats, Floats]:
+    """The departure of each of these lines from the prediction by its two neighbours on each side, as power of charge
+    [C²]: if shared by all five lines, and if of the middle line alone; 0 at the other lines.
 
-    First the power that each of the five lines would need for that, then that which the line would need alone; 0 at the
-    other lines.
-
-    Expected is the cubic through the four, or where that is nearer, what a single pole (a resonance) leaves between
-    them: the quotient of a parabola and 1 + px, whose p makes the third divided difference of y (1 + px) vanish.
+    The prediction is the cubic through the four neighbours or, where nearer, a single pole (a resonance): the quotient
+    of a parabola and 1 + px, whose p makes the third divided difference of y (1 + px) vanish.
     """
     assert measured.force_power is not None
-    of_all, alone = np.zeros((2, len(measured.frequency)))
+    of_all, of_middle = np.zeros((2, len(measured.frequency)))
     if len(rows) > 4:
         middle = rows[2:-2]
-        beside = np.stack([rows[n : len(rows) - 4 + n] for n in (0, 1, 3, 4)])
-        x = (measured.frequency[beside] - measured.frequency[middle]) / measured.frequency[0]
+        neighbours = np.stack([rows[n : len(rows) - 4 + n] for n in (0, 1, 3, 4)])
+        x = (measured.frequency[neighbours] - measured.frequency[middle]) / measured.frequency[0]
         difference = 1 / np.stack([np.prod(x[n] - np.delete(x, n, axis=0), axis=0) for n in range(4)])
         weight = -np.prod(x, axis=0) * difference / x  # Lagrange's, at the middle
-        values, noise = measured.values[beside], 1 / measured.force_power
+        values, noise = measured.values[neighbours], 1 / measured.force_power
         below = (difference * values * x).sum(axis=0)
         pole = -(difference * values).sum(axis=0) / np.where(below == 0, np.inf, below)
         cubic = (weight * values).sum(axis=0)
         off = measured.values[middle] - np.stack([cubic, cubic + pole * (weight * values * x).sum(axis=0)])
         square = np.min(np.abs(off) ** 2, axis=0)
-        of_all[middle] = square / (noise[middle] + (weight**2 * noise[beside]).sum(axis=0))
-        alone[middle] = square / noise[middle]
-    return of_all, alone
+        of_all[middle] = square / (noise[middle] + (weight**2 * noise[neighbours]).sum(axis=0))
+        of_middle[middle] = square / noise[middle]
+    return of_all, of_middle
 
 
-_LEAST_LOSS = 2e-3  # 1 − γ² of the lines that are used: below, H1 and H2 differ by less
+_LEAST_LOSS = 2e-3  # 1 − γ² of the used lines: below it H1 and H2 differ by less
 _FEWEST_LINES, _FEWEST_AVERAGES = 16, 3.0
-_NODES = 33  # of each noise's share of its bound
-_WORST = 0.9  # of a line's power, that may be taken for noise
-_MODEL = 5e-3  # of γ², that leakage and other defects of an estimate make
-_CORRELATED = 2.0  # neighbouring lines of Hann's window that tell as much as one
+_NODES = 33  # grid nodes of each noise power, from 0 to its bound
+_WORST = 0.9  # largest share of a line's power that may be noise
+_MODEL = 5e-3  # error of γ² by leakage and other defects of an estimate
+_CORRELATED = 2.0  # neighbouring lines of Hann's window that carry the information of one
 _TINY = float(np.finfo(float).tiny)
-_TOGETHER = 16  # lines
-_MARGIN = 1.3  # that a group's power may lie below its mean: three standard deviations of 8 blocks and 16 lines
-_WORTH_SAYING = 0.01  # of the FRF
+_TOGETHER = 16  # lines of a group
+_MARGIN = 1.3  # mean over power of a group: three standard deviations with 8 blocks and 16 lines
+_WORTH_SAYING = 0.01  # least reported bias, relative
 
 
 def without_noise_bias(measured: Frf, used: Mask) -> Frf:
-    """The FRF without the bias by noise of its estimator, which was `bias`, and the uncertainty `bias_unsure` that is
-    left, both of the lines that are `used` (lines,).
+    """The FRF corrected for the `bias` of its estimator by noise, with the remaining uncertainty `bias_unsure`, both
+    for the `used` lines (lines,).
 
-    As it is where their coherence is nearly 1, or where power or γ² is not known.
+    Unchanged where their coherence is nearly 1, or where power or γ² is not known.
     """
     force, charge, coherence, averages = (
         measured.force_power, measured.charge_power, measured.coherence, measured.averages
@@ -251,9 +239,9 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
     if force is None or charge is None or coherence is None or averages is None or measured.passes is None:
         return measured
     count = np.minimum(averages, measured.passes)
-    known = np.isfinite(coherence) & (force > 0) & (charge > 0) & (count > 1)
-    used = used & known
-    if used.sum() < 1 or known.sum() < _FEWEST_LINES or float(np.median(averages)) < _FEWEST_AVERAGES:
+    valid = np.isfinite(coherence) & (force > 0) & (charge > 0) & (count > 1)
+    used = used & valid
+    if used.sum() < 1 or valid.sum() < _FEWEST_LINES or float(np.median(averages)) < _FEWEST_AVERAGES:
         return measured
     weight = information(expected_coherence(coherence[used]))
     weight /= weight.sum()
@@ -261,7 +249,7 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
     loss = float(weight @ (1 - true_coherence[used]))
     if loss < _LEAST_LOSS:
         return measured
-    noise = _posterior(force, charge, coherence, count, _groups(used, known))
+    noise = _posterior(force, charge, coherence, count, _groups(used, valid))
     in_force = np.minimum(noise.force / force, _WORST)
     in_charge = np.minimum(noise.charge / charge, _WORST)
     if measured.estimator == "H2":
@@ -273,16 +261,16 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
         size = _total_least_squares(force, charge, coherence, noise)
         sensitive = noise.force_sd / force
     raw = np.abs(measured.values)
-    factor = np.where(known & (raw > 0), size / np.where(raw > 0, raw, 1.0), 1.0)
+    factor = np.where(valid & (raw > 0), size / np.where(raw > 0, raw, 1.0), 1.0)
     explained = float(weight @ (1 - (1 - in_force[used]) * (1 - in_charge[used])))
     unexplained = max(loss - explained, 0.0)
-    unsure = float(np.hypot(weight @ sensitive[used], unexplained / np.sqrt(3.0)))
+    uncertainty = float(np.hypot(weight @ sensitive[used], unexplained / np.sqrt(3.0)))
     bias = float(weight @ (1 / factor[used] - 1))
-    return replace(measured, values=measured.values * factor, bias=bias, bias_unsure=unsure)
+    return replace(measured, values=measured.values * factor, bias=bias, bias_unsure=uncertainty)
 
 
 def _total_least_squares(force: Floats, charge: Floats, coherence: Floats, noise: "_Noise") -> Floats:
-    """|FRF| of the line through (F, Q), whose noise has these powers: Hv of `estimators` with κ = k/m known, which is
+    """|FRF| by total least squares of (F, Q) with these noise powers: Hv of `estimators` with known κ = k/m, which is
     H1 for m = 0 and H2 for k = 0."""
     unit_force, unit_charge = float(force.max()), float(charge.max())  # N²/Hz, C²/Hz: their squares underflow
     force, charge = force / unit_force, charge / unit_charge
@@ -296,7 +284,7 @@ def _total_least_squares(force: Floats, charge: Floats, coherence: Floats, noise
 
 
 class _Noise:
-    """Means and standard deviations of the powers of noise."""
+    """Posterior means and standard deviations of the noise powers."""
 
     def __init__(self, force: Floats, charge: Floats, weight: Floats) -> None:
         of_force, of_charge = weight.sum(axis=1), weight.sum(axis=0)
@@ -306,18 +294,18 @@ class _Noise:
 
 
 def _posterior(force: Floats, charge: Floats, coherence: Floats, count: Floats, groups: Sequence[Indices]) -> _Noise:
-    """That of the noise of both channels, from powers, γ² as estimated and the number of blocks of lines (lines,), on a
-    grid up to the least power that any group of lines has and the least share of it that its loss of coherence allows.
+    """The posterior of the noise powers of both channels from powers, estimated γ² and numbers of blocks (lines,).
 
-    Over the lines of a group γ² is Σ |S_fq|²/Σ S_ff S_qq. Of n blocks the expected sums are those of the spectra times
+    The grid ends at the least power of any group of lines, or the share of it that its loss of coherence allows. Over
+    the lines of a group γ² is Σ |S_fq|²/Σ S_ff S_qq; for n blocks the expected sums are those of the spectra times
     γ² + 1/n and 1 + γ²/n.
     """
     product = force * charge
-    sums = np.array([[part[own].sum() for part in (product, coherence * product, force, charge)] for own in groups])
-    lines = np.array([len(own) for own in groups])
-    blocks = np.array([float(np.mean(count[own])) for own in groups])
-    seen = sums[:, 1] / sums[:, 0]
-    true = np.clip((seen - 1 / blocks) / (1 - seen / blocks), 0.0, 1.0)
+    sums = np.array([[part[group].sum() for part in (product, coherence * product, force, charge)] for group in groups])
+    lines = np.array([len(group) for group in groups])
+    blocks = np.array([float(np.mean(count[group])) for group in groups])
+    estimated = sums[:, 1] / sums[:, 0]
+    true = np.clip((estimated - 1 / blocks) / (1 - estimated / blocks), 0.0, 1.0)
     inverse_force, inverse_charge = sums[:, 3] / sums[:, 0], sums[:, 2] / sums[:, 0]  # 1/S_ff and 1/S_qq of a group
     independent = np.maximum(lines / _CORRELATED, 1.0)
     variance = (2 * true + 1 / blocks) * (1 - true) ** 2 / (blocks * independent) + _MODEL**2
@@ -337,40 +325,40 @@ def _posterior(force: Floats, charge: Floats, coherence: Floats, count: Floats, 
     return _Noise(shares * most_force, shares * most_charge, weight / weight.sum())
 
 
-def _groups(used: Mask, known: Mask) -> list[Indices]:
-    """Neighbours among the lines that are used, and among the others: powers of single lines are too unsure, and where
-    few lines were excited those beside them have others."""
+def _groups(used: Mask, valid: Mask) -> list[Indices]:
+    """Groups of neighbouring lines, used and other ones apart: powers of single lines are too uncertain, and excited
+    lines have other powers than the lines between them."""
     groups: list[Indices] = []
-    for lines in (np.flatnonzero(used), np.flatnonzero(known & ~used)):
+    for lines in (np.flatnonzero(used), np.flatnonzero(valid & ~used)):
         if len(lines):
             groups += np.array_split(lines, max(1, len(lines) // _TOGETHER))
     return groups
 
 
 def noise_findings(measured: Sequence[Frf]) -> list[Finding]:
-    """What noise made of FRFs, where it is worth saying: of the median recording."""
+    """A finding on the bias of FRFs by noise, for the median recording, where it is large enough."""
     biased = [frf for frf in measured if frf.bias or frf.bias_unsure]
     if 2 * len(biased) <= len(measured):
         return []
-    bias, unsure = (float(np.median([getattr(frf, name) for frf in biased])) for name in ("bias", "bias_unsure"))
-    if max(abs(bias), unsure) < _WORTH_SAYING:
+    bias, uncertainty = (float(np.median([getattr(frf, name) for frf in biased])) for name in ("bias", "bias_unsure"))
+    if max(abs(bias), uncertainty) < _WORTH_SAYING:
         return []
-    arguments = {"percent": 100 * bias, "estimator": biased[0].estimator, "unsure_percent": 100 * unsure}
+    arguments = {"percent": 100 * bias, "estimator": biased[0].estimator, "unsure_percent": 100 * uncertainty}
     return [Finding(Reason.NOISE_IN_FRF, "", "force_n" if biased[0].estimator == "H1" else "charge_pc", arguments)]
 
 
 _UNSURE, _SURE = 0.2, 0.05  # relative uncertainty
-_BESIDE_BEST, _BEST = 5.0, 0.1  # the best: this quantile
+_TIMES_BEST, _BEST = 5.0, 0.1  # times the best uncertainty, which is this quantile
 _BY_CHANCE = 1e-6
-_LEAST_LINES = 8  # so that of a record of few lines all are kept
+_LEAST_LINES = 8  # with fewer lines all are kept
 _BIASED, _BIASED_ONCE = 2, 16  # lines, next to 0 Hz
 _ONCE = 2.0  # passes; noise has half as many as there are blocks
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The `lines` that say something, and those that are `idle`; the `mains` that spoil some; how `uneven` the noise of
-    those lines is; whether the force has each but `once`, and whether neighbours among them share their noise."""
+    """The used `lines` and the `idle` ones; the `mains` that spoil some; the relative noise along the used lines
+    (`uneven`); whether the force acts `once` at each, and whether neighbours share their noise (`shared`)."""
 
     lines: Indices
     idle: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
@@ -381,25 +369,25 @@ class Choice:
 
     @property
     def apart(self) -> Indices:
-        """Places among `lines` of those whose noise is independent.
+        """Indices into `lines` of those with independent noise.
 
-        Neighbouring lines of blocks of noise are correlated (a Hann window's by 4/9; two apart by 1/36): of two
-        neighbours one is used.
+        Neighbouring lines of blocks of noise are correlated (with a Hann window by 4/9; two apart by 1/36): one of two
+        neighbours is used.
         """
         if not self.shared:
             return np.arange(len(self.lines))
-        places: list[int] = []
-        for place, line in enumerate(self.lines.tolist()):
-            if not places or line > self.lines[places[-1]] + 1:
-                places.append(place)
-        return np.array(places, dtype=np.intp)
+        indices: list[int] = []
+        for index, line in enumerate(self.lines.tolist()):
+            if not indices or line > self.lines[indices[-1]] + 1:
+                indices.append(index)
+        return np.array(indices, dtype=np.intp)
 
 
 @dataclass(frozen=True)
 class Usable:
-    """The idle and the used lines of an FRF, without the bias of its estimator, and the choice that was made of all.
+    """The idle and the used lines of an FRF, corrected for the bias of its estimator, and the choice among all lines.
 
-    Where charge follows force at no line all are used, as of a dead sensor, and the choice has none.
+    Where charge follows force at no line, as of a dead sensor, all are used and the choice has none.
     """
 
     frf: Frf
@@ -417,15 +405,15 @@ def usable_lines(measured: Sequence[Frf]) -> list[Usable]:
 
 
 def _excited(imported: Sequence[Frf]) -> dict[bytes, Mask]:
-    """Of each grid of lines those that the force excited."""
-    known = [frf for frf in imported if np.isfinite(frf.frequency).all() and (frf.frequency > 0).all()]
-    every = {frf.frequency.tobytes(): np.ones(len(frf.frequency), dtype=bool) for frf in imported}
-    if not any(np.isfinite(frf.coherence_or_nan).any() for frf in known):
-        return every
-    stacks = stacked(known)
+    """The excited lines of each grid of lines."""
+    valid = [frf for frf in imported if np.isfinite(frf.frequency).all() and (frf.frequency > 0).all()]
+    excited = {frf.frequency.tobytes(): np.ones(len(frf.frequency), dtype=bool) for frf in imported}
+    if not any(np.isfinite(frf.coherence_or_nan).any() for frf in valid):
+        return excited
+    stacks = stacked(valid)
     frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
     followed = frequencies[excited_lines(stacks, frequencies)]
-    return every | {stack.frequency.tobytes(): np.isin(stack.frequency, followed) for stack in stacks}
+    return excited | {stack.frequency.tobytes(): np.isin(stack.frequency, followed) for stack in stacks}
 
 
 def _of_lines(frf: Frf, excited: Mask) -> Usable:
@@ -439,8 +427,8 @@ def _of_series(frf: Frf) -> Usable:
     if not len(choice.lines):
         return Usable(frf, choice)
     used = np.isin(np.arange(len(frf.frequency)), choice.lines)
-    whole = replace(without_noise_bias(frf, used), used=used)
-    return Usable(whole.at(np.sort(np.concatenate([choice.lines, choice.idle]))), choice)
+    corrected = replace(without_noise_bias(frf, used), used=used)
+    return Usable(corrected.at(np.sort(np.concatenate([choice.lines, choice.idle]))), choice)
 
 
 def choose_lines(measured: Frf) -> Choice:
@@ -454,12 +442,12 @@ def choose_lines(measured: Frf) -> Choice:
         return Choice(every if (uncertainty <= _UNSURE).any() else none)
     usual = _usual(force)
     typical = float(np.median(uncertainty[force >= usual]))
-    powerful = force >= usual * np.clip((typical / _UNSURE) ** 2, 1 / _BESIDE_BEST**2, 1.0)
+    powerful = force >= usual * np.clip((typical / _UNSURE) ** 2, 1 / _TIMES_BEST**2, 1.0)
     best = float(np.quantile(uncertainty[powerful], _BEST))
     if best > _UNSURE:
         return Choice(none)
     powerful[powerful] = _expected(measured, powerful) <= _UNSURE
-    powerful |= (uncertainty <= min(_SURE, _BESIDE_BEST * best)) & _beyond_chance(measured)
+    powerful |= (uncertainty <= min(_SURE, _TIMES_BEST * best)) & _beyond_chance(measured)
     if not powerful.any():
         return Choice(none)
     mains = mains_on_charge(measured, powerful)
@@ -467,15 +455,15 @@ def choose_lines(measured: Frf) -> Choice:
     shared = not measured.independent and len(strong) >= _LEAST_LINES
     once = measured.passes is not None and float(np.median(measured.passes[powerful])) < _ONCE
     biased = min(_BIASED_ONCE, len(strong) // 2) if once else _BIASED
-    kept = strong[strong >= biased] if shared else strong
-    if not len(kept):  # mains spoil all, where lines are coarse
+    chosen = strong[strong >= biased] if shared else strong
+    if not len(chosen):  # mains spoil all, where lines are coarse
         return Choice(none, mains=mains)
-    uneven = _uneven(force[kept], uncertainty[kept])
-    return Choice(kept, np.flatnonzero(~powerful & (every >= (biased if shared else 0))), mains, uneven, once, shared)
+    uneven = _uneven(force[chosen], uncertainty[chosen])
+    return Choice(chosen, np.flatnonzero(~powerful & (every >= (biased if shared else 0))), mains, uneven, once, shared)
 
 
 def _expected(measured: Frf, lines: Mask) -> Floats:
-    """The relative uncertainty that γ² of the lines around lets expect of each of these."""
+    """The expected relative uncertainty of each of these lines by γ² of the lines around."""
     assert measured.coherence is not None
     assert measured.averages is not None
     around, count = expected_coherence(measured.coherence[lines]), measured.averages[lines]
@@ -485,21 +473,21 @@ def _expected(measured: Frf, lines: Mask) -> Floats:
 
 
 def _beyond_chance(measured: Frf) -> Mask:
-    """Where noise alone would not give this γ²: of n blocks of it, (1 − γ²)^(n − 1) are larger (Carter 1987)."""
+    """Where noise alone would not give this γ²: for n blocks it is exceeded with (1 − γ²)^(n − 1) (Carter 1987)."""
     assert measured.coherence is not None
     assert measured.averages is not None
     return np.asarray((1 - measured.coherence) ** (measured.averages - 1) < _BY_CHANCE)
 
 
 def _usual(power: Floats) -> float:
-    """The power of lines that hold half of all, at least."""
+    """The least power among the strongest lines that together hold half of the total."""
     falling = np.sort(power)[::-1]
     return float(falling[np.searchsorted(np.cumsum(falling), 0.5 * falling.sum())])
 
 
 def _uneven(force: Floats, uncertainty: Floats) -> Floats:
-    """The lines' noise over its course along frequency. It goes as a power of the force that a line has: −½ where it is
-    noise of the charge, 0 where it is one of the gain."""
+    """The relative noise of lines as a power of their force power: exponent −½ for noise of the charge, 0 for that of
+    the gain."""
     size, noise = np.log(force), np.log(np.maximum(uncertainty, 1e-12))
     size = size - size.mean()
     exponent = float(np.clip(size @ noise / max(size @ size, 1e-12), -0.5, 0.0))

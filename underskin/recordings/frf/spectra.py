@@ -1,25 +1,14 @@
-"""Spectra of time series.
+"""Spectra of time series of force and charge: periods, defects, block averages, stepped sine, and FRFs on common grids.
 
-Periodic forces: a sweep, a burst or noise that begins anew, over and over.
+Periodic forces (a repeated sweep, burst or noise of period T) and their charge have lines at the multiples of 1/T only.
+Hann's window over two periods is exact there: it mixes a line with those half a line away, which are empty (Pintelon
+and Schoukens, System Identification, 2012, chapter 2). A straight-line fit would remove parts of both signals and bias
+the lowest lines; the difference of the means of two periods is drift alone.
 
-Force and charge then have lines at the multiples of 1/T, T the period, and nothing between. Hann's window over two
-periods gives each of them exactly: the window mixes a line with those half a line away alone, which are empty (Pintelon
-and Schoukens, System Identification, 2012, chapter 2). A straight line fitted to a block would take a part of the force
-with it, another one of the charge, and leave their ratio wrong at the lowest lines; the means of the two periods, which
-are equal but for the drift, tell the drift alone.
+Blocks with a defect (overload, held samples, jumps) are left out of the average.
 
-Defects of a sampled signal: overload (clipping), held samples and jumps.
-
-The blocks that a defect touches are left out of the FRF, and the rest is used.
-
-The FRF from spectra averaged over blocks of two signals.
-
-Stepped sine: where the force dwells on a tone, and the complex amplitude of its cycles there.
-
-A step is a run of cycles of one period, seen by its rising crossings of the middle; the frequency is then refined by
-the phase's advance over the step. Amplitude X means x = Re(X e^(iωt)).
-
-FRFs put together where they have the same lines, so that they are worked on at once.
+A step of a stepped sine is a run of cycles of one period between rising crossings of the middle; its frequency is
+refined by the advance of the phase over the step. Amplitude X means x = Re(X e^(iωt)).
 """
 
 from collections.abc import Callable, Sequence
@@ -40,15 +29,15 @@ from underskin.units import Complexes, Floats, Indices, Mask
 
 _FEWEST_PERIODS = 4
 _LEAST_SAMPLES = 16  # of a period
-_PARTS = 8  # of a record: the mean over one is taken for drift where likeness is asked for
-_ALIKE = 0.9  # correlation of one period with each later one
-_AS_GOOD = 0.002  # of the correlation: the shortest of the periods that are as good as the best
-_ROUNDING = 1e-9  # of the force, that a constant one may seem to move by
-_DIP = 0.5  # a correlation below this ends the likeness of neighbouring samples
+_PARTS = 8  # parts of a record whose moving mean is removed as drift
+_ALIKE = 0.9  # least correlation of one period with each later one
+_AS_GOOD = 0.002  # difference of correlations within which the shorter period is chosen
+_ROUNDING = 1e-9  # of the force: smaller variations of a constant one are rounding
+_DIP = 0.5  # correlation below which neighbouring samples are no longer alike
 
 
 def period_of(force: Floats) -> int:
-    """The samples after which a force repeats itself, at least four times in all; 0 where it does not."""
+    """The period of a force in samples, of which there are at least four; 0 without one."""
     samples = len(force)
     longest = samples // _FEWEST_PERIODS
     if longest < _LEAST_SAMPLES:
@@ -84,13 +73,13 @@ def without_drift(blocks: Floats) -> Floats:
 _CLIPPED_RUN = 3  # samples in a row at the extreme value
 _CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1) = 2.4 times the samples of the next
 _HELD_RUN = 5  # samples in a row of one value
-_COARSE = 0.2  # share of samples that equal the one before, above which the levels are coarse
+_COARSE = 0.2  # share of samples equal to the one before, above which the levels are coarse
 _ONE_LEVEL = 1.5
-_BY_CHANCE = 1e-3  # runs as long in the whole signal
+_BY_CHANCE = 1e-3  # expected number of equally long runs in the whole signal
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
-_BLOW, _RINGING = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
-_AS_SHARP = 0.5  # of a jump: the bend at its place in the next period, where a periodic signal begins anew
-_GIVE_OR_TAKE = 2  # samples: a period need not be a whole number of them
+_BLOW, _RINGING = 20.0, 6.0  # kurtosis: 1.5 of a sine, 3 of noise, hundreds of a hammer's blow, tens of its ringing
+_AS_SHARP = 0.5  # of a jump: least second difference a period later, where a periodic signal restarts
+_GIVE_OR_TAKE = 2  # samples, since a period need not be a whole number of them
 _CLEAR = 3.0  # standard deviations from 0
 _LOCAL = 64  # samples that make a neighbourhood
 
@@ -106,10 +95,8 @@ class Defect:
 
 
 def mean_of(force: Floats) -> float | None:
-    """The mean of a force where it is a preload; None where an AC coupling may have removed that.
-
-    Then the mean lies within three standard deviations of 0.
-    """
+    """The mean of a force where it is a preload; None where it lies within three standard deviations of 0, as after an
+    AC coupling."""
     mean, scatter = float(np.mean(force)), float(np.std(force))
     return mean if abs(mean) > _CLEAR * scatter else None
 
@@ -117,8 +104,8 @@ def mean_of(force: Floats) -> float | None:
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
     """Every defect of force and charge.
 
-    Jumps are no defects where the force is a blow that the charge answers, nor where a periodic force, such as a sweep,
-    begins anew: these recur in each period.
+    Jumps are no defects where the force is a blow that the charge follows, nor where a periodic force, such as a sweep,
+    restarts: these recur in each period.
     """
     every = [*defects("force_n", force), *defects("charge_pc", charge)]
     if _kurtosis(force) > _BLOW and _kurtosis(charge) > _RINGING:
@@ -133,14 +120,14 @@ def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
 
 
 def _recurs(signal: Floats, period: int) -> Mask:
-    """Where a signal bends as sharply a period before or after; nowhere without a period."""
-    bend = np.pad(np.abs(np.diff(signal, n=2)), 1)
+    """Where a similarly large second difference occurs a period before or after; nowhere without a period."""
+    curvature = np.pad(np.abs(np.diff(signal, n=2)), 1)
     if not period:
         return np.zeros(len(signal), dtype=bool)
-    around = maximum_filter1d(bend, 2 * _GIVE_OR_TAKE + 1)
+    around = maximum_filter1d(curvature, 2 * _GIVE_OR_TAKE + 1)
     before, after = np.zeros((2, len(signal)))
     before[period:], after[:-period] = around[:-period], around[period:]
-    return np.asarray(np.maximum(before, after) > _AS_SHARP * bend)
+    return np.asarray(np.maximum(before, after) > _AS_SHARP * curvature)
 
 
 def _kurtosis(signal: Floats) -> float:
@@ -186,8 +173,8 @@ def _overload(signal: Floats) -> Mask:
 
 
 def _held(signal: Floats) -> Mask:
-    """Runs of one value that end in more than one level's step (a slow signal turns on one level); where levels are so
-    coarse that neighbours are alike by chance, those that end in a leap."""
+    """Runs of one value that end in a step of more than one level (a slow signal turns on one level); with coarse
+    levels, where neighbours are equal by chance, those that end in a leap."""
     step = np.abs(np.diff(signal))
     same = np.concatenate([[False], step == 0])
     mask = np.zeros(len(signal), dtype=bool)
@@ -205,16 +192,16 @@ def _held(signal: Floats) -> Mask:
 
 def _jumps(signal: Floats) -> Mask:
     mask = np.zeros(len(signal), dtype=bool)
-    bend = np.abs(np.diff(signal, n=2))
-    # In parts of two lengths, so that they are taken at once: a long series has some ten thousand.
-    length, longer = divmod(len(bend), max(1, len(bend) // _LOCAL))
-    parts = np.split(bend, [longer * (length + 1)])
+    curvature = np.abs(np.diff(signal, n=2))
+    # Parts of two lengths, so that each length is processed at once: a long series has some ten thousand parts.
+    length, longer = divmod(len(curvature), max(1, len(curvature) // _LOCAL))
+    parts = np.split(curvature, [longer * (length + 1)])
     sizes = (length + 1, length)
     medians = [np.median(part.reshape(-1, size), axis=1) for part, size in zip(parts, sizes, strict=True)]
     usual = 1.4826 * np.concatenate(medians)
     around = np.max([np.roll(usual, shift) for shift in (-1, 0, 1)], axis=0)
     scale = np.repeat(around, np.repeat(sizes, [len(of_size) for of_size in medians]))
-    mask[1:-1] = (bend > _JUMP * scale) & (scale > 0)
+    mask[1:-1] = (curvature > _JUMP * scale) & (scale > 0)
     return mask
 
 
@@ -229,8 +216,8 @@ _TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks as long as their `taper` that start every `step` samples, less what `steadied` takes off them, and the
-    `lines` of their spectra that are kept."""
+    """Blocks as long as their `taper` that start every `step` samples, detrended by `steadied`; `lines` of their
+    spectra are kept."""
 
     taper: Floats
     step: int
@@ -250,12 +237,12 @@ class Blocks:
 class Frf:
     """Lines of a measured FRF: `frequency` [Hz], `values` [C/N], and γ² and the number of averages where known.
 
-    `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
-    was averaged over one block. `defects` are those of the time series. `force_power` [N²] and
-    `charge_power` [C²] are mean squared amplitudes, and `passes` is in how many blocks the force has its power at a
-    line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is. `used`: the lines that say
-    something (`line_choice`), None where nobody looked. `bias` is what noise made of the `estimator` and was taken
-    off, and `bias_unsure` what that leaves open, relative and about the same for all lines (`line_choice`).
+    `averages` counts independent blocks (overlapping ones count for less than one each); the coherence of a line
+    averaged over one block is NaN. `defects` are those of the time series. `force_power` [N²] and `charge_power` [C²]
+    are mean squared amplitudes; `passes` is the number of blocks in which the force has its power at a line,
+    (Σ p)²/Σ p²; None for tones. `independent`: whether the noise of neighbouring lines is. `used`: the lines to use
+    (`line_choice`), None if undetermined. `bias`: the removed bias of the `estimator` by noise, and `bias_unsure` its
+    remaining uncertainty, both relative and about the same for all lines (`line_choice`).
     """
 
     frequency: Floats
@@ -278,14 +265,14 @@ class Frf:
         return np.full(len(self.values), np.nan) if self.coherence is None else self.coherence
 
     def at(self, lines: Indices) -> "Frf":
-        """The same at some of the lines."""
+        """The FRF at some of the lines."""
         columns = ("frequency", "values", "coherence", "averages", "force_power", "charge_power", "passes", "used")
-        known = {name: column for name in columns if (column := getattr(self, name)) is not None}
-        return replace(self, **{name: column[lines] for name, column in known.items()})
+        present = {name: column for name in columns if (column := getattr(self, name)) is not None}
+        return replace(self, **{name: column[lines] for name, column in present.items()})
 
     @property
     def used_or_all(self) -> Mask:
-        """The lines that say something; all where nobody looked."""
+        """The lines to use; all where undetermined."""
         return np.ones(len(self.values), dtype=bool) if self.used is None else self.used
 
     @property
@@ -299,13 +286,13 @@ class Frf:
 def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, estimator: Estimator) -> Frf:
     """The average over the undamaged blocks of force [N] and charge [C], sampled at `sample_rate` [Hz]."""
     defects = defects_of_pair(force, charge)
-    whole = ~blocks.of(damaged(defects, len(force))).any(axis=1)
-    count = int(whole.sum())
+    undamaged = ~blocks.of(damaged(defects, len(force))).any(axis=1)
+    count = int(undamaged.sum())
     if not count:
         first = defects[0]
         words = sentences.defect(first.kind, first.channel, first.samples, first.first_sample)
         raise unusable(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
-    force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
+    force_spectra, charge_spectra = (blocks.spectra(signal)[undamaged] for signal in (force, charge))
     frequency: Floats = sample_rate * np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)
     kappa = noise_ratio([(force_spectra, charge_spectra)])
@@ -326,7 +313,7 @@ def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, 
 
 
 def without_line(blocks: Floats) -> Floats:
-    """The blocks (blocks, samples) less the straight line that fits each best."""
+    """The blocks (blocks, samples) less the least-squares line of each."""
     time = np.arange(blocks.shape[1]) - (blocks.shape[1] - 1) / 2
     level = blocks.mean(axis=1, keepdims=True)
     slope = (blocks @ time / (time @ time))[:, None]
@@ -334,7 +321,7 @@ def without_line(blocks: Floats) -> Floats:
 
 
 def _independent_blocks(count: int, taper: Floats, step: int) -> float:
-    """How many independent blocks carry as much as `count` overlapping ones (Welch 1967)."""
+    """The number of independent blocks equivalent to `count` overlapping ones (Welch 1967)."""
     power = taper @ taper
     excess = 0.0
     for lag in range(1, min(count, -(-len(taper) // step))):
@@ -347,9 +334,9 @@ _SAME_PERIOD = 0.05
 _DRIFT = 0.025  # of the period, from a run's first half to its second: a sweep's runs drift by about 0.05
 _FEWEST_CYCLES = 4
 _FINE = 8  # samples a cycle
-_COVERED = 0.7  # a force that dwells on tones does so for most of its time
-_BLOCK = 16  # samples, at least, in the whole cycles that make a block of the average
-_SETTLING = 0.1  # of a step, and at least one cycle: the answer to the step itself dies away
+_COVERED = 0.7  # least share of the time that a stepped-sine force dwells on tones
+_BLOCK = 16  # least number of samples in the whole cycles of a block of the average
+_SETTLING = 0.1  # of a step, and at least one cycle: the transient after the step
 
 
 @dataclass(frozen=True)
@@ -391,7 +378,7 @@ def find_steps(force: Floats, sample_rate: float) -> list[Step]:
 
 
 def settled(step: Step, sample_rate: float) -> int:
-    """The sample from which the answer to the step itself has died away."""
+    """The sample from which the transient after the step has decayed."""
     return step.first + int(np.ceil(max(sample_rate / step.frequency, _SETTLING * (step.last - step.first))))
 
 
@@ -425,14 +412,14 @@ def step_amplitudes(
     if blocks < 1:
         return np.empty(0, complex), np.empty(0, complex)
     edges = first + np.round(np.arange(blocks + 1) * block).astype(int)
-    whole = np.array([not bad[a:b].any() for a, b in pairwise(edges)])
+    undamaged = np.array([not bad[a:b].any() for a, b in pairwise(edges)])
     time = np.arange(edges[0], edges[-1]) / sample_rate
     good = ~bad[edges[0] : edges[-1]]
     pair = []
     for signal in (force, charge):
         part = signal[edges[0] : edges[-1]]
         level = _level_and_drift(part, time, step.frequency, good)
-        pair.append(_each_block(part - level, time, step.frequency, edges - edges[0])[whole])
+        pair.append(_block_amplitudes(part - level, time, step.frequency, edges - edges[0])[undamaged])
     return pair[0], pair[1]
 
 
@@ -447,7 +434,7 @@ def _level_and_drift(signal: Floats, time: Floats, frequency: float, good: Mask)
     return line @ coefficients[:2]
 
 
-def _each_block(signal: Floats, time: Floats, frequency: float, edges: NDArray[np.int_]) -> Complexes:
+def _block_amplitudes(signal: Floats, time: Floats, frequency: float, edges: NDArray[np.int_]) -> Complexes:
     """Least squares on cosine and sine in each block."""
     angle = 2 * np.pi * frequency * time
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -461,7 +448,7 @@ def _each_block(signal: Floats, time: Floats, frequency: float, edges: NDArray[n
 
 
 def _rising_crossings(signal: Floats) -> Floats:
-    """Places (fractions of a sample) where the signal rises through its running middle, noise ignored."""
+    """Positions (fractional samples) where the signal rises through its median, with hysteresis against noise."""
     middle = signal - np.median(signal)
     threshold = 0.3 * np.quantile(np.abs(middle), 0.9)
     state = np.where(middle > threshold, 1, np.where(middle < -threshold, -1, 0))
@@ -488,34 +475,34 @@ def _even_runs(crossings: Floats) -> list[tuple[float, float, int]]:
 
 
 def _drifts(crossings: list[float]) -> bool:
-    """Whether the period changes over a run: a sweep passes through tones and dwells on none."""
+    """Whether the period changes over a run, as in a sweep, which dwells on no tone."""
     half = len(crossings) // 2
     first, second = crossings[half] - crossings[0], crossings[-1] - crossings[-1 - half]
     return abs(second - first) > _DRIFT * first
 
 
 def _refined(signal: Floats, start: float, end: float, cycles: int) -> float:
-    """Cycles per sample: the phase of the second half of a run against the first."""
+    """Cycles per sample by the phase of the second half of a run relative to the first."""
     frequency = cycles / (end - start)
-    place = np.arange(int(np.ceil(start)), int(end))
+    samples = np.arange(int(np.ceil(start)), int(end))
     size = int(cycles // 2 / frequency)
     if size < _BLOCK:
         return frequency
     phases = []
-    for part in (place[:size], place[-size:]):
+    for part in (samples[:size], samples[-size:]):
         values = signal[part] - signal[part].mean()
         phases.append(values @ (np.hanning(len(part)) * np.exp(-2j * np.pi * frequency * part)))
     advance = np.angle(phases[1] / phases[0])
-    return float(frequency + advance / (2 * np.pi * (place[-size] - place[0])))
+    return float(frequency + advance / (2 * np.pi * (samples[-size] - samples[0])))
 
 
-_AROUND = 11  # lines whose median γ² is that to be expected in their middle
+_AROUND = 11  # lines whose median γ² is the expected one of the middle line
 
 
 @dataclass(frozen=True)
 class Stack:
-    """Recordings of one grid: `rows` are their numbers; frequency (lines,), values (rows, lines), γ² or NaN, and which
-    lines of each recording are `used`, all where nobody looked."""
+    """Recordings on one grid of lines: `rows` are their indices; frequency (lines,), values (rows, lines), γ² or NaN,
+    and the `used` lines of each recording, all where undetermined."""
 
     rows: Indices
     frequency: Floats
@@ -524,14 +511,14 @@ class Stack:
     used: Mask
 
     def at(self, lines: Mask) -> "Stack":
-        """The same at some of the lines (lines,)."""
+        """The stack at some of the lines (lines,)."""
         columns = (self.values[:, lines], self.coherence[:, lines], self.used[:, lines])
         return Stack(self.rows, self.frequency[lines], *columns)
 
     @cached_property
     def weights(self) -> Floats:
-        """γ²/(1 − γ²) of the lines that are used (rows, lines), by which the variance of a line goes, with the γ² to be
-        expected; rounding of γ² near 1 is kept from ruling."""
+        """γ²/(1 − γ²) of the used lines (rows, lines), the inverse variance of a line up to a factor, with the expected
+        γ²; limited where γ² is near 1."""
         weights = np.zeros(self.coherence.shape)
         for row, (coherence, used) in enumerate(zip(self.coherence, self.used, strict=True)):
             weights[row, used] = information(expected_coherence(coherence[used]))
@@ -545,22 +532,22 @@ def information(coherence: Floats) -> Floats:
 
 
 def expected_coherence(coherence: Floats) -> Floats:
-    """γ² of each line (lines,) by those around it: weights by a line's own γ² prefer those that came out too large."""
+    """γ² of each line (lines,) by those around it: weights by a line's own γ² would favour estimates too large."""
     if not np.isfinite(coherence).all() or len(coherence) < _AROUND:
         return coherence
     return np.asarray(median_filter(coherence, _AROUND, mode="nearest"))
 
 
 def stacked(frfs: Sequence[Frf]) -> list[Stack]:
-    """The recordings, put together where they share the same lines."""
+    """The recordings, stacked where they share the same lines."""
     members: dict[bytes, list[int]] = {}
     for row, frf in enumerate(frfs):
         members.setdefault(frf.frequency.tobytes(), []).append(row)
     stacks = []
     for rows in members.values():
-        own = [frfs[row] for row in rows]
-        values = np.array([frf.values for frf in own])
-        coherence = np.array([frf.coherence_or_nan for frf in own])
-        used = np.array([frf.used_or_all for frf in own])
+        members_of_grid = [frfs[row] for row in rows]
+        values = np.array([frf.values for frf in members_of_grid])
+        coherence = np.array([frf.coherence_or_nan for frf in members_of_grid])
+        used = np.array([frf.used_or_all for frf in members_of_grid])
         stacks.append(Stack(np.array(rows), frfs[rows[0]].frequency, values, coherence, used))
     return stacks

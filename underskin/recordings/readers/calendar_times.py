@@ -1,8 +1,5 @@
-"""Times of recordings, and the zone in which they were written.
-
-The lab's time zone: that of the time of day, and of times that are written without one. Dates and times as spreadsheets
-write them: 24.12.2025 09:30, 24/12/2025 9:30:15.
-"""
+"""Times of recordings: the lab's time zone, and dates as spreadsheets write them, 24.12.2025 09:30, 24/12/2025
+9:30:15."""
 
 import os
 import re
@@ -15,7 +12,7 @@ TIME_ZONE = "UNDERSKIN_TIME_ZONE"  # the setting; UTC where it is not set
 
 
 def time_zone() -> tzinfo:
-    """The zone that the setting names; raises InvalidInput where there is none of that name."""
+    """The time zone of the setting; raises InvalidInput for an unknown one."""
     name = os.environ.get(TIME_ZONE) or "UTC"
     if name == "UTC":
         return UTC
@@ -26,12 +23,12 @@ def time_zone() -> tzinfo:
 
 
 def in_lab(moment: datetime) -> datetime:
-    """A moment in the lab's zone, taken as UTC where it states none; where the calendar ends in that zone, as it is."""
-    known = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    """A moment in the lab's zone, assumed in UTC where it states none; unchanged where it overflows the calendar."""
+    zoned = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
     try:
-        return known.astimezone(time_zone())
+        return zoned.astimezone(time_zone())
     except OverflowError:
-        return known
+        return zoned
 
 
 _WRITTEN = re.compile(
@@ -43,49 +40,49 @@ _ISO_DATE = re.compile(r"(\d{4})-(\d{2})-(\d{2})")
 
 
 def iso_time(cell: str, zone: tzinfo) -> str:
-    """A date and time in a zone as ISO 8601 writes it; what is not written as above stays as it is.
+    """A date and time in a zone as ISO 8601; other texts are unchanged.
 
-    With points the day comes first; with strokes it may be the month. Raises ValueError where that cannot be told, or
+    With points the day comes first; with slashes it may be the month. Raises ValueError where that is ambiguous, or
     where there is no such day or time.
     """
-    found = _WRITTEN.fullmatch(cell.strip())
-    if found is None:
+    match = _WRITTEN.fullmatch(cell.strip())
+    if match is None:
         return cell
-    day, month = int(found["one"]), int(found["two"])
-    if found["mark"] == "/" and day != month:
+    day, month = int(match["one"]), int(match["two"])
+    if match["mark"] == "/" and day != month:
         if max(day, month) <= _MONTHS:
-            raise ValueError(_two_days(found))
+            raise ValueError(_two_days(match))
         day, month = (day, month) if month <= _MONTHS else (month, day)
-    hour, minute, second = (int(found[part] or 0) for part in ("hour", "minute", "second"))
+    hour, minute, second = (int(match[part] or 0) for part in ("hour", "minute", "second"))
     try:
-        time = f"{found['year']}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
+        time = f"{match['year']}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
         return datetime.fromisoformat(time).replace(tzinfo=zone).isoformat()
     except ValueError as error:
         raise ValueError(f"is no date and time: {error}") from None
 
 
-def _two_days(found: re.Match[str]) -> str:
-    """That a date can be two days, which, and how either is written so that it is one alone."""
-    numbers = int(found["one"]), int(found["two"])
-    clock = f"T{int(found['hour']):02}:{found['minute']}" if found["hour"] else ""
-    days = [date(int(found["year"]), month, day) for day, month in (numbers, numbers[::-1])]
+def _two_days(match: re.Match[str]) -> str:
+    """The message that a date is ambiguous, with both days and their ISO forms."""
+    numbers = int(match["one"]), int(match["two"])
+    clock = f"T{int(match['hour']):02}:{match['minute']}" if match["hour"] else ""
+    days = [date(int(match["year"]), month, day) for day, month in (numbers, numbers[::-1])]
     named = " or ".join(f"{day.day} {day:%B %Y}" for day in days)
     return f"can be two days, {named}: write it as {' or '.join(f'{day}{clock}' for day in days)}"
 
 
 def with_zone(text: str, zone: tzinfo) -> str:
-    """A date, or a date and time, as ISO 8601 writes it or as above, with its zone: `zone` where it states none.
+    """A date, or a date and time, in ISO 8601 or as for `iso_time`, with its zone: `zone` where it states none.
 
-    Raises ValueError where it is none of these.
+    Raises ValueError for other texts.
     """
-    told = iso_time(text.strip(), zone)
-    moment = datetime.fromisoformat(told)
-    return told if moment.tzinfo is not None else moment.replace(tzinfo=zone).isoformat()
+    text_with_zone = iso_time(text.strip(), zone)
+    moment = datetime.fromisoformat(text_with_zone)
+    return text_with_zone if moment.tzinfo is not None else moment.replace(tzinfo=zone).isoformat()
 
 
 def of_two_cells(day: str, clock: str) -> str:
-    """A date, also one that begins an ISO time, and a time of day in cells of their own, as `iso_time` reads them; an
-    ISO time beside which there is no other time of day as it is."""
+    """A date, or the date of an ISO time, and a time of day in separate cells, as one text for `iso_time`; an ISO time
+    without another time of day is unchanged."""
     day, clock = day.strip(), clock.strip()
     iso = _ISO_DATE.match(day)
     if iso is None or not (clock or iso.end() == len(day)):

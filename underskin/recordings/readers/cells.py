@@ -1,21 +1,12 @@
-"""Cells of tables in text files, fast.
+"""Cells of tables in text files, parsed in bulk.
 
-Lines of text parted into cells, by the bytes of all of them at once.
+A text is read in blocks of whole lines, so that a long file is never in memory as a whole (`BlockText`). Lines of a
+block are split into cells on their bytes at once (`part`), where `text.cells` would give the same result: they have at
+most as many cells as the table has columns, and quotes enclose whole cells. `PlainRows` are the lines whose columns of
+numbers hold numbers, as `text.number` reads them; other lines (blank, comments, invalid rows) are left to the caller.
 
-A line is taken if `text.cells` would part it alike: it has no more cells than the table has columns, and its quotes
-hold whole cells. Others are left out.
-
-A text read in blocks of whole lines, so that a long file never lies in memory as a whole.
-
-The plain rows of a block of lines: those whose columns of numbers hold numbers, all read at once.
-
-What else a line may be (blank, a comment, a row with something wrong in it) is left to whoever reads single lines.
-Cells are what `text.cells` gives, and numbers what `text.number` reads.
-
-Where the numbers of a text table are: separator, decimal mark, which columns hold numbers.
-
-A row holds a number in every column of numbers; other columns hold text. The separator and the decimal mark are those
-with the longest run of rows, among equals those with the fewest columns of text.
+`find` locates the table: a row holds a number in every column of numbers; other columns hold text. Separator and
+decimal mark are those with the longest run of rows, and among equals with the fewest columns of text.
 """
 
 import codecs
@@ -39,15 +30,15 @@ BLANKS = " "
 QUOTE, NEWLINE = b'"\n'
 _BLANK, _HASH, _EQUALS = b" #="
 _SMALL_S, _TO_SMALL = ord("s"), 0x20
-# Between other bytes than these, a line may be parted at more than its blanks.
+# A line with other bytes than these may be split at more than its blanks.
 _PARTED_AT_BLANKS = np.zeros(256, bool)
 _PARTED_AT_BLANKS[[NEWLINE, *(mark for mark in range(_BLANK, 127) if mark not in b';"')]] = True
 
 
 @dataclass(frozen=True)
 class CellBytes:
-    """The cells of lines with `width` cells each: `data` has them one behind another, each with a line feed behind it;
-    `lengths` (lines, width) count it; `lines` says which line each is, from 0."""
+    """The cells of lines with `width` cells each: `data` holds them in sequence, each followed by a line feed, which
+    `lengths` (lines, width) include; `lines` are the indices of the lines, from 0."""
 
     data: Bytes
     lengths: Places
@@ -58,7 +49,7 @@ class CellBytes:
         return self.data if cells.all() else self.data[np.repeat(cells.ravel(), self.lengths.ravel())]
 
     def having(self, places: Mask) -> Mask:
-        """Which cells (lines, width) have any of some bytes."""
+        """Which cells (lines, width) contain any of these bytes."""
         if not self.lines.size:
             return np.zeros(self.lengths.shape, bool)
         starts = np.cumsum(self.lengths.ravel()) - self.lengths.ravel()
@@ -73,16 +64,16 @@ class CellBytes:
 
 
 def part(lines: Sequence[str], separator: str, width: int, *, is_template: bool) -> CellBytes:
-    """The cells of the lines that have at most `width`; those that a line lacks are empty.
+    """The cells of the lines that have at most `width`, padded with empty ones.
 
-    `is_template`: lines that begin with # or sep= may say nothing, and are left out.
+    `is_template`: lines that begin with # or sep= may be comments, and are left out.
     """
     block = _Lines("\n".join(lines))
     if separator == BLANKS:
         block.leave_out(block.having(~_PARTED_AT_BLANKS[block.data]))
         block.part_at_single_blanks()
     if is_template:
-        block.leave_out(_may_say_nothing(block))
+        block.leave_out(_may_be_empty_line(block))
     _leave_out_odd_quotes(block, ord(separator))
     _bring_to_width(block, ord(separator), width)
     marks = _marks(block.data, ord(separator))
@@ -92,79 +83,79 @@ def part(lines: Sequence[str], separator: str, width: int, *, is_template: bool)
 
 
 class _Lines:
-    """Lines as bytes, each with a line feed behind it, and which each is."""
+    """Lines as bytes, each followed by a line feed, and their indices."""
 
     def __init__(self, lines: str) -> None:
         self.data: Bytes = np.frombuffer(f"{lines}\n".encode(), np.uint8)
         self.lines: Places = np.arange(np.count_nonzero(self.data == NEWLINE))
 
     def ends(self) -> Places:
-        """Where the line feed of each line is."""
+        """The offset of the line feed of each line."""
         return np.flatnonzero(self.data == NEWLINE)
 
     def starts(self) -> Places:
-        """Where each line begins."""
+        """The offset of the start of each line."""
         return np.append(0, self.ends() + 1)[:-1]
 
     def lengths(self) -> Places:
-        """How many bytes each line has, with its line feed."""
+        """The number of bytes of each line, with its line feed."""
         return np.diff(self.ends(), prepend=-1)
 
     def having(self, places: Mask) -> Mask:
-        """Which lines have any of some bytes."""
+        """Which lines contain any of these bytes."""
         return np.logical_or.reduceat(places, self.starts()) if self.lines.size else np.zeros(0, bool)
 
     def leave_out(self, lines: Mask) -> None:
-        """Leave some of the lines out."""
+        """Remove some of the lines."""
         if lines.any():
             self.data = self.data[np.repeat(~lines, self.lengths())]
             self.lines = self.lines[~lines]
 
     def part_at_single_blanks(self) -> None:
-        """Leave one blank between two others, and none at the ends of lines."""
+        """Collapse runs of blanks to one, and remove those at the ends of lines."""
         after = np.append(self.data[1:], NEWLINE)
         self.data = self.data[(self.data != _BLANK) | ((after != _BLANK) & (after != NEWLINE))]
         before = np.insert(self.data[:-1], 0, NEWLINE)
         self.data = self.data[(self.data != _BLANK) | (before != NEWLINE)]
 
 
-def _may_say_nothing(block: _Lines) -> Mask:
-    """Which lines begin with # or sep=, within quotes or behind a blank too."""
+def _may_be_empty_line(block: _Lines) -> Mask:
+    """Which lines begin with # or sep=, also within quotes or after a blank."""
     starts = block.starts()
     for skipped in (_BLANK, QUOTE):
         starts = starts + (block.data[starts] == skipped)
     first = block.data[starts]
     fourth = block.data[np.minimum(starts + 3, block.data.size - 1)]
-    told = ((first | _TO_SMALL) == _SMALL_S) & (fourth == _EQUALS)
-    return np.asarray((first == _HASH) | (first == _BLANK) | told)
+    is_separator_line = ((first | _TO_SMALL) == _SMALL_S) & (fourth == _EQUALS)
+    return np.asarray((first == _HASH) | (first == _BLANK) | is_separator_line)
 
 
 def _leave_out_odd_quotes(block: _Lines, separator: int) -> None:
-    """Leave out the lines in which quotes are not around whole cells."""
+    """Remove the lines in which quotes do not enclose whole cells."""
     quotes = block.data == QUOTE
     if not quotes.any():
         return
     block.leave_out(np.add.reduceat(quotes, block.starts(), dtype=np.intp) % 2 == 1)
     quotes, inside = block.data == QUOTE, _inside(block.data)
-    beside = (block.data == separator) | (block.data == NEWLINE)
-    before, after = np.append(True, beside)[:-1], np.append(beside, True)[1:]
+    delimiters = (block.data == separator) | (block.data == NEWLINE)
+    before, after = np.append(True, delimiters)[:-1], np.append(delimiters, True)[1:]
     block.leave_out(block.having(quotes & ~np.where(inside, before, after)))
 
 
 def _inside(data: Bytes) -> Mask:
-    """Which bytes lie within quotes, from each that opens to before the one that closes."""
+    """Which bytes lie within quotes, from each opening quote to before the closing one."""
     return np.asarray(np.logical_xor.accumulate(data == QUOTE))
 
 
 def _marks(data: Bytes, separator: int) -> Places:
-    """Where the separators and line feeds are that end cells."""
+    """The offsets of the separators and line feeds that end cells."""
     marks = (data == separator) | (data == NEWLINE)
     return np.flatnonzero(marks & ~_inside(data) if (data == QUOTE).any() else marks)
 
 
 def _bring_to_width(block: _Lines, separator: int, width: int) -> None:
-    """Add separators to lines with fewer cells, take some from the ends of those with more, and leave out those whose
-    surplus cells hold anything."""
+    """Pad lines with fewer cells by separators, remove empty surplus cells at their ends, and remove lines with other
+    surplus cells."""
     surplus = _surplus(block, separator, width)
     if (surplus > 0).any():
         ends = block.ends()
@@ -180,7 +171,7 @@ def _bring_to_width(block: _Lines, separator: int, width: int) -> None:
 
 
 def _surplus(block: _Lines, separator: int, width: int) -> Places:
-    """How many cells each line has beyond the width; less than 0 where it lacks some."""
+    """The number of cells of each line beyond the width; negative where some are missing."""
     ends = block.data[_marks(block.data, separator)] == NEWLINE
     return np.diff(np.flatnonzero(ends), prepend=-1) - width
 
@@ -189,7 +180,7 @@ BLOCK_BYTES = 1 << 20
 
 
 class BlockText:
-    """The text of an open file; it may be gone through any number of times.
+    """The text of an open file, which can be iterated any number of times.
 
     Raises FileError where the bytes are no text.
     """
@@ -199,7 +190,7 @@ class BlockText:
         self._encoding, self._start = _encoding(stream, file)
 
     def blocks(self) -> Iterator[str]:
-        """Whole lines, about BLOCK_BYTES at a time, without the end of the last of them; line ends are a line feed."""
+        """Whole lines, about BLOCK_BYTES at a time, without the last line end; line ends are line feeds."""
         decoder = codecs.getincrementaldecoder(self._encoding)()
         rest = ""
         for data in _pieces(self._stream, self._start):
@@ -218,7 +209,7 @@ class BlockText:
 
 
 def _pieces(stream: BinaryIO, start: int) -> Iterator[bytes]:
-    """The bytes of a stream from a place on; others may move in it meanwhile."""
+    """The bytes of a stream from an offset on; its position may change in between."""
     while True:
         stream.seek(start)
         data = stream.read(BLOCK_BYTES)
@@ -233,19 +224,19 @@ def _line_feeds(lines: str) -> str:
 
 
 def _encoding(stream: BinaryIO, file: str) -> tuple[str, int]:
-    """The encoding of a text, as `text.decode` finds it, and where it begins."""
+    """The encoding of a text as by `text.decode`, and the offset of its start."""
     stream.seek(0)
     head = stream.read(BLOCK_BYTES)
     marked = text.marked_encoding(head)
     if marked is not None:
-        _require_whole(stream, *marked, file)
+        _require_decodable(stream, *marked, file)
         return marked
-    place = 0
+    offset = 0
     for data in _pieces(stream, 0):
         zero = data.find(0)
         if zero >= 0:
-            raise FileError(file, f"byte {place + zero}", "is no text: it holds a zero byte")
-        place += len(data)
+            raise FileError(file, f"byte {offset + zero}", "is no text: it holds a zero byte")
+        offset += len(data)
     try:
         decoder = codecs.getincrementaldecoder("utf-8")()
         for data in _pieces(stream, 0):
@@ -256,27 +247,27 @@ def _encoding(stream: BinaryIO, file: str) -> tuple[str, int]:
     return "utf-8", 0
 
 
-def _require_whole(stream: BinaryIO, encoding: str, start: int, file: str) -> None:
-    """Raises FileError where the bytes behind the mark are not of the encoding."""
+def _require_decodable(stream: BinaryIO, encoding: str, start: int, file: str) -> None:
+    """Raise FileError where the bytes after the mark are invalid in the encoding."""
     decoder = codecs.getincrementaldecoder(encoding)()
-    place = 0  # from the mark on
+    offset = 0  # from the mark on
     try:
         for data in _pieces(stream, start):
-            held = len(decoder.getstate()[0])
+            pending = len(decoder.getstate()[0])
             decoder.decode(data)
-            place += len(data)
-        held = len(decoder.getstate()[0])
+            offset += len(data)
+        pending = len(decoder.getstate()[0])
         decoder.decode(b"", final=True)
     except UnicodeDecodeError as error:
-        raise text.no_text(file, place - held + error.start, encoding, error.reason) from None
+        raise text.no_text(file, offset - pending + error.start, encoding, error.reason) from None
 
 
 @dataclass(frozen=True)
 class RowStyle:
     """How rows are written: `width` cells, of which `columns` hold numbers.
 
-    `is_template`: as csv_template.py has them, where such a cell may be empty, and lines that begin with # or sep= may
-    say nothing.
+    `is_template`: as in csv_template.py, where such a cell may be empty, and lines that begin with # or sep= may be
+    comments.
     """
 
     separator: str
@@ -289,8 +280,7 @@ class RowStyle:
 class PlainRows:
     """The plain rows among some lines.
 
-    `numbers` has the values of each column of numbers, nan where a cell is empty; `filled` (rows, columns) says where
-    none is.
+    `numbers`: the values of each column of numbers, nan for empty cells; `filled` (rows, columns): the non-empty cells.
     """
 
     def __init__(self, lines: Sequence[str], style: RowStyle) -> None:
@@ -308,8 +298,8 @@ class PlainRows:
         self.numbers: list[Floats] = _by_column(values, self.filled)
 
     def runs(self) -> Iterator[tuple[int, int, int]]:
-        """The rows that follow each other without another line between: which line the first is, from 0, which row it
-        is, and the row behind the last."""
+        """Runs of consecutive rows: the line index of the first, from 0, its row index, and the row index after the
+        last."""
         lines = self._cells.lines
         breaks = (np.flatnonzero(np.diff(lines) != 1) + 1).tolist()
         for start, end in zip([0, *breaks], [*breaks, lines.size], strict=True):
@@ -339,7 +329,7 @@ def _texts(cells: CellBytes, columns: Sequence[int]) -> list[str]:
 
 
 def _refused(cells: CellBytes, style: RowStyle) -> Mask:
-    """The lines with nothing in any cell, or with none or a byte of no number in a column of numbers."""
+    """The lines without any content, or with an empty or non-numeric cell in a column of numbers."""
     filled = cells.lengths > 1
     wrong = _in_columns(cells, style.columns) & cells.having(~_OF_NUMBERS[style.decimal][cells.data])
     digits = cells.having((cells.data > ord('"')) & (cells.data != ord("-")))  # np.fromstring reads a blank as -1
@@ -350,28 +340,28 @@ def _refused(cells: CellBytes, style: RowStyle) -> Mask:
 
 
 def _numbers(cells: CellBytes, style: RowStyle) -> Floats | None:
-    """The numbers in all cells that hold some, row by row; None where one cannot be read."""
+    """The numbers of all non-empty cells, row by row; None where one cannot be read."""
     wanted = _in_columns(cells, style.columns) & (cells.lengths > 1)
     data = cells.of(wanted)
     joined = data[data != QUOTE].tobytes().replace(text.MINUS.encode(), b"-").replace(style.decimal.encode(), b".")
     count = np.count_nonzero(wanted)
     try:
         # A line feed ends each number, and blanks may stand around it.
-        found = np.fromstring(joined.replace(b"\n", b",")[:-1], sep=",") if count else np.empty(0)
+        numbers = np.fromstring(joined.replace(b"\n", b",")[:-1], sep=",") if count else np.empty(0)
     except ValueError:
         return None
-    return found if found.size == count else None
+    return numbers if numbers.size == count else None
 
 
 def _unreadable(cells: CellBytes, style: RowStyle) -> Mask:
-    """The lines in which a cell of a column of numbers holds something else."""
+    """The lines in which a cell of a column of numbers is no number."""
     filled = cells.lengths[:, list(style.columns)] > 1
     readable = [text.number(cell, style.decimal) is not None for cell in _texts(cells, style.columns)]
     return np.asarray((filled & ~np.reshape(readable, filled.shape)).any(axis=1))
 
 
 def _by_column(values: Floats, filled: Mask) -> list[Floats]:
-    """The numbers of each column, in memory of its own."""
+    """The numbers of each column as a contiguous copy."""
     if filled.all():
         return [column.copy() for column in values.reshape(filled.shape).T]
     spread = np.full(filled.shape, np.nan)
@@ -397,7 +387,7 @@ _LEAST = 2  # columns of numbers, rows of a table
 
 @dataclass(frozen=True)
 class Table:
-    """Where the rows begin and how they are written; `columns` are those that hold numbers, of `width` in all."""
+    """The first row and the style of the rows; `columns`: those that hold numbers, of `width` in all."""
 
     start: int
     separator: str
@@ -406,11 +396,11 @@ class Table:
     width: int
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line; none where there is one at most, or quotes do not close."""
+        """The cells of a line; empty for at most one cell, or unclosed quotes."""
         return split(line, self.separator)
 
     def row(self, line: str) -> list[float] | None:
-        """The numbers of a row, one for each of `columns`; None where the line is none."""
+        """The numbers of a row, one for each of `columns`; None where the line is no row."""
         cells = self.cells(line)
         if not max(self.columns) < len(cells) <= self.width:
             return None
@@ -419,7 +409,7 @@ class Table:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """The cells of a line, without empty ones at its end; none where there is one at most, or quotes do not close."""
+    """The cells of a line without empty ones at its end; empty for at most one cell, or unclosed quotes."""
     if separator == BLANKS:
         return _tokens(line) if " " in line and "\t" not in line and ";" not in line else []
     try:
@@ -434,17 +424,17 @@ def _tokens(line: str) -> list[str]:
 
 
 def room(line: str, separator: str) -> int:
-    """How many cells a line has room for, those at its end too that are empty."""
+    """The number of cells of a line, including empty ones at its end."""
     return len(split(line, separator)) if separator == BLANKS else line.count(separator) + 1
 
 
 def uncommented(line: str) -> str:
-    """The line without the mark that begins a comment."""
+    """The line without a leading comment mark."""
     return _COMMENT.sub("", line, count=1) if is_comment(line) else line
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line begins with a mark of comments: #, %, // or !."""
+    """Whether a line begins with a comment mark: #, %, // or !."""
     return _COMMENT.match(line) is not None
 
 
@@ -470,7 +460,7 @@ def find(lines: Sequence[str]) -> Table | None:
 
 
 def most_numbers(lines: Sequence[str]) -> tuple[int, int]:
-    """How many numbers the line with most of them holds, however it is separated, and its index."""
+    """The number of numbers of the line with most of them, with any separator, and its index."""
     counts = [max(_count(line, *style) for style in _STYLES) for line in lines]
     most = max(counts)
     return most, counts.index(most)
@@ -482,7 +472,7 @@ def _count(line: str, separator: str, decimal: str) -> int:
 
 
 def _columns(line: str, separator: str, decimal: str) -> tuple[int, ...]:
-    """Which cells of a line are numbers; none where fewer than two are."""
+    """Which cells of a line are numbers; empty where fewer than two are."""
     cells = split(line, separator)
     columns = tuple(index for index, cell in enumerate(cells) if text.number(cell, decimal) is not None)
     return columns if len(columns) >= _LEAST else ()
@@ -501,7 +491,7 @@ def _longest_run(columns_of: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...]
 
 
 def no_row(index: int, line: str, table: Table, file: str) -> FileError:
-    """What is wrong with a line among the rows."""
+    """The error for an invalid line among the rows."""
     where = "" if len(table.columns) == table.width else f" in {table.width} columns"
     expected = f"must be a row of {len(table.columns)} numbers{where}, as above it; found {line[:60]!r}"
     return FileError(file, f"line {index + 1}", expected)

@@ -1,10 +1,8 @@
-"""Arithmetic on channels, with units: `Piezo - Deflection`, `0.05 [N/m] * 'Deflection (nm)'`.
+"""Arithmetic on channels with units: `Piezo - Deflection`, `0.05 [N/m] * 'Deflection (nm)'` (`derived` of `rig/1`).
 
-A formula holds names of channels, in quotes where one is not a single word; numbers; a unit in brackets behind either;
-`+ - * /`, a leading minus, and parentheses. Python's `ast` takes it apart, everything else in it is refused, and
-nothing of it is ever run. Sums need one dimension on both sides; units are converted.
-
-Channels that a rig description derives from those of a file (`derived` of `rig/1`), by formulas with units.
+A formula holds names of channels, in quotes where one is not a single word; numbers; a unit in brackets after either;
+`+ - * /`, a leading minus, and parentheses. It is parsed by Python's `ast`; everything else is rejected and nothing is
+executed. Both sides of a sum need one dimension; units are converted.
 """
 
 import ast
@@ -37,8 +35,7 @@ _UNIT = "its unit in brackets, such as 0.05 [N/m]"
 
 @dataclass(frozen=True)
 class Quantity:
-    """Values in SI, a scalar or (samples,), the exponents of their unit, and the unit that they came in ("" where they
-    are computed)."""
+    """Values in SI, a scalar or (samples,), the exponents of their unit, and their original unit ("" of results)."""
 
     values: Any
     dimension: Exponents
@@ -47,8 +44,8 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula that was parsed: its text, the names in it, each once, and whether it adds or subtracts terms that both
-    hold names."""
+    """A parsed formula: its text, the distinct names in it, and whether it adds or subtracts terms that both hold
+    names."""
 
     text: str
     names: tuple[str, ...]
@@ -56,11 +53,11 @@ class Formula:
     tree: ast.expr = dataclasses.field(compare=False)  # of the text
 
 
-Known = Callable[[str, str | None], Quantity]  # of a name and the unit stated behind it
+QuantityOf = Callable[[str, str | None], Quantity]  # quantity of a name and the unit stated after it
 
 
 def parse(field: str, text: str) -> Formula:
-    """A formula; raises InvalidInput that names the term which is none."""
+    """Parse a formula; raises InvalidInput that names the invalid term."""
     if len(text) > LONGEST_NAME:
         raise InvalidInput(field, shown(text), f"must have up to {LONGEST_NAME} characters")
     text = text.strip()
@@ -78,13 +75,13 @@ def parse(field: str, text: str) -> Formula:
     return Formula(text, tuple(dict.fromkeys(parser.names(tree))), parser.adds_names(tree), tree)
 
 
-def evaluate(formula: Formula, known: Known, file: str, place: str) -> Quantity:
-    """Its value, (samples,) or a scalar; `known` gives the quantity of a name.
+def evaluate(formula: Formula, quantity_of: QuantityOf, file: str, place: str) -> Quantity:
+    """Its value, (samples,) or a scalar; `quantity_of` gives the quantity of a name.
 
     Raises FileError that names the term whose unit or length does not fit.
     """
     with np.errstate(all="ignore"):
-        return _Evaluation(formula.text, known, file, place).of(formula.tree)
+        return _Evaluation(formula.text, quantity_of, file, place).of(formula.tree)
 
 
 def labels(formula: Formula) -> Iterator[str]:
@@ -98,7 +95,7 @@ def _source(text: str, node: ast.expr) -> str:
 
 
 def _name(text: str, node: ast.expr) -> str | None:
-    """The channel that a node names, as it was written (`ast` itself would normalise its letters); None for others."""
+    """The channel that a node names, as written (`ast` would normalise its letters); None for other nodes."""
     if isinstance(node, ast.Name):
         return _source(text, node)
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
@@ -111,7 +108,7 @@ def _number(node: ast.expr) -> float | None:
 
 
 class _Parser:
-    """Refuses what is no arithmetic."""
+    """Rejects everything but arithmetic."""
 
     def __init__(self, field: str, text: str) -> None:
         self.field = field
@@ -133,7 +130,7 @@ class _Parser:
             self._require_number(node)
 
     def names(self, node: ast.expr) -> Iterator[str]:
-        """The names in it, from left to right; what stands in brackets is a unit."""
+        """The names in it, from left to right, without units in brackets."""
         name = _name(self.text, node)
         if name is not None:
             yield name
@@ -144,8 +141,12 @@ class _Parser:
 
     def adds_names(self, node: ast.expr) -> bool:
         """Whether two terms that hold names are added or subtracted anywhere in it."""
-        sums = (one for one in ast.walk(node) if isinstance(one, ast.BinOp) and isinstance(one.op, ast.Add | ast.Sub))
-        return any(all(any(self.names(side)) for side in (one.left, one.right)) for one in sums)
+        sums = (
+            operation
+            for operation in ast.walk(node)
+            if isinstance(operation, ast.BinOp) and isinstance(operation.op, ast.Add | ast.Sub)
+        )
+        return any(all(any(self.names(side)) for side in (operation.left, operation.right)) for operation in sums)
 
     def _require_number(self, node: ast.expr) -> None:
         number = _number(node)
@@ -159,21 +160,21 @@ class _Parser:
 
 
 class _Evaluation:
-    """Computes a tree that `parse` has let through."""
+    """Computes a tree that `parse` has accepted."""
 
-    def __init__(self, text: str, known: Known, file: str, place: str) -> None:
+    def __init__(self, text: str, quantity_of: QuantityOf, file: str, place: str) -> None:
         self.text = text
-        self.known = known
+        self.quantity_of = quantity_of
         self.file = file
         self.place = place
 
     def of(self, node: ast.expr, label: str | None = None) -> Quantity:
-        """The quantity of a node; `label`: the unit that stands behind it."""
+        """The quantity of a node; `label`: the unit stated after it."""
         if isinstance(node, ast.Subscript):
             return self.of(node.value, _source(self.text, node.slice))
         name = _name(self.text, node)
         if name is not None:
-            return self.known(name, label)
+            return self.quantity_of(name, label)
         if isinstance(node, ast.UnaryOp):
             operand = self.of(node.operand)
             return Quantity(-operand.values, operand.dimension)
@@ -186,24 +187,26 @@ class _Evaluation:
     def _combined(self, node: ast.BinOp) -> Quantity:
         left, right = self.of(node.left), self.of(node.right)
         if np.ndim(left.values) and np.ndim(right.values) and len(left.values) != len(right.values):
-            raise self._error(f"{self._said(node.left)} and {self._said(node.right)} differ in length")
+            raise self._error(f"{self._source_of(node.left)} and {self._source_of(node.right)} differ in length")
         if isinstance(node.op, ast.Mult):
             return Quantity(left.values * right.values, times(left.dimension, right.dimension))
         if isinstance(node.op, ast.Div):
             if not np.ndim(right.values) and right.values == 0:
-                raise self._error(f"{self._said(node)}: is a division by 0")
+                raise self._error(f"{self._source_of(node)}: is a division by 0")
             return Quantity(np.divide(left.values, right.values), times(left.dimension, right.dimension, -1))
         if left.dimension != right.dimension:
             both = f"{self._with_unit(node.left, left)}, {self._with_unit(node.right, right)}"
-            raise self._error(f"{self._said(node)}: {both}; only what has units of one kind can be added or subtracted")
+            raise self._error(
+                f"{self._source_of(node)}: {both}; only what has units of one kind can be added or subtracted"
+            )
         sign = 1 if isinstance(node.op, ast.Add) else -1
         return Quantity(left.values + sign * right.values, left.dimension)
 
     def _with_unit(self, node: ast.expr, quantity: Quantity) -> str:
         unit_words = f"the unit {quantity.label}" if quantity.label else described(quantity.dimension)
-        return f"{self._said(node)} has {unit_words}"
+        return f"{self._source_of(node)} has {unit_words}"
 
-    def _said(self, node: ast.expr) -> str:
+    def _source_of(self, node: ast.expr) -> str:
         return str(shown(_source(self.text, node)))
 
     def _error(self, reason: str) -> FileError:
@@ -211,10 +214,12 @@ class _Evaluation:
 
 
 def in_unit(values: Any, label: str) -> Quantity:
-    """Values that are in a unit that is known here, `1` for numbers without one."""
-    known, dimension = unit(label), exponents(label)
+    """Values in a supported unit, `1` for numbers without one."""
+    parsed_unit, dimension = unit(label), exponents(label)
     assert dimension is not None
-    return Quantity(values if known is None else values * known.to_si, dimension, "" if known is None else label)
+    return Quantity(
+        values if parsed_unit is None else values * parsed_unit.to_si, dimension, "" if parsed_unit is None else label
+    )
 
 
 Stated = Mapping[str, str | float]
@@ -226,8 +231,8 @@ def with_derived(
 ) -> Contents:
     """The contents with the derived channels in every block that has the names of their formulas.
 
-    A name is a channel, one derived before it, or a property of the file (`stated` of a block). What was derived from
-    what is a warning. Raises FileError that names the formula and its term.
+    A name is a channel, one derived before it, or a property of the file (`stated` of a block). A warning states each
+    derivation. Raises FileError that names the formula and its term.
     """
     if not formulas:
         return contents
@@ -236,20 +241,20 @@ def with_derived(
         place = f"{FIELD}.{name}"
         if any(block.channel(name) for block in contents.blocks):
             raise FileError(file, place, "is a channel of the file already: choose another name")
-        able = [one for one in derivations if not one.missing(formula)]
-        if not able:
-            least = min(derivations, key=lambda one: len(one.missing(formula)), default=None)
-            lacking = ", ".join(formula.names if least is None else least.missing(formula))
+        possible = [derivation for derivation in derivations if not derivation.missing(formula)]
+        if not possible:
+            nearest = min(derivations, key=lambda derivation: len(derivation.missing(formula)), default=None)
+            lacking = ", ".join(formula.names if nearest is None else nearest.missing(formula))
             raise FileError(file, place, f"{lacking}: is no channel or property; it has {contents.described()}")
-        for one in able:
-            one.add(name, formula, place)
-    remarks = [warning for one in derivations for warning in one.warnings]
+        for derivation in possible:
+            derivation.add(name, formula, place)
+    remarks = [warning for derivation in derivations for warning in derivation.warnings]
     warnings = tuple(dict.fromkeys([*contents.warnings, *remarks]))
-    return replace(contents, blocks=tuple(one.block for one in derivations), warnings=warnings)
+    return replace(contents, blocks=tuple(derivation.block for derivation in derivations), warnings=warnings)
 
 
 class _Derivation:
-    """One block, to which derived channels are added, what the file states about it, and remarks on them."""
+    """One block, to which derived channels are added, the properties of the file for it, and warnings."""
 
     def __init__(self, block: Block, stated: Stated, file: str) -> None:
         self.block = block
@@ -261,27 +266,27 @@ class _Derivation:
         self._labels: list[str] = []
 
     def missing(self, formula: Formula) -> list[str]:
-        """Names of a formula that are nothing here."""
-        known = {*self.stated, *self._constants}
-        return [name for name in formula.names if name not in known and self._channel(name) is None]
+        """Names of a formula that are neither channel, constant nor property."""
+        scalars = {*self.stated, *self._constants}
+        return [name for name in formula.names if name not in scalars and self._channel(name) is None]
 
     def add(self, name: str, formula: Formula, place: str) -> None:
-        """Add the channel of a formula; a constant serves later formulas alone."""
+        """Add the channel of a formula; a constant is used by later formulas only."""
         self._place, self._labels = place, []
-        quantity = evaluate(formula, self._known, self.file, place)
+        quantity = evaluate(formula, self._quantity, self.file, place)
         label = label_of(quantity.dimension, [*self._labels, *labels(formula)])
         if label is None:
             raise self._error(f"{formula.text} has {described(quantity.dimension)}, which no channel can have")
         if np.ndim(quantity.values) == 0:
             self._constants[name] = quantity
             return
-        known = unit(label)
-        values = quantity.values if known is None else quantity.values / known.to_si
+        label_unit = unit(label)
+        values = quantity.values if label_unit is None else quantity.values / label_unit.to_si
         channel = Channel(name, label or "1", values)
         self.block = replace(self.block, channels=(*self.block.channels, channel))
         self.warnings.append(f"channel {name!r} is derived: {formula.text}")
 
-    def _known(self, name: str, stated_unit: str | None) -> Quantity:
+    def _quantity(self, name: str, stated_unit: str | None) -> Quantity:
         if name in self._constants:
             return self._constants[name]
         channel = self._channel(name)
@@ -296,7 +301,7 @@ class _Derivation:
         return in_unit(number, self._unit(name, labelled_unit(name), stated_unit))
 
     def _channel(self, name: str) -> Channel | None:
-        """The channel of that name; one whose heading has a unit behind it only where nothing else is called so."""
+        """The channel of that name; one whose heading ends with a unit only where nothing else has the name."""
         stated = name in self.stated or name in self._constants
         return self.block.channel(name) if stated else self.block.headed(name)
 

@@ -1,10 +1,9 @@
-"""Tables that instruments write as text: some lines about the measurement, a line of headings, rows of numbers.
+"""Tables that instruments write as text: lines about the measurement, a line of headings, rows of numbers.
 
-The rows and the headings are found by cells.py and tables.py. Headings name the channels and, in brackets
-or behind the last underscore, their units. Columns of text are left out, with a warning. Lines above the headings and
-under the numbers that hold a name and a value become properties, unless the name has two values. Where the headings
-come again, what follows is a part of its own. A cell in quotes may hold the separator. See Also csv_template.py, our
-own table.
+Rows and headings are found by cells.py and tables.py. Headings name the channels and, in brackets or after the last
+underscore, their units. Columns of text are left out with a warning. Lines above the headings and under the numbers
+with a name and a value become properties, unless the name has two values. Where the headings are repeated, a new block
+starts. A cell in quotes may hold the separator. See Also csv_template.py, the template of this package.
 """
 
 import re
@@ -24,7 +23,7 @@ _WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
 _SHOWN = 30  # letters of a cell in a message
-_HEAD, _SAMPLED = 10_000, 50  # lines of the beginning of a long file, and of each block behind, that show its style
+_HEAD, _SAMPLED = 10_000, 50  # lines of the start of a long file, and of each later block, that determine its style
 
 
 class NoTable(FileError):
@@ -40,7 +39,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     reader = SectionReader(table, repeated, file)
     reader.take_all(source)
     _refuse_other_rows(head[: table.start], reader.under, table, file)
-    left_out = _left_out(reader, table, headings, file)
+    column_warnings = _text_column_warnings(reader, table, headings, file)
     above, *between, under = (
         [line for line in lines if line.strip() not in repeated]
         for lines in (
@@ -51,18 +50,18 @@ def read(stream: BinaryIO, file: str) -> Contents:
     )
     properties, warnings = _properties([*above, *under], table)
     blocks = []
-    for number, (section, own) in enumerate(zip(reader.sections, [above, *between], strict=True), start=1):
+    for number, (section, section_lines) in enumerate(zip(reader.sections, [above, *between], strict=True), start=1):
         name = str(number) if len(reader.sections) > 1 else ""
         blocks.append(Block(name, _channels(table, headings, section), group_starts=section.group_starts))
         if name:
-            told, _ = _properties(own, table)
-            properties |= {f"{name}.{of}": value for of, value in told.items()}
-    return Contents(tuple(blocks), properties, (*warnings, *left_out), _layout(table, headings, reader.sections))
+            section_properties, _ = _properties(section_lines, table)
+            properties |= {f"{name}.{name_in_section}": value for name_in_section, value in section_properties.items()}
+    return Contents(tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, headings, reader.sections))
 
 
 def _table(source: BlockText, file: str) -> tuple[Sequence[str], Table]:
-    """The lines at the beginning, and the table whose rows begin among them and go on under them; of a long file its
-    style is that of some lines everywhere."""
+    """The lines at the start, and the table whose rows start among them; the style of a long file follows from sampled
+    lines."""
     blocks = source.blocks()
     head = next(blocks).split("\n")
     sample = [line for block in blocks for line in block.split("\n", _SAMPLED)[:_SAMPLED]]
@@ -78,15 +77,15 @@ def _table(source: BlockText, file: str) -> tuple[Sequence[str], Table]:
 
 
 def _no_table(lines: Sequence[str]) -> str:
-    """That there is no table, and what was found."""
+    """The message that there is no table, and what the text holds instead."""
     most, index = table_rows.most_numbers(lines)
     line = next(number for number, line in enumerate(lines) if line.strip() or number == len(lines) - 1)
-    found = (
+    example = (
         f"line {index + 1} holds most, {most}: {lines[index][:_SHOWN]!r}"
         if most
         else f"no line holds any; line {line + 1} is {lines[line][:_SHOWN]!r}"
     )
-    return f"holds no table, two rows of at least two numbers each: {found}; names go into the CSV template"
+    return f"holds no table, two rows of at least two numbers each: {example}; names go into the CSV template"
 
 
 def _channels(table: Table, headings: Headings, section: Section) -> tuple[Channel, ...]:
@@ -96,7 +95,7 @@ def _channels(table: Table, headings: Headings, section: Section) -> tuple[Chann
 
 
 def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: str) -> None:
-    """Refuses numbers under the rows, and rows above them with thousands apart: they would be lost."""
+    """Reject numbers under the rows, and rows above them with separated thousands: they would be lost."""
     for index, line in under:
         first = line.strip().partition(table.separator)[0].strip().strip('"')
         if text.number(first, table.decimal) is not None:
@@ -107,15 +106,15 @@ def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: s
             raise table_rows.no_row(index, line, table, file)
 
 
-def _left_out(reader: SectionReader, table: Table, headings: Headings, file: str) -> list[str]:
-    """In words, the columns that hold text; raises FileError where one holds numbers in most rows."""
+def _text_column_warnings(reader: SectionReader, table: Table, headings: Headings, file: str) -> list[str]:
+    """Messages on columns of text; raises FileError where one holds numbers in most rows."""
     warnings = []
-    for column, told in reader.texts.items():
-        if told.first is not None and told.count < reader.count / 2:
-            raise table_rows.no_row(*told.first, table, file)
-        if told.example:
+    for column, text_column in reader.texts.items():
+        if text_column.first is not None and text_column.count < reader.count / 2:
+            raise table_rows.no_row(*text_column.first, table, file)
+        if text_column.example:
             name = headings.names[column][0]
-            warnings.append(f"column {name!r} holds text, such as {told.example[:_SHOWN]!r}, and is left out")
+            warnings.append(f"column {name!r} holds text, such as {text_column.example[:_SHOWN]!r}, and is left out")
     return warnings
 
 
@@ -131,22 +130,27 @@ def _layout(table: Table, headings: Headings, sections: Sequence[Section]) -> st
 
 
 def _properties(lines: Iterable[str], table: Table) -> tuple[dict[str, str | float], list[str]]:
-    """What lines that hold a name and a value say, a number as text, as written; and which have two values."""
+    """The properties in lines that hold a name and a value, as written; and messages on names with two values."""
     values: dict[str, list[str]] = {}
     for line in lines:
         stated = _stated(table_rows.uncommented(line).strip(), table)
         if stated is not None:
             values.setdefault(stated[0], []).append(stated[1])
-    twice = {name: different for name, said in values.items() if len(different := list(dict.fromkeys(said))) > 1}
+    ambiguous = {
+        name: different
+        for name, stated_values in values.items()
+        if len(different := list(dict.fromkeys(stated_values))) > 1
+    }
     doubts = [
-        f"{name!r} is given as {one!r} and as {other!r}: neither is used" for name, (one, other, *_) in twice.items()
+        f"{name!r} is given as {first!r} and as {second!r}: neither is used"
+        for name, (first, second, *_) in ambiguous.items()
     ]
-    return {name: said[0] for name, said in values.items() if name not in twice}, doubts
+    return {name: stated_values[0] for name, stated_values in values.items() if name not in ambiguous}, doubts
 
 
 def _stated(line: str, table: Table) -> tuple[str, str] | None:
-    """The name and the value that a line holds, as cells or with a colon or = between them; a unit behind the value
-    goes to the name."""
+    """The name and the value in a line, as cells or separated by a colon or =; a unit after the value is moved to the
+    name."""
     for separator in dict.fromkeys([table.separator, "\t", ";", *([","] if table.decimal == "." else [])]):
         cells = table_rows.split(line, separator) if separator != BLANKS else []
         match [cell for cell in cells if cell]:
@@ -156,12 +160,12 @@ def _stated(line: str, table: Table) -> tuple[str, str] | None:
                 return _with_its_unit(name.rstrip(":= "), f"{value} {label}")
             case [_, _, *_]:
                 return None
-    told = _STATED.fullmatch(line)
-    return None if told is None else _with_its_unit(told["name"], told["value"].strip('"'))
+    pair = _STATED.fullmatch(line)
+    return None if pair is None else _with_its_unit(pair["name"], pair["value"].strip('"'))
 
 
 def _with_its_unit(name: str, value: str) -> tuple[str, str]:
-    told = _WITH_UNIT.fullmatch(value)
-    if told is None or unit(told["unit"]) is None:
+    parts = _WITH_UNIT.fullmatch(value)
+    if parts is None or unit(parts["unit"]) is None:
         return name, value
-    return f"{name} ({told['unit']})", told["value"]
+    return f"{name} ({parts['unit']})", parts["value"]

@@ -1,6 +1,4 @@
-"""The recordings in the table of the CSV template: rows by row, or many rows of one recording at once.
-
-Campaigns as CSV, by one template: lines about the skin, then a table with a row per line or sample.
+"""Campaigns as CSV by one template: lines about the skin, then a table with a row per line or sample.
 
     schema,campaign/1
     name,palm 3 in May
@@ -11,11 +9,12 @@ Campaigns as CSV, by one template: lines about the skin, then a table with a row
     r1,s01,1.0,10,7.1,-0.5
     ,,,20,7.2,-0.6
 
-Separator, decimal mark and units are the file's own: `;` and `,` work, `preload [mN]` is converted. A first line
-`sep=;` and lines that begin with `#` say nothing; a line of words, below a blank one under the table, is a note. A
-cell in quotes may hold the separator. An empty cell under a quantity that a recording has once repeats the one above;
-an empty `id` continues the recording, and so does its own id where every row has it. A column `conditions.NAME` holds
-whatever else the lab noted. A cell too many, a field that comes again and a recording that begins twice are refused.
+Separator, decimal mark and units are those of the file: `;` and `,` work, `preload [mN]` is converted. A first line
+`sep=;` and lines that begin with `#` are ignored; a line of words below a blank one under the table is a note. A cell
+in quotes may hold the separator. An empty cell of a quantity that a recording has once repeats the one above; an empty
+`id` continues the recording, and so does the same id in every row. A column `conditions.NAME` holds any further
+condition. Surplus cells, repeated fields and recordings that start twice are rejected. Long runs of rows of one id are
+read at once, others row by row.
 """
 
 import cmath
@@ -53,12 +52,12 @@ from underskin.units import LAB, Floats, LabField
 
 POSITION = ("position_x_mm", "position_y_mm")
 _ID = "id"
-_LEAST = 8  # rows that are worth being taken at once
-_Run = tuple[str, int, int]  # an id, the first of its rows and the one behind the last
+_LEAST = 8  # least number of rows that are read at once
+_Run = tuple[str, int, int]  # an id, the index of its first row and the index after its last
 
 
 class CellReader(Protocol):
-    """What reads single cells, and words errors about them."""
+    """Reads single cells, and words errors about them."""
 
     decimal: str
 
@@ -66,135 +65,145 @@ class CellReader(Protocol):
         """The value of a field in the cell at a place (row and column, from 0)."""
 
     def error(self, index: int, reason: str, column: int | None = None) -> FileError:
-        """What is wrong with a row, or with its cell in a column (both from 0)."""
+        """The error of a row, or of its cell in a column (both from 0)."""
 
 
 class TemplateRecordings:
-    """Takes the lines under the headings; `columns` are those that hold fields, of `width` in all."""
+    """Collects recordings from the lines under the headings; `columns`: those that hold fields, of `width` in all."""
 
     def __init__(self, lines: TemplateLines, columns: Sequence[Column], width: int, reader: CellReader) -> None:
         self._lines = lines
         self._columns = columns
-        self._each = [column for column in columns if column.field in (*COLUMNS, MAGNITUDE, PHASE)]
-        self._once = [column for column in columns if column not in self._each]
-        places = [column.place for column in self._each]
-        self._style = RowStyle(lines.separator, reader.decimal, places, width, is_template=True)
-        self._identity = next(column.place for column in columns if column.field == _ID)
+        self._row_columns = [column for column in columns if column.field in (*COLUMNS, MAGNITUDE, PHASE)]
+        self._recording_columns = [column for column in columns if column not in self._row_columns]
+        indices = [column.index for column in self._row_columns]
+        self._style = RowStyle(lines.separator, reader.decimal, indices, width, is_template=True)
+        self._identity = next(column.index for column in columns if column.field == _ID)
         self._width = width
         self._reader = reader
         self._recordings: list[_Recording] = []
-        self._begun: dict[str, int] = {}
+        self._first_rows: dict[str, int] = {}
         self._current, self._continued = "", False  # the id, and whether rows without it have followed
 
     def documents(self) -> list[dict[str, Any]]:
-        """The recordings as in a campaign; raises FileError where a date and a time of day are no time."""
-        for recording, index in zip(self._recordings, self._begun.values(), strict=True):
-            self._date(recording.once, index)
+        """The recordings as in a campaign document; raises FileError for an invalid date and time of day."""
+        for recording, index in zip(self._recordings, self._first_rows.values(), strict=True):
+            self._date(recording.constants, index)
         return [recording.document() for recording in self._recordings]
 
-    def _date(self, once: dict[str, Any], index: int) -> None:
-        """Put `recorded_at` in place of a date and a time of day, of a recording that begins in a row."""
-        day, clock = once.pop(DATE, None), once.pop(CLOCK, None)
-        column = next((one for one in self._columns if one.field == DATE), None)
+    def _date(self, constants: dict[str, Any], index: int) -> None:
+        """Replace a date and a time of day by `recorded_at`, for a recording that starts at row `index`."""
+        day, clock = constants.pop(DATE, None), constants.pop(CLOCK, None)
+        column = next((candidate for candidate in self._columns if candidate.field == DATE), None)
         if column is None or day is clock is None:
             return
         if day is None:
-            raise self._reader.error(index, f"has a time of day, {clock!r}, and no {column.heading}", column.place)
-        once["recorded_at"] = self._reader.value("recorded_at", of_two_cells(day, clock or ""), (index, column.place))
+            raise self._reader.error(index, f"has a time of day, {clock!r}, and no {column.heading}", column.index)
+        constants["recorded_at"] = self._reader.value(
+            "recorded_at", of_two_cells(day, clock or ""), (index, column.index)
+        )
 
     def take(self, first: int, lines: Sequence[str]) -> None:
-        """Take lines, of which the first is at an index; raises FileError."""
+        """Read lines, the first of which has the index `first`; raises FileError."""
         rows = PlainRows(lines, self._style)
         taken = 0
         for line, start, end in rows.runs():
             self._take_rows(first + taken, lines[taken:line])
             ids = [cell.strip() for cell in rows.texts(self._identity, start, end)]
-            for own, run_start, run_end in _runs(ids, start):
+            for recording_id, run_start, run_end in _runs(ids, start):
                 taken = line + run_end - start
                 index = first + line + run_start - start
-                if run_end - run_start < _LEAST or not self._take_run(own, index, rows, slice(run_start, run_end)):
+                if run_end - run_start < _LEAST or not self._take_run(
+                    recording_id, index, rows, slice(run_start, run_end)
+                ):
                     self._take_rows(index, lines[index - first : taken])
         self._take_rows(first + taken, lines[taken:])
 
     def _take_rows(self, first: int, lines: Sequence[str]) -> None:
-        """The same row by row, which names what is wrong."""
+        """Read lines row by row, with errors that name the row."""
         for index, line in enumerate(lines, start=first):
             row = self._lines.cells(index, line)
             if any(row):
                 self._take_row(index, row)
 
     def _take_row(self, index: int, row: Sequence[str]) -> None:
-        own = row[self._identity] if self._identity < len(row) else ""
-        if own in self._begun and self._begins(own):
-            began = self._begun[own] + 1
-            raise self._reader.error(index, f"recording {own!r} began on line {began} already", self._identity)
-        if not own and not self._current:
+        recording_id = row[self._identity] if self._identity < len(row) else ""
+        if recording_id in self._first_rows and self._starts_recording(recording_id):
+            first_line = self._first_rows[recording_id] + 1
+            raise self._reader.error(
+                index, f"recording {recording_id!r} began on line {first_line} already", self._identity
+            )
+        if not recording_id and not self._current:
             raise self._reader.error(index, "the first row of the table needs an id")
-        recording = self._recording(own, index)
+        recording = self._recording(recording_id, index)
         if len(row) > self._width:
             raise self._reader.error(index, f"has {len(row)} cells under {self._width} headings", self._width)
         if contradiction := recording.add(self._values(row, index)):
             raise self._reader.error(index, contradiction)
 
-    def _begins(self, own: str) -> bool:
-        """Whether rows of this id begin a recording."""
-        return bool(own) and (own != self._current or self._continued)
+    def _starts_recording(self, recording_id: str) -> bool:
+        """Whether rows of this id start a recording."""
+        return bool(recording_id) and (recording_id != self._current or self._continued)
 
-    def _recording(self, own: str, index: int) -> "_Recording":
-        """The recording that rows with an id, or with none, belong to."""
-        if self._begins(own):
-            self._current, self._begun[own] = own, index
+    def _recording(self, recording_id: str, index: int) -> "_Recording":
+        """The recording that rows with this id, which may be empty, belong to."""
+        if self._starts_recording(recording_id):
+            self._current, self._first_rows[recording_id] = recording_id, index
             self._recordings.append(_Recording())
-        self._continued = not own
+        self._continued = not recording_id
         return self._recordings[-1]
 
     def _values(self, row: Sequence[str], index: int) -> dict[str, Any]:
         """The values of a row by field."""
         cells = dict(enumerate(row))
         values = {
-            one.field: self._reader.value(one.field, cells.get(one.place, ""), (index, one.place), one.factor)
-            for one in self._columns
+            column.field: self._reader.value(
+                column.field, cells.get(column.index, ""), (index, column.index), column.factor
+            )
+            for column in self._columns
         }
         return template_columns.with_parts(values)
 
-    def _take_run(self, own: str, index: int, rows: PlainRows, run: slice) -> bool:
-        """Take rows of one id at once; False where single rows must tell what they are."""
-        begins = self._begins(own)
-        if (begins and own in self._begun) or not (own or self._current):
+    def _take_run(self, recording_id: str, index: int, rows: PlainRows, run: slice) -> bool:
+        """Read rows of one id at once; False where they must be read one by one."""
+        starts = self._starts_recording(recording_id)
+        if (starts and recording_id in self._first_rows) or not (recording_id or self._current):
             return False
-        once: dict[str, Any] = {}
-        for column in self._once:
-            different = {cell.strip() for cell in set(rows.texts(column.place, run.start, run.stop))} - {""}
+        constants: dict[str, Any] = {}
+        for column in self._recording_columns:
+            different = {cell.strip() for cell in set(rows.texts(column.index, run.start, run.stop))} - {""}
             if len(different) > 1:
                 return False
             for cell in different:
                 try:
-                    once[column.field] = self._reader.value(column.field, cell, (index, column.place), column.factor)
+                    constants[column.field] = self._reader.value(
+                        column.field, cell, (index, column.index), column.factor
+                    )
                 except FileError:
                     return False
         lines: dict[str, Floats | None] = {}
-        for place, column in enumerate(self._each):
-            filled = rows.filled[run, place]
+        for number, column in enumerate(self._row_columns):
+            filled = rows.filled[run, number]
             if filled.any() and not filled.all():
                 return False
-            lines[column.field] = rows.numbers[place][run] * column.factor if filled.any() else None
-        whole = _with_parts(lines)
-        if whole is None or (not begins and self._recordings[-1].contradiction(once)):
+            lines[column.field] = rows.numbers[number][run] * column.factor if filled.any() else None
+        columns = _with_parts(lines)
+        if columns is None or (not starts and self._recordings[-1].contradiction(constants)):
             return False
-        self._recording(own, index).add_lines(once, whole, run.stop - run.start)
+        self._recording(recording_id, index).add_lines(constants, columns, run.stop - run.start)
         return True
 
 
 def _runs(ids: Sequence[str], start: int) -> Iterator[_Run]:
-    """The runs of rows of one id, of which the first row is at `start`."""
-    for own, run in groupby(ids):
+    """The runs of rows of one id; the first row has the index `start`."""
+    for recording_id, run in groupby(ids):
         end = start + sum(1 for _ in run)
-        yield own, start, end
+        yield recording_id, start, end
         start = end
 
 
 def _with_parts(lines: dict[str, Floats | None]) -> dict[str, Floats | None] | None:
-    """Columns with real and imaginary part in place of magnitude and phase; None where one lacks the other."""
+    """Columns with real and imaginary part instead of magnitude and phase; None where one of these is missing."""
     if MAGNITUDE not in lines:
         return lines
     others = {field: values for field, values in lines.items() if field not in (MAGNITUDE, PHASE)}
@@ -208,115 +217,123 @@ def _with_parts(lines: dict[str, Floats | None]) -> dict[str, Floats | None] | N
 
 
 def _are_nan(*values: Any) -> bool:
-    """Whether all are NaN, which equals nothing and is refused once the table is read."""
+    """Whether all values are NaN, which is unequal to itself and rejected after the table is read."""
     return all(isinstance(value, float) and math.isnan(value) for value in values)
 
 
 class _Recording:
-    """A recording under way: what it has once, and its columns in parts."""
+    """A recording being read: its `constants`, one value each, and its columns in parts."""
 
     def __init__(self) -> None:
-        self.once: dict[str, Any] = {}
+        self.constants: dict[str, Any] = {}
         self.columns: dict[str, list[Floats | list[Any]]] = {}
 
-    def contradiction(self, once: Mapping[str, Any]) -> str:
-        """What contradicts the rows above, in words."""
-        for field, value in once.items():
-            above = self.once.get(field)
+    def contradiction(self, constants: Mapping[str, Any]) -> str:
+        """The first contradiction to the rows above, in words; empty without one."""
+        for field, value in constants.items():
+            above = self.constants.get(field)
             if value is not None and above is not None and above != value and not _are_nan(above, value):
                 return f"{field} = {value!r}, but {above!r} above it"
         return ""
 
     def add(self, line: Mapping[str, Any]) -> str:
-        """Take the values of a row; what contradicts those above it, in words."""
-        entries = {field: line[field] for field in COLUMNS if field in line}
-        if any(value is not None for value in entries.values()):  # one missing beside others is for the checks
-            for field, value in entries.items():
+        """Add the values of a row; returns a contradiction to the rows above, in words."""
+        line_values = {field: line[field] for field in COLUMNS if field in line}
+        if any(value is not None for value in line_values.values()):  # a single missing value is left to the checks
+            for field, value in line_values.items():
                 parts = self.columns.setdefault(field, [])
                 last = parts[-1] if parts else None
                 if isinstance(last, list):
                     last.append(value)
                 else:
                     parts.append([value])
-        once = {field: value for field, value in line.items() if field not in COLUMNS and value is not None}
-        if contradiction := self.contradiction(once):
+        constants = {field: value for field, value in line.items() if field not in COLUMNS and value is not None}
+        if contradiction := self.contradiction(constants):
             return contradiction
-        self.once |= once
+        self.constants |= constants
         return ""
 
-    def add_lines(self, once: Mapping[str, Any], lines: Mapping[str, Floats | None], count: int) -> None:
-        """Take `count` rows at once, by their columns, and what they have once, which contradicts nothing."""
-        self.once |= once
+    def add_lines(self, constants: Mapping[str, Any], lines: Mapping[str, Floats | None], count: int) -> None:
+        """Add `count` rows by their columns, and constants without contradiction."""
+        self.constants |= constants
         if any(values is not None for values in lines.values()):
             for field in (name for name in COLUMNS if name in lines):
                 values = lines[field]
                 self.columns.setdefault(field, []).append([None] * count if values is None else values)
 
     def document(self) -> dict[str, Any]:
-        """As in a campaign: one position, and no columns that it leaves empty, which are another kind's."""
+        """The recording as in a campaign document: one position, without empty columns, which belong to other kinds."""
         columns = {name: _joined(parts) for name, parts in self.columns.items() if not all(map(_is_empty, parts))}
-        position = [self.once.pop(name, None) for name in POSITION]
-        noted = {name.removeprefix(FURTHER): value for name, value in self.once.items() if name.startswith(FURTHER)}
-        own = {name: value for name, value in self.once.items() if not name.startswith(FURTHER)}
+        position = [self.constants.pop(name, None) for name in POSITION]
+        conditions = {
+            name.removeprefix(FURTHER): value for name, value in self.constants.items() if name.startswith(FURTHER)
+        }
+        single_values = {name: value for name, value in self.constants.items() if not name.startswith(FURTHER)}
         return {
             **({} if position == [None, None] else {"position_mm": position}),
-            **own,
-            **({"conditions": noted} if noted else {}),
+            **single_values,
+            **({"conditions": conditions} if conditions else {}),
             **columns,
         }
 
 
 def _is_empty(part: Floats | list[Any]) -> bool:
-    return isinstance(part, list) and all(entry is None for entry in part)
+    return isinstance(part, list) and all(value is None for value in part)
 
 
 def _joined(parts: Sequence[Floats | list[Any]]) -> Floats | list[Any]:
-    """An array where some parts are, and the others hold numbers alone; else a list."""
+    """The parts of a column as an array where some are arrays and the others hold only numbers; else as a list."""
     if any(isinstance(part, np.ndarray) for part in parts) and not any(map(_is_other, parts)):
         return np.concatenate(parts)
-    return _counted([entry for part in parts for entry in (part.tolist() if isinstance(part, np.ndarray) else part)])
+    return _counted([value for part in parts for value in (part.tolist() if isinstance(part, np.ndarray) else part)])
 
 
-def _counted(entries: list[Any]) -> list[Any]:
-    """The entries of a column, of which the first that is no number says how many more there are."""
-    wrong = [place for place, entry in enumerate(entries) if isinstance(entry, CellText)]
-    if len(wrong) > 1:
-        first = entries[wrong[0]]
-        entries[wrong[0]] = CellText(first, f"{first.place}, and {len(wrong) - 1} more in this column")
-    return entries
+def _counted(values: list[Any]) -> list[Any]:
+    """The values of a column, with the count of invalid cells in the place of the first one."""
+    invalid = [index for index, value in enumerate(values) if isinstance(value, CellText)]
+    if len(invalid) > 1:
+        first = values[invalid[0]]
+        values[invalid[0]] = CellText(first, f"{first.place}, and {len(invalid) - 1} more in this column")
+    return values
 
 
 def _is_other(part: Floats | list[Any]) -> bool:
-    """Whether a part holds anything but numbers."""
-    return isinstance(part, list) and not all(isinstance(entry, float) for entry in part)
+    """Whether a list holds anything but numbers."""
+    return isinstance(part, list) and not all(isinstance(value, float) for value in part)
 
 
 _SENSOR = ("id", "x_mm", "y_mm")
 _TEXTS = ("id", "kind", "sensor", "recorded_at", "estimator", "name", "skin.id", DATE, CLOCK)
 _TOLERANCE = "tolerances."
 _SKIN_FIELDS = (
-    *(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name not in ("sensors", "tolerances")),
-    *(f"skin.{_TOLERANCE}{entry.name}" for entry in fields(Tolerances)),
+    *(
+        f"skin.{model_field.name}"
+        for model_field in fields(SkinDescription)
+        if model_field.name not in ("sensors", "tolerances")
+    ),
+    *(f"skin.{_TOLERANCE}{model_field.name}" for model_field in fields(Tolerances)),
 )
-_KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(POSITION)) - {"conditions"}
-_MOST_ABOVE = 10_000  # lines
+_FIELDS = ({model_field.name for kind in KINDS.values() for model_field in fields(kind)} | set(POSITION)) - {
+    "conditions"
+}
+_MOST_LINES_ABOVE = 10_000  # lines
 _FLAGS = {"true": True, "false": False}
 
 
 def is_template(content: str) -> bool:
-    """Whether a text begins as the template does."""
+    """Whether a text starts like the template."""
     return template_lines.separator_of(content) is not None
 
 
 def has_table(content: str) -> bool:
-    """Whether a line of a text whose cells are separated by tabs is the headings of the table."""
-    return any(_begins_table(line.split("\t")) for line in content.splitlines())
+    """Whether a tab-separated text has a line of headings of the table."""
+    return any(_is_heading_row(line.split("\t")) for line in content.splitlines())
 
 
 def read(stream: BinaryIO, file: str, sheet: str = "") -> Document:
     """The campaign document of a filled-in template; raises FileError that names the line.
 
-    `sheet`: where in a workbook the text stands, in words, for cells that are no number.
+    `sheet`: the place of the text in a workbook, in words, for errors.
     """
     source = BlockText(stream, file)
     separator = template_lines.separator_of(next(source.blocks()))
@@ -326,8 +343,8 @@ def read(stream: BinaryIO, file: str, sheet: str = "") -> Document:
     return Document(template.document(), tuple(template.warnings))
 
 
-def _begins_table(row: Sequence[str]) -> bool:
-    """Whether a row is the headings: they begin with id, behind an index without a heading too."""
+def _is_heading_row(row: Sequence[str]) -> bool:
+    """Whether a row is that of the headings: it starts with id, or with an unnamed index column and id."""
     first, second = [cell.lower() for cell in [*row, ""][:2]]
     return first == _ID or (first in NO_NAME and second == _ID)
 
@@ -339,23 +356,23 @@ class _Template:
         self.lines = lines
         self.separator = lines.separator
         self.decimal = text.decimal_mark(lines.holding, lines.separator)
-        self.rows = self._to_the_headings()
-        self.stated: dict[str, int] = {}  # where the fields above the table stand
+        self.rows = self._rows_to_headings()
+        self.stated: dict[str, int] = {}  # line indices of the fields above the table
         self.warnings: list[str] = []
         self.has_local_times = False
 
-    def _to_the_headings(self) -> list[list[str]]:
+    def _rows_to_headings(self) -> list[list[str]]:
         """The rows above the table, and last the headings."""
         rows = []
-        for row in islice(self.lines, _MOST_ABOVE):
+        for row in islice(self.lines, _MOST_LINES_ABOVE):
             rows.append(row)
-            if _begins_table(row):
+            if _is_heading_row(row):
                 return rows
         raise self.error(len(rows) - 1, "the table is missing: no line begins with id")
 
     def document(self) -> dict[str, Any]:
         """The campaign document."""
-        above = [self._above(row, index) for index, row in enumerate(self.rows[:-1]) if any(row)]
+        above = [self._read_line_above(row, index) for index, row in enumerate(self.rows[:-1]) if any(row)]
         parts = {part: {field: value for of, field, value in above if of == part} for part in ("campaign", "skin")}
         sensors = [value for part, _, value in above if part == "sensor"]
         tolerances = {name: value for name, value in parts["skin"].items() if name.startswith(_TOLERANCE)}
@@ -365,14 +382,14 @@ class _Template:
         skin |= {"sensors": sensors} if sensors else {}
         return {"schema": SCHEMA, **parts["campaign"], "skin": skin, "recordings": self._recordings()}
 
-    def _above(self, row: list[str], index: int) -> tuple[str, str, Any]:
-        """A line above the table: what it is about (campaign, skin or sensor), its field and its value."""
+    def _read_line_above(self, row: list[str], index: int) -> tuple[str, str, Any]:
+        """A line above the table: its subject (campaign, skin or sensor), its field and its value."""
         name = template_columns.in_small_letters(row[0])
         self._require_few(row, index, 4 if name == "sensor" else 2)
         cell = row[1] if len(row) > 1 else ""
         if name == "sensor":
             values = [*row[1:], "", "", ""]
-            sensor = {key: self.value(key, values[place], (index, place + 1)) for place, key in enumerate(_SENSOR)}
+            sensor = {key: self.value(key, values[column], (index, column + 1)) for column, key in enumerate(_SENSOR)}
             return "sensor", name, sensor
         if name in ("schema", "name", "units_checked"):
             self._require_first(name, index)
@@ -387,14 +404,14 @@ class _Template:
         return "skin", field, value
 
     def _require_few(self, row: list[str], index: int, most: int) -> None:
-        """Refuses cells behind those that a line above the table has, such as what follows a decimal comma."""
+        """Reject surplus cells of a line above the table, such as the digits after a decimal comma."""
         if len(row) > most:
             point = ", decimals are written with a point" if self.separator == "," else ""
             hint = f"cells that hold {self.separator!r} go in quotes{point}"
             raise self.error(index, f"{row[most]!r} is a cell too many under {row[0]}: {hint}", most)
 
     def _require_first(self, field: str, index: int) -> None:
-        """Refuses a field that stands above already."""
+        """Reject a field that was stated before."""
         before = self.stated.setdefault(field, index)
         if before != index:
             raise self.error(index, f"{field} is given on line {before + 1} already", 0)
@@ -403,12 +420,12 @@ class _Template:
         return any([cell.lower() for cell in row[:2]] == ["units_checked", "true"] for row in self.rows)
 
     def _require_meant(self, heading: str, field: str, cell: str, converted: Any, index: int) -> None:
-        """Refuses a value that is likely in the field's unit and unlikely in the one that its heading says."""
-        number, known = text.number(cell, self.decimal), LAB[field]
-        if number is None or known.likely is None or _likely(known, converted) or not _likely(known, number):
+        """Reject a value that is likely in the field's unit and unlikely in the unit of its heading."""
+        number, quantity = text.number(cell, self.decimal), LAB[field]
+        if number is None or quantity.likely is None or _likely(quantity, converted) or not _likely(quantity, number):
             return
-        said = f"{cell} {labelled_unit(heading)} is {converted:g} {known.unit}: was {cell} {known.unit} meant?"
-        raise self.error(index, f"{heading} = {cell}: {said} (if not, units_checked,true)")
+        hint = f"{cell} {labelled_unit(heading)} is {converted:g} {quantity.unit}: was {cell} {quantity.unit} meant?"
+        raise self.error(index, f"{heading} = {cell}: {hint} (if not, units_checked,true)")
 
     def _recordings(self) -> list[dict[str, Any]]:
         start, end = len(self.rows), self._end()
@@ -418,13 +435,13 @@ class _Template:
         return recordings.documents()
 
     def _end(self) -> int:
-        """The row behind the last of the table; words under it are notes, single ones below a blank line."""
+        """The index after the last row of the table; rows of words below a blank line are notes."""
         start = len(self.rows)
         end = start
         under: list[list[str]] = []  # the rows behind the last that has numbers
         for first, lines in self.lines.blocks(start):
             last = next(
-                (place for place in reversed(range(len(lines))) if self._is_full(first + place, lines[place])), None
+                (number for number in reversed(range(len(lines))) if self._is_full(first + number, lines[number])), None
             )
             if last is not None:
                 end, under = first + last + 1, []
@@ -432,11 +449,11 @@ class _Template:
             under += [self.lines.cells(index, line) for index, line in rest]
         cut = sum(1 for _ in takewhile(self._may_be_cut, under))
         notes = [(index, row) for index, row in enumerate(under[cut:], start=end + cut) if row[0]]
-        self.warnings += [template_lines.note_told(index + 1, row) for index, row in notes]
+        self.warnings += [template_lines.note_message(index + 1, row) for index, row in notes]
         return end + cut
 
     def _is_full(self, index: int, line: str) -> bool:
-        """Whether a line has more than words; one whose quotes do not close is refused when its turn comes."""
+        """Whether a line holds more than words; one with unclosed quotes is rejected later."""
         if self.separator not in line:
             return False
         try:
@@ -446,45 +463,45 @@ class _Template:
         return any(cells[1:]) and not template_lines.is_note(cells)
 
     def _may_be_cut(self, row: Sequence[str]) -> bool:
-        """Whether words directly under the rows may begin a recording whose numbers are missing: no cell names a sensor
-        or a kind that there is none of."""
-        known = {"sensor": self._sensors(), "kind": set(KINDS)}
-        names = [(known.get(heading.lower()), cell) for heading, cell in zip(self.rows[-1], row, strict=False)]
-        return any(row) and all(not cell or not those or cell in those for those, cell in names)
+        """Whether words directly under the rows may start a recording whose numbers are missing: no cell names an
+        unknown sensor or kind."""
+        known_values = {"sensor": self._sensors(), "kind": set(KINDS)}
+        names = [(known_values.get(heading.lower()), cell) for heading, cell in zip(self.rows[-1], row, strict=False)]
+        return any(row) and all(not cell or not allowed or cell in allowed for allowed, cell in names)
 
     def _sensors(self) -> set[str]:
         return {row[1] for row in self.rows[:-1] if row[0].lower() == "sensor" and len(row) > 1}
 
     def _columns(self, start: int, end: int) -> list[Column]:
-        """The field of each column and the factor to its unit, each field once."""
+        """The columns that hold fields, each field once."""
         headings = self.rows[-1]
 
         def under(places: Sequence[int]) -> Iterator[list[str]]:
             return self.lines.under(places, len(headings), start, end)
 
         try:
-            columns, left_out = template_columns.columns(headings, under, _KNOWN, self.decimal)
+            columns, notes = template_columns.columns(headings, under, _FIELDS, self.decimal)
         except NoField as error:
-            raise self.error(start - 1, str(error), error.place) from None
-        self.warnings += left_out
+            raise self.error(start - 1, str(error), error.index) from None
+        self.warnings += notes
         self.warnings += template_columns.halved(column.heading for column in columns)
         return columns
 
     def _field(self, name: str, index: int) -> tuple[str, float]:
-        """The field of the skin that a name above the table means, and the factor to its unit."""
+        """The field of the skin for a name above the table, and the factor to its unit."""
         if f"skin.{name}" in _SKIN_FIELDS:
             return name, 1.0
-        known = lab_field(name)
-        if known is None:
+        field_and_factor = lab_field(name)
+        if field_and_factor is None:
             close = get_close_matches(f"skin.{name}", _SKIN_FIELDS, 1)
             guess = f"; did you mean {close[0]}?" if close else ""
             raise self.error(index, f"{name!r} is no field, or its unit is not of the field{guess}")
-        return known
+        return field_and_factor
 
     def value(self, field: str, cell: str, place: tuple[int, int], factor: float = 1.0) -> Any:
         """The number in the cell at a place (row and column, from 0).
 
-        What is no number stays as it is, for the campaign's checks to refuse.
+        Anything else is unchanged, to be rejected by the campaign's checks.
         """
         if cell and field == "recorded_at":
             return self._time(cell, place)
@@ -512,11 +529,11 @@ class _Template:
         return time
 
     def error(self, index: int, reason: str, column: int | None = None) -> FileError:
-        """What is wrong with a row, or with its cell in a column (both from 0)."""
+        """The error of a row, or of its cell in a column (both from 0)."""
         place = f"line {index + 1}" if column is None else f"line {index + 1}, column {column + 1}"
         return FileError(self.file, place, reason)
 
 
-def _likely(known: LabField, value: float) -> bool:
-    assert known.likely is not None
-    return known.likely[0] <= value <= known.likely[1]
+def _likely(quantity: LabField, value: float) -> bool:
+    assert quantity.likely is not None
+    return quantity.likely[0] <= value <= quantity.likely[1]

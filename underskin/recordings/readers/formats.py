@@ -1,4 +1,4 @@
-"""The file formats that are read: those of this package, by a file's content, and those of others, by its name.
+"""The supported file formats: those of this package, detected by a file's content, and those of others, by its name.
 
 Another package adds a format through an entry point of the group `underskin.readers`, which names a `FileFormat`.
 """
@@ -55,9 +55,9 @@ _STARTS = {
 class FileFormat:
     """A file format of another package.
 
-    `name` is what it is called in messages. Files whose names end with one of the `suffixes` (such as ".dat") are read
-    by `read`, which gets the open file and its name, and answers with its channels or raises FileError. It runs in a
-    process of its own that has limits on memory and time.
+    `name` is its name in messages. Files whose names end with one of the `suffixes` (such as ".dat") are read by
+    `read`, which gets the open file and its name, and returns its channels or raises FileError. It runs in a separate
+    process with limits on memory and time.
     """
 
     name: str
@@ -67,12 +67,12 @@ class FileFormat:
 
 @cache
 def formats_of_other_packages() -> Mapping[str, FileFormat]:
-    """By name.
+    """The formats of other packages by name.
 
     Raises
     ------
     ExtensionError
-        Where one cannot be used: names its package, the format and the field.
+        For an invalid format: names its package, the format and the field.
     """
     formats: dict[str, FileFormat] = {}
     for extension in extensions.load(GROUP):
@@ -102,7 +102,7 @@ def _check(extension: extensions.Extension, others: Mapping[str, FileFormat]) ->
 
 
 def is_parsed_apart(name: str) -> bool:
-    """Whether files of a format are parsed in a process of their own, whatever their size."""
+    """Whether files of a format are parsed in a separate process, whatever their size."""
     return name in BINARY or name not in MODULES
 
 
@@ -136,8 +136,8 @@ def _text_format(head: bytes, file: str) -> str:
     try:
         start = text.decode(head[: len(head) // 2 * 2 or 1], file).lstrip()
     except FileError as error:
-        known = "campaign JSON and HDF5, CSV, XLSX, TDMS, LVM, UFF58 and MATLAB files"
-        raise FileError(file, error.place, f"is of no format that is read here: {known}") from None
+        supported = "campaign JSON and HDF5, CSV, XLSX, TDMS, LVM, UFF58 and MATLAB files"
+        raise FileError(file, error.place, f"is of no format that is read here: {supported}") from None
     if start[:1] == "{" or _JSON_LIST.match(start):
         return "JSON"
     if start.startswith(lvm_file.MAGIC):
@@ -152,10 +152,10 @@ def parse(name: str, stream: BinaryIO, file: str) -> Contents | Document:
     """
     if name in MODULES:
         module = importlib.import_module(f"underskin.recordings.readers.{MODULES[name]}")
-        held = module.read(stream, file)
-        held = held if isinstance(held, Contents | Document) else Document(held)
+        content = module.read(stream, file)
+        content = content if isinstance(content, Contents | Document) else Document(content)
         cut = cut_end.warning(stream) if name in _TABLES else ""
-        return replace(held, warnings=(*held.warnings, cut)) if cut else held
+        return replace(content, warnings=(*content.warnings, cut)) if cut else content
     stream.seek(0)
     contents = formats_of_other_packages()[name].read(stream, file)
     if not isinstance(contents, Contents):

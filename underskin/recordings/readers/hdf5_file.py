@@ -1,12 +1,11 @@
-"""HDF5 files from outside. They may hold nothing that leads out of them, or back to where the walk has been, and no
-data that were never written.
-
-Campaigns as HDF5, field for field as in JSON, and back without loss.
+"""Campaigns as HDF5, field for field as in JSON, without loss.
 
 /                        attributes schema, name, units_checked
-/skin                    attributes as in the document; tolerances.thickness_percent and its like
+/skin                    attributes as in the document; tolerances.thickness_percent etc.
 /skin/sensors            datasets id, x_mm, y_mm
 /recordings/<number>     attributes for single values, a dataset for each column
+
+Files from outside may not hold links out of the file, cycles, or datasets that declare data never written.
 """
 
 import re
@@ -31,9 +30,9 @@ _LARGEST_COMPRESSION = 1100  # deflate's is 1032
 
 @contextmanager
 def opened(stream: BinaryIO, file: str, what: str) -> Iterator[Any]:
-    """The root of a file, which a message calls `what`.
+    """The root of a file, named `what` in messages.
 
-    Raises FileError where it is damaged, or holds what it may not.
+    Raises FileError where it is damaged, or holds forbidden objects.
     """
     stream.seek(0)
     with damage_said(file, "", lambda error: f"{what} {damage(error)}"), h5py.File(stream, "r") as source:
@@ -42,7 +41,7 @@ def opened(stream: BinaryIO, file: str, what: str) -> Iterator[Any]:
 
 
 def damage(error: Exception) -> str:
-    """What is wrong with the file; h5py lets any exception of a damaged one through."""
+    """The damage of a file in words; h5py raises any exception for one."""
     cut = _CUT.search(str(error))
     if cut is not None:
         return f"was cut off: {cut[1]} of its {cut[2]} bytes are there; copy it once more"
@@ -50,8 +49,8 @@ def damage(error: Exception) -> str:
 
 
 def refuse_outside(source: Any, file: str) -> None:
-    """Raises FileError at a soft or external link, external storage, a virtual dataset, a group met again, or a dataset
-    that declares more than the file can have stored."""
+    """Raise FileError for a soft or external link, external storage, a virtual dataset, a cycle, or a dataset that
+    declares more than the file can have stored."""
     seen: set[Any] = set()
     for item, here in _objects(source, "", 0, file):
         address = h5py.h5o.get_info(item.id).addr
@@ -65,7 +64,7 @@ def refuse_outside(source: Any, file: str) -> None:
 
 
 def _objects(group: Any, path: str, depth: int, file: str) -> Iterator[tuple[Any, str]]:
-    """Each object below a group, with its path, before what it holds itself."""
+    """Each object below a group with its path, parents first."""
     if depth > _DEEPEST:
         raise FileError(file, path, _TOO_MUCH)
     for name in group:
@@ -96,7 +95,7 @@ def write(campaign: Campaign, stream: BinaryIO) -> None:
 
 
 def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, Any]], file: Path | BinaryIO) -> None:
-    """Write a campaign document whose recordings come one by one; what `about` has of them is not read."""
+    """Write a campaign document with an iterable of recordings; those in `about` are ignored."""
     with h5py.File(file, "w", libver="latest") as target:
         _write_attributes(target, {name: about[name] for name in about if name not in ("skin", "recordings")})
         skin = dict(about["skin"])
@@ -106,8 +105,8 @@ def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, A
         for name in ("id", "x_mm", "y_mm") if sensors else ():
             target[f"skin/sensors/{name}"] = [sensor[name] for sensor in sensors]
         groups = target.create_group("recordings")
-        for number, recording in enumerate(recordings):
-            group = groups.create_group(f"{number:06d}")
+        for index, recording in enumerate(recordings):
+            group = groups.create_group(f"{index:06d}")
             _write_attributes(group, {name: value for name, value in recording.items() if name not in COLUMNS})
             for name in recording.keys() & set(COLUMNS):
                 group[name] = np.array(recording[name], dtype=np.float64)

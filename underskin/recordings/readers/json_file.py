@@ -1,8 +1,7 @@
-"""Keys that come twice in one object of a JSON document: parsers take the last and say nothing.
+"""Campaigns as JSON (`campaign/1`), the format all others are converted to.
 
-The search hops from one quotation mark to the next, so that the numbers between them cost little.
-
-Campaigns as JSON (`campaign/1`), the format all others are turned into.
+Repeated keys of an object, of which parsers silently use the last, are rejected; the search jumps from one quotation
+mark to the next, so that the numbers between them cost little.
 """
 
 import json
@@ -21,8 +20,8 @@ _COLON = re.compile(rb"\s*:")
 
 
 def repeated_key(document: bytes) -> tuple[str, str] | None:
-    """The first key that comes again in its object, however it is escaped, and the line and column of its second
-    place, from 1, in words; None where there is none.
+    """The first repeated key of an object, in any escaping, and the line and column of its second place, from 1, in
+    words; None without one.
 
     `document` must be valid JSON, in UTF-8, or in UTF-16 or UTF-32, which Python's own parser reads too.
     """
@@ -30,7 +29,7 @@ def repeated_key(document: bytes) -> tuple[str, str] | None:
     number = _number_of_repeated(document)
     if number is None:
         return None
-    string = next(match for place, match in enumerate(_STRING.finditer(document)) if place == number)
+    string = next(match for index, match in enumerate(_STRING.finditer(document)) if index == number)
     before = document[: string.start()].decode("utf-8", "replace")
     line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
     return _unescaped(string[1]), f"line {line}, column {column}"
@@ -44,8 +43,8 @@ def _in_utf8(document: bytes) -> bytes:
 
 
 def _number_of_repeated(document: bytes) -> int | None:
-    """Which string of the document, from 0, is the first key that comes again."""
-    if b"\\" in document:  # then leave no quotation mark but those that begin and end strings
+    """The index, from 0, of the string of the document that is the first repeated key."""
+    if b"\\" in document:  # replace quotation marks within strings
         document = _ESCAPE.sub(lambda escape: _AS_UNICODE[escape[1]], document)
     objects: list[set[bytes]] = []  # the keys of those that are open
     number = behind = 0
@@ -70,9 +69,9 @@ def _number_of_repeated(document: bytes) -> int | None:
 
 
 def _braces(document: bytes, start: int, end: int) -> tuple[int, bool]:
-    """How many open objects the braces between two strings close, and whether they open one that stays open.
+    """The number of open objects that the braces between two strings close, and whether they open one that stays open.
 
-    No object has a key between two strings, so that the last brace alone can open one that stays open.
+    No object has a key between two strings, so that only the last brace can open one that stays open.
     """
     opening, closing = document.find(b"{", start, end), document.find(b"}", start, end)
     if opening < 0 and closing < 0:
@@ -103,13 +102,13 @@ def document(data: bytes, file: str) -> Any:
     """
     data = data.removeprefix(_BOM)
     try:
-        read = orjson.loads(data)
+        parsed = orjson.loads(data)
     except orjson.JSONDecodeError as error:
         raise FileError(file, f"line {error.lineno}, column {error.colno}", f"not JSON: {error.msg}") from None
     if repeated := repeated_key(data):
         key, place = repeated
         raise FileError(file, place, f"the key {key!r} must be given once in its object")
-    return read
+    return parsed
 
 
 def write(campaign: Campaign) -> bytes:

@@ -1,7 +1,7 @@
-"""Long JSON documents, read by `sandbox.call_apart` in a process of its own: long lists of numbers become arrays.
+"""Long JSON documents, read by `sandbox.call_apart` in a separate process: long lists of numbers become arrays.
 
-The lists are cut out of the text and converted piece by piece, which takes 8 bytes a number and no Python object for
-each; what is left is short, and is read as any JSON. So little memory suffices, and whoever asked gets arrays.
+The lists are cut out of the text and converted piece by piece, with 8 bytes a number and no Python object for each; the
+rest is short, and is parsed as usual.
 """
 
 import re
@@ -17,17 +17,16 @@ from underskin.units import Floats
 
 _BOM = b"\xef\xbb\xbf"
 _PIECE = 1 << 16  # characters of a list that are objects at once
-# A string, which may hold anything; a list of numbers alone, not in place of a key; or a quotation mark that begins no
-# string.
+# A string; a list of only numbers, not in place of a key; or an unclosed quotation mark.
 _PARTS = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"|\[([-+0-9.eE,\s]{64,}+)\](?!\s*+:)|"', re.DOTALL)
-_NO_MEMORY = "Not enough memory"  # how orjson says it
-_DEEPEST = 200  # lists and objects in each other, which is what can be answered
+_NO_MEMORY = "Not enough memory"  # message of orjson
+_DEEPEST = 200  # nesting of lists and objects, the limit of an answer
 
 
 def read(stream: BinaryIO, most_plain: str, most_numbers: str) -> dict[str, Any]:
-    """One of: `document`; `invalid`, the line, the column and what is wrong there; `repeated`, a key and its second
-    place; `plain`, the bytes beside long lists of numbers where they are more than `most_plain`; `numbers`, how many
-    are in a list that has more than `most_numbers`."""
+    """One of: `document`; `invalid`, the line, the column and the error; `repeated`, a repeated key and its second
+    place; `plain`, the number of bytes outside long lists of numbers where above `most_plain`; `numbers`, the length of
+    a list above `most_numbers`."""
     body = stream.read().removeprefix(_BOM)
     mark = secrets.token_hex(16)  # nothing in the document can pass for a list that was cut out
     try:
@@ -54,7 +53,7 @@ class _TooMany(Exception):
 
 def _cut(body: bytes, mark: str, most_numbers: int) -> tuple[bytes, list[Floats]]:
     """The document with a string in place of each long list of numbers, and these lists; raises _TooMany."""
-    kept: list[bytes] = []
+    pieces: list[bytes] = []
     arrays: list[Floats] = []
     behind = 0
     for part in _PARTS.finditer(body):
@@ -62,14 +61,14 @@ def _cut(body: bytes, mark: str, most_numbers: int) -> tuple[bytes, list[Floats]
             break
         array = None if part.start(1) < 0 else _numbers(body, *part.span(1), most_numbers)
         if array is not None:
-            kept += body[behind : part.start()], b'"%b:%d"' % (mark.encode(), len(arrays))
+            pieces += body[behind : part.start()], b'"%b:%d"' % (mark.encode(), len(arrays))
             arrays.append(array)
             behind = part.end()
-    return b"".join((*kept, body[behind:])), arrays
+    return b"".join((*pieces, body[behind:])), arrays
 
 
 def _numbers(body: bytes, start: int, end: int, most: int) -> Floats | None:
-    """The numbers between two commas each; None where the list is not as JSON has it. Raises _TooMany."""
+    """The comma-separated numbers; None where the list is no valid JSON. Raises _TooMany."""
     count = body.count(b",", start, end) + 1
     if count > most:
         raise _TooMany(count)
@@ -91,11 +90,11 @@ def _numbers(body: bytes, start: int, end: int, most: int) -> Floats | None:
 
 
 def _place(body: bytes, error: orjson.JSONDecodeError) -> list[Any]:
-    """Where the whole document, not what was left of it, is no JSON."""
+    """Line, column and message of the error in the original document."""
     try:
         orjson.loads(body)
-    except orjson.JSONDecodeError as whole:
-        error = whole
+    except orjson.JSONDecodeError as error_in_whole:
+        error = error_in_whole
     return [error.lineno, error.colno, error.msg]
 
 
@@ -103,9 +102,9 @@ def _with_arrays(value: Any, mark: str, arrays: list[Floats], depth: int) -> Any
     if depth > _DEEPEST:
         raise FileError("", "", f"lists and objects are nested more than {_DEEPEST} deep")
     if isinstance(value, dict):
-        return {name: _with_arrays(entry, mark, arrays, depth + 1) for name, entry in value.items()}
+        return {name: _with_arrays(item, mark, arrays, depth + 1) for name, item in value.items()}
     if isinstance(value, list):
-        return [_with_arrays(entry, mark, arrays, depth + 1) for entry in value]
+        return [_with_arrays(item, mark, arrays, depth + 1) for item in value]
     if isinstance(value, str) and value.startswith(mark):
         return arrays[int(value.removeprefix(f"{mark}:"))]
     return value

@@ -1,8 +1,8 @@
 """LabVIEW measurement files (LVM), text: a header, then segments of channels.
 
-Each acquisition is a block: a segment, or, where a segment goes on after its stated number of samples, each run of that
-many. Comments at the ends of rows are left out. Source of the format: "Specification for the LabVIEW Measurement File
-(.lvm)", National Instruments.
+Each acquisition is a block: a segment, or, where a segment continues after its stated number of samples, each run of
+that many. Comments at the ends of rows are ignored. Source of the format: "Specification for the LabVIEW Measurement
+File (.lvm)", National Instruments.
 """
 
 import re
@@ -19,7 +19,7 @@ from underskin.recordings.readers import text
 
 MAGIC = "LabVIEW Measurement"
 _END_OF_HEADER = "***End_of_Header***"
-_OF_EACH_CHANNEL = ("Samples", "Delta_X", "Date", "Time", "X_Dimension")  # rows of a header that name all channels
+_CHANNEL_ROWS = ("Samples", "Delta_X", "Date", "Time", "X_Dimension")  # rows of a header that name all channels
 _LEAST_STEP_S = 1e-12
 _SAME_START_S = 1e-6
 _LATEST_S = 1e10  # LabVIEW counts seconds from 1904
@@ -29,7 +29,7 @@ _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
 @dataclass
 class _Segment:
-    """A segment under way: its header's rows and its data rows, with their line numbers."""
+    """A segment being read: its header's rows and its data rows, with their line numbers."""
 
     header: dict[str, list[str]] = field(default_factory=dict)
     names: list[str] = field(default_factory=list)
@@ -91,7 +91,7 @@ class _Reader:
         self.file = file
         self.separator = separator
         self.decimal = header.get("Decimal_Separator")
-        self.began = _moment(header.get("Date", ""), header.get("Time", ""))
+        self.start_time = _moment(header.get("Date", ""), header.get("Time", ""))
         self.x_columns = header.get("X_Columns", "One")
         self.warnings = warnings
 
@@ -107,7 +107,7 @@ class _Reader:
         channels = [
             Channel(
                 names[1 + step * channel] or f"channel {channel + 1}",
-                _entry(segment, "Y_Unit_Label", channel),
+                _header_cell(segment, "Y_Unit_Label", channel),
                 np.array(values, dtype=np.float64),
                 self._rate(segment, channel),
                 starts[channel],
@@ -118,20 +118,24 @@ class _Reader:
 
     def _rate(self, segment: _Segment, channel: int) -> float | None:
         """1/Delta_X of a channel over time."""
-        step = self._number(_entry(segment, "Delta_X", channel))
-        is_time = _entry(segment, "X_Dimension", channel) in ("Time", "")
+        step = self._number(_header_cell(segment, "Delta_X", channel))
+        is_time = _header_cell(segment, "X_Dimension", channel) in ("Time", "")
         return 1 / step if step is not None and _LEAST_STEP_S < step < _LATEST_S and is_time else None
 
     def _starts(self, segment: _Segment, count: int) -> list[float]:
-        """When each channel begins after the first of them [s]: by X0, the first abscissa, and by Date and Time.
+        """The start of each channel after the first of them [s]: by X0, the first abscissa, or by Date and Time.
 
-        Raises FileError where both differ from channel to channel, and not alike.
+        Raises FileError where both differ between channels and disagree.
         """
         channels = range(count)
-        by_abscissa = _after_first([self._number(_entry(segment, "X0", channel)) for channel in channels])
-        moments = [_moment(_entry(segment, "Date", channel), _entry(segment, "Time", channel)) for channel in channels]
+        by_abscissa = _after_first([self._number(_header_cell(segment, "X0", channel)) for channel in channels])
+        moments = [
+            _moment(_header_cell(segment, "Date", channel), _header_cell(segment, "Time", channel))
+            for channel in channels
+        ]
         stamps = [
-            None if one is None else datetime.fromisoformat(one).replace(tzinfo=UTC).timestamp() for one in moments
+            None if moment is None else datetime.fromisoformat(moment).replace(tzinfo=UTC).timestamp()
+            for moment in moments
         ]
         by_clock = _after_first(stamps)
         if any(by_abscissa) and any(by_clock) and not np.allclose(by_abscissa, by_clock, atol=_SAME_START_S):
@@ -142,7 +146,7 @@ class _Reader:
         return by_abscissa if any(by_abscissa) else by_clock
 
     def _count(self, segment: _Segment) -> int:
-        stated = _entry(segment, "Channels", 0)
+        stated = _header_cell(segment, "Channels", 0)
         widest = max((len(cells) for _, cells in segment.rows), default=0)
         if not stated.isascii() or not stated.isdigit() or not 0 < int(stated[:9]) < max(widest, 1):
             place = f"line {segment.rows[0][0]}" if segment.rows else "a segment"
@@ -153,7 +157,7 @@ class _Reader:
         return self.separator != "," and any("," in cell for cell in segment.rows[0][1][:-1])
 
     def _columns(self, segment: _Segment, count: int, step: int, decimal: str) -> list[list[float]]:
-        """The channels' numbers: a channel with fewer samples has empty cells, or none, at its end."""
+        """The channels' numbers; a channel with fewer samples ends with empty or missing cells."""
         columns: list[list[float]] = [[] for _ in range(count)]
         for index, (line, cells) in enumerate(segment.rows):
             for channel, written in enumerate(cells[1 : 1 + step * count : step]):
@@ -167,14 +171,14 @@ class _Reader:
         return columns
 
     def _number(self, cell: str) -> float | None:
-        """A number of the header: the decimal mark is its own where the header names none."""
+        """A number of the header, with its own decimal mark where the header states none."""
         return text.number(cell, self.decimal or ("," if "," in cell else "."))
 
     def _acquisitions(self, segment: _Segment, channels: tuple[Channel, ...]) -> list[Block]:
         """The channels cut into runs of the stated number of samples."""
         rates = {channel.sample_rate_hz for channel in channels}
         rate = rates.pop() if len(rates) == 1 else None
-        samples = {_entry(segment, "Samples", channel) for channel in range(len(channels))}
+        samples = {_header_cell(segment, "Samples", channel) for channel in range(len(channels))}
         stated = samples.pop() if len(samples) == 1 else ""
         length = max(len(channel.values) for channel in channels)
         run = int(stated) if stated.isascii() and stated.isdigit() and 0 < len(stated) < 10 and int(stated) else length
@@ -184,33 +188,38 @@ class _Reader:
             raise FileError(self.file, f"line {segment.rows[0][0]}", reason)
         if run and length % run:
             self.warnings.append(f"the last acquisition was interrupted after {length % run} of {run} samples")
-        began = _moment(_entry(segment, "Date", 0), _entry(segment, "Time", 0)) or self.began
+        start_time = _moment(_header_cell(segment, "Date", 0), _header_cell(segment, "Time", 0)) or self.start_time
         return [
-            Block("", tuple(replace(one, values=one.values[start : start + run]) for one in channels), rate, began)
+            Block(
+                "",
+                tuple(replace(channel, values=channel.values[start : start + run]) for channel in channels),
+                rate,
+                start_time,
+            )
             for start in range(0, length, run or 1)
         ]
 
 
 def _without_gaps(header: dict[str, list[str]]) -> dict[str, list[str]]:
-    """The header of channels that each have a column of abscissae, without the empty cells above these; as it is where
-    a writer left no cells for them."""
-    filled = next((cells for name in _OF_EACH_CHANNEL if any(cells := header.get(name, [])[1:])), [])
+    """The header of channels with a column of abscissae each, without the empty cells above these; unchanged where the
+    writer left none."""
+    filled = next((cells for name in _CHANNEL_ROWS if any(cells := header.get(name, [])[1:])), [])
     return header if filled and filled[0] else {name: cells[::2] for name, cells in header.items()}
 
 
 def _after_first(times: Sequence[float | None]) -> list[float]:
-    """Times after the earliest; 0 for one that is not known."""
-    known = [time for time in times if time is not None and abs(time) < _LATEST_S]
-    return [time - min(known) if time is not None and abs(time) < _LATEST_S else 0.0 for time in times]
+    """Times after the earliest; 0 for an unknown one."""
+    valid = [time for time in times if time is not None and abs(time) < _LATEST_S]
+    return [time - min(valid) if time is not None and abs(time) < _LATEST_S else 0.0 for time in times]
 
 
-def _entry(segment: _Segment, name: str, channel: int) -> str:
-    entries = segment.header.get(name, [])
-    return entries[channel] if channel < len(entries) else ""
+def _header_cell(segment: _Segment, name: str, channel: int) -> str:
+    cells_of_row = segment.header.get(name, [])
+    return cells_of_row[channel] if channel < len(cells_of_row) else ""
 
 
 def _moment(date: str, time: str) -> str | None:
-    """A header's Date (year/month/day) and Time, without a zone as it is written; None where they are none."""
+    """A header's Date (year/month/day) and Time as ISO 8601 without a zone; None where they are invalid."""
     match = re.match(r"(\d\d:\d\d:\d\d)(?:[.,](\d{1,6}))?", time)
     if match is None:
         return None

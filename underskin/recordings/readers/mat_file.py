@@ -1,7 +1,7 @@
-"""MATLAB files: version 5 by scipy, version 7.3 (HDF5) by h5py. Only numbers and texts are read; nothing is run.
+"""MATLAB files: version 5 by scipy, version 7.3 (HDF5) by h5py. Only numbers and texts are read; nothing is executed.
 
 Vectors are channels, `name`; a matrix is one channel a column, `name(:,1)`. Single numbers and texts are properties. A
-structure is a block of its own; the variables beside it are a block without a name.
+structure is a block; the variables outside structures are a block without a name.
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,7 +25,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     is_73 = stream.read(len(MAGIC_73)) == MAGIC_73
     stream.seek(0)
     with damage_said(file, "", lambda error: f"no MATLAB file: {type(error).__name__}: {error}"):
-        # SciPy's stubs know paths alone
+        # SciPy's stubs accept paths only
         variables = _variables_73(stream, file) if is_73 else scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
     return _contents({name: value for name, value in variables.items() if not name.startswith("__")})
 
@@ -69,7 +69,7 @@ def _variables_73(stream: BinaryIO, file: str) -> dict[str, Any]:
 
 
 def _value(dataset: Any) -> Any:
-    """A variable as loadmat gives it; None for what holds neither numbers nor text (cells, references, objects)."""
+    """A variable as by loadmat; None where it holds neither numbers nor text (cells, references, objects)."""
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         return None
     if dataset.dtype.names == ("real", "imag"):

@@ -1,4 +1,4 @@
-"""What reading one file may take; each limit is a setting."""
+"""Limits on the reading of one file; each is a setting."""
 
 import math
 import os
@@ -16,8 +16,8 @@ _ALLOWED = {MEMORY_MB: (100.0, 1e6), SECONDS: (1.0, 86_400.0), EXPANSION: (1.0, 
 
 @dataclass(frozen=True)
 class ParsingLimits:
-    """`memory_bytes` beyond the interpreter's own, `seconds` on a processor; the contents may be `expansion` times as
-    long as the file, and 16 MB."""
+    """`memory_bytes` beyond the interpreter's own, `seconds` of processor time; the contents may be `expansion` times
+    as long as the file plus 16 MB."""
 
     memory_bytes: int = 1_000_000_000
     seconds: float = 60.0
@@ -37,7 +37,7 @@ class ParsingLimits:
         return cls(int(memory_mb * 1e6), seconds, expansion)
 
     def content_bytes(self, file_bytes: int) -> int:
-        """How long the contents of a file of this size may be."""
+        """The largest size of the contents of a file of this size."""
         return min(self.memory_bytes, _SHORT_BYTES + int(self.expansion * file_bytes))
 
 

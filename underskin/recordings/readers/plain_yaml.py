@@ -1,6 +1,6 @@
-"""YAML as documents of a user's have it: no references, dates or keys that come twice; 1e-3 is a number, as in JSON.
+"""YAML of user documents: no references, dates or repeated keys; 1e-3 is a number, as in JSON.
 
-`document` is for `sandbox.call_apart`: a few kilobytes of YAML can take a parser long.
+`document` is for `sandbox.call_apart`, since a few kilobytes of YAML can take a parser long.
 """
 
 import math
@@ -23,19 +23,19 @@ _Base: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
 
 class _PlainLoader(_Base):  # type: ignore[misc]
-    """A safe loader that refuses keys that come twice."""
+    """A safe loader that rejects repeated keys."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-        """Refuses a key that comes twice: the last one would be taken."""
+        """Reject a repeated key, of which the last value would be used."""
         mapping = super().construct_mapping(node, deep=deep)
         if len(mapping) == len(node.value):
             return mapping
         seen = set()
-        for entry, _ in node.value:
-            key = self.construct_object(entry, deep=True)
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
             if key in seen:
-                problem = f"the key {key!r} (column {entry.start_mark.column + 1}) must be given once in its mapping"
-                raise yaml.constructor.ConstructorError(None, None, problem, entry.start_mark)
+                problem = f"the key {key!r} (column {key_node.start_mark.column + 1}) must be given once in its mapping"
+                raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
             seen.add(key)
         return mapping
 
@@ -50,8 +50,8 @@ _PlainLoader.add_implicit_resolver(
 
 
 def document(stream: BinaryIO) -> dict[str, Any]:
-    """`document`: what an open YAML file holds, of what JSON has; `lines`: on which line each field stands, by its
-    path (`parameters.loss.low`). Raises FileError that names the line."""
+    """`document`: the content of an open YAML file as JSON types; `lines`: the line of each field by its path
+    (`parameters.loss.low`). Raises FileError that names the line."""
     written = text.decode(stream.read(), "")
     try:
         _require_plain(written)
@@ -59,7 +59,7 @@ def document(stream: BinaryIO) -> dict[str, Any]:
         try:
             tree = loader.get_single_node()
             lines = dict(_lines(tree, ""))
-            held = None if tree is None else _as_json(loader.construct_document(tree), "", lines)
+            content = None if tree is None else _as_json(loader.construct_document(tree), "", lines)
         finally:
             loader.dispose()
     except yaml.MarkedYAMLError as error:
@@ -68,11 +68,11 @@ def document(stream: BinaryIO) -> dict[str, Any]:
         raise FileError("", "", f"not YAML: {error}") from None
     except (LookupError, AttributeError, TypeError, ArithmeticError):  # a tag, such as !!bool, of what is none
         raise FileError("", "", "not YAML: a value is not of the type that its tag states") from None
-    return {"document": held, "lines": lines}
+    return {"document": content, "lines": lines}
 
 
 def _require_plain(written: str) -> None:
-    """Refuses references, of which a few lines can stand for any amount of data, and what is nested too deeply."""
+    """Reject references, which can expand to any amount of data, and deep nesting."""
     depth = 0
     for event in yaml.parse(written, Loader=_Base):
         if isinstance(event, yaml.AliasEvent):
@@ -88,7 +88,7 @@ def _refused(event: yaml.Event, problem: str) -> FileError:
 
 
 def _not_yaml(error: yaml.MarkedYAMLError, written: str) -> FileError:
-    """A problem at a mark; where it is half of a surrogate pair, which LibYAML refuses, with the field."""
+    """The error at a mark; with the field where it is half of a surrogate pair, which LibYAML rejects."""
     mark = error.problem_mark
     if mark is None:
         return FileError("", "", f"not YAML: {error.problem}")
@@ -109,20 +109,19 @@ def _lines(node: Any, path: str) -> Iterator[tuple[str, int]]:
     if not isinstance(node, yaml.MappingNode):
         return
     for key, value in node.value:
-        place = _below(path, str(key.value)) if isinstance(key, yaml.ScalarNode) else path
-        yield place.encode("utf-8", "replace").decode(), key.start_mark.line + 1
-        yield from _lines(value, place)
+        field_path = _below(path, str(key.value)) if isinstance(key, yaml.ScalarNode) else path
+        yield field_path.encode("utf-8", "replace").decode(), key.start_mark.line + 1
+        yield from _lines(value, field_path)
 
 
 def _as_json(value: Any, path: str, lines: dict[str, int]) -> Any:
-    """What YAML has beyond JSON, as text: nothing that a field takes."""
+    """A value as JSON types; others as text, which no field accepts."""
     if isinstance(value, dict):
         return {
-            _as_text(name, path, lines): _as_json(entry, _below(path, str(name)), lines)
-            for name, entry in value.items()
+            _as_text(name, path, lines): _as_json(item, _below(path, str(name)), lines) for name, item in value.items()
         }
     if isinstance(value, list):
-        return [_as_json(entry, path, lines) for entry in value]
+        return [_as_json(item, path, lines) for item in value]
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int):

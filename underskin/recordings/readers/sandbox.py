@@ -1,7 +1,7 @@
-"""Files from outside, parsed in a process of their own that has a limit on memory and on time.
+"""Files from outside, parsed in a separate process with limits on memory and time.
 
-The child gets the open file, no name and no path, cannot write more than it may hold, and answers in JSON and plain
-arrays, so that nothing it says is run here. When it dies, that is an error that names the file.
+The child gets the open file without name or path, cannot write more than the limit, and answers in JSON and plain
+arrays, so that nothing in the answer is executed. If it dies, FileError names the file.
 """
 
 import importlib
@@ -29,7 +29,7 @@ from underskin.recordings.validation import CellText, shown
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE, parsing_limits.EXPANSION)
 _LAST_WORDS = 500
-_WAIT_TIMES = 5  # as long by the clock as on a processor: a busy machine is no reason to refuse a file
+_WAIT_TIMES = 5  # wall-clock limit over that of processor time, since a busy machine must not reject a file
 _CELL = 2  # entries of a cell in an answer: its text and its place
 _LENGTH = struct.Struct("<Q")
 _LONG_BYTES = 4 << 20  # arrays of more lie apart from each other (glibc), so that they grow without being copied
@@ -51,12 +51,12 @@ def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits | 
 
 
 def call_apart(
-    function: str, stream: BinaryIO, file: str, *given: str, what: str, limits: ParsingLimits | None = None
+    function: str, stream: BinaryIO, file: str, *arguments: str, what: str, limits: ParsingLimits | None = None
 ) -> dict[str, Any]:
-    """What `function` ("module:name", called with the stream and the texts given) answers, in a child process.
+    """The answer of `function` ("module:name", called with the stream and the given texts) in a child process.
 
-    The answer is made of what JSON has and arrays of one axis; `what` the file is read as goes into errors. Raises
-    FileError as `parse_apart`.
+    The answer consists of JSON types and arrays of one axis; `what` names the format in errors. Raises FileError as
+    `parse_apart`.
     """
     limits = limits or ParsingLimits.from_environment()
     longest = limits.content_bytes(stream.seek(0, os.SEEK_END))
@@ -66,9 +66,9 @@ def call_apart(
     environment["MALLOC_MMAP_THRESHOLD_"] = str(_LONG_BYTES)
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
     bounds = [str(limits.memory_bytes), str(limits.seconds), str(longest)]
-    command = [sys.executable, "-P", "-m", __name__, function, *bounds, *given]
-    with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as said:
-        child = subprocess.Popen(command, stdin=stream, stdout=answer, stderr=said, env=environment)
+    command = [sys.executable, "-P", "-m", __name__, function, *bounds, *arguments]
+    with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
+        child = subprocess.Popen(command, stdin=stream, stdout=answer, stderr=errors, env=environment)
         try:
             status = child.wait(_WAIT_TIMES * limits.seconds)
         except subprocess.TimeoutExpired:
@@ -80,17 +80,17 @@ def call_apart(
             reason = f"reading it as {what} took more than {limits.seconds:g} s and was stopped"
             raise FileError(file, "", f"{reason} ({parsing_limits.SECONDS})")
         if status != 0:
-            raise FileError(file, "", f"the process that read it as {what} {_end(status, said)}")
+            raise FileError(file, "", f"the process that read it as {what} {_end(status, errors)}")
         answer.seek(0)
         return _understood(answer, file)
 
 
-def _end(status: int, said: BinaryIO) -> str:
-    """How the child ended: by a signal, or with what it said last."""
+def _end(status: int, errors: BinaryIO) -> str:
+    """How the child ended: by a signal, or with its last message."""
     if status < 0:
         return f"was killed by signal {-status}"
-    said.seek(max(0, said.seek(0, os.SEEK_END) - _LAST_WORDS))
-    last = "".join(said.read().decode("utf-8", "replace").strip().splitlines()[-1:])
+    errors.seek(max(0, errors.seek(0, os.SEEK_END) - _LAST_WORDS))
+    last = "".join(errors.read().decode("utf-8", "replace").strip().splitlines()[-1:])
     return f"ended with status {status}: {last}"
 
 
@@ -105,10 +105,10 @@ def _understood(answer: BinaryIO, file: str) -> dict[str, Any]:
 
 
 def _with_arrays(contents: Any, mark: str, answer: BinaryIO, behind: int) -> Any:
-    """What was answered, with the array that each {mark: [type, start, count]} stands for, the first of them beginning
-    `behind` the header, and the cell of each {mark: [text, place]}."""
+    """The answer with the array for each {mark: [type, start, count]}, the first of which starts at offset `behind`,
+    and the cell for each {mark: [text, place]}."""
     if isinstance(contents, list):
-        return [_with_arrays(entry, mark, answer, behind) for entry in contents]
+        return [_with_arrays(item, mark, answer, behind) for item in contents]
     if not isinstance(contents, dict):
         return contents
     if contents.keys() == {mark}:
@@ -123,7 +123,9 @@ def _with_arrays(contents: Any, mark: str, answer: BinaryIO, behind: int) -> Any
 def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
     contents = parse(name, stream, "")
     if isinstance(contents, Contents):
-        blocks = [{**vars(block), "channels": [vars(one) for one in block.channels]} for block in contents.blocks]
+        blocks = [
+            {**vars(block), "channels": [vars(channel) for channel in block.channels]} for block in contents.blocks
+        ]
         return {**vars(contents), "blocks": blocks}
     return {"document": contents.campaign, "warnings": contents.warnings}
 
@@ -151,7 +153,7 @@ def _main() -> None:
 
 
 def _encoded(answer: dict[str, Any]) -> list[Any]:
-    """The answer's parts. Nothing in a file can pass for an array: their mark is not to be guessed."""
+    """The answer's parts. Nothing in a file can imitate an array, since the mark is random."""
     mark = secrets.token_hex(16)
     arrays: list[Any] = []
     position = 0

@@ -1,12 +1,9 @@
-"""Tables of text files: headings and sections.
+"""Headings and rows of tables in text files.
 
-The names and units of a text table's columns, from the lines above its numbers.
-
-The names are the nearest line above the numbers that has a cell for each column: the nearest with a known unit, or
-behind a word such as `columns:`, before the nearest of all. A line of units may stand between, and so may lines that
-are neither, such as the marker `eoh`.
-
-The rows of a text table, block by block: sections under one line of headings each, groups, columns of text.
+The names of the columns are on the nearest line above the numbers that has a cell for each column: the nearest with a
+known unit, or after a word such as `columns:`, before the nearest of all. A line of units may stand between, and so may
+other lines, such as the marker `eoh`. Rows are read block by block into sections, each under one line of headings, with
+groups of rows separated by blank or comment lines; columns of text are counted.
 """
 
 import re
@@ -43,7 +40,7 @@ _NO_UNITS = ("", "-", "–", "1", "%", "°C", "K", "#", "a.u.", "n/a")
 
 @dataclass(frozen=True)
 class Headings:
-    """Name and unit of each column; `lines` are the numbers of the lines that say them, from 0."""
+    """Name and unit of each column; `lines`: the indices of the lines that state them, from 0."""
 
     names: Sequence[tuple[str, str]]
     lines: tuple[int, ...] = ()
@@ -56,15 +53,17 @@ class _Candidate:
     label: str  # "units", "names", or none
 
     def is_sure(self) -> bool:
-        """Whether more than the number of its cells speaks for names."""
+        """Whether it holds names by more evidence than the number of its cells."""
         return self.label == "names" or any(unit(labelled_unit(cell)) is not None for cell in self.cells)
 
     def is_units(self) -> bool:
         units = [without_brackets(cell) for cell in self.cells]
-        known = sum(unit(cell) is not None for cell in units)
-        others = sum(cell not in _NO_UNITS for cell in units) - known
+        unit_count = sum(unit(cell) is not None for cell in units)
+        other_count = sum(cell not in _NO_UNITS for cell in units) - unit_count
         states_values = any("=" in cell or ":" in cell for cell in units)  # k=3 N/m
-        return self.label == "units" or (self.label == "" and known > 0 and others <= known and not states_values)
+        return self.label == "units" or (
+            self.label == "" and unit_count > 0 and other_count <= unit_count and not states_values
+        )
 
 
 def find(lines: Sequence[str], table: Table, file: str) -> Headings:
@@ -74,33 +73,41 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
     """
     _require_closed_quotes(lines, table, file)
     candidates = list(_candidates(lines, table))
-    units = next((one for one in candidates if one.is_units()), None)
-    names = _names([one for one in candidates if one is not units and _full(one, table)], units, table)
-    if names is None:  # a line of units alone names the columns as well
+    units = next((candidate for candidate in candidates if candidate.is_units()), None)
+    names = _names(
+        [candidate for candidate in candidates if candidate is not units and _full(candidate, table)], units, table
+    )
+    if names is None:  # a line of units also serves as names
         names = units if units is not None and _full(units, table) else None
     if names is None:
         return Headings([(f"column {number}", "") for number in range(1, table.width + 1)])
-    said = [""] * table.width if units is None else [without_brackets(cell) for cell in _padded(units.cells, table)]
+    stated_units = (
+        [""] * table.width if units is None else [without_brackets(cell) for cell in _padded(units.cells, table)]
+    )
     headings = [
         (name or f"column {number}", by_row or labelled_unit(name))
-        for number, (name, by_row) in enumerate(zip(_padded(names.cells, table), said, strict=True), start=1)
+        for number, (name, by_row) in enumerate(zip(_padded(names.cells, table), stated_units, strict=True), start=1)
     ]
-    return Headings(headings, tuple(dict.fromkeys(one.line for one in (names, units) if one is not None)))
+    return Headings(
+        headings, tuple(dict.fromkeys(candidate.line for candidate in (names, units) if candidate is not None))
+    )
 
 
 def _names(candidates: Sequence[_Candidate], units: _Candidate | None, table: Table) -> _Candidate | None:
     """The line of names among those from the nearest to the farthest; above a line of `units` the nearest to it."""
     if units is not None and units.label == "":
-        # What stands under the units is nearer than names and neither: they would be names without these units.
-        return next((one for one in candidates if one.line < units.line), None)
-    words = [one for one in candidates if not _holds_number(one, table)]
-    return next((one for one in words if one.is_sure()), next(iter(words), next(iter(candidates), None)))
+        # Lines under the units are no names, which would then lack these units.
+        return next((candidate for candidate in candidates if candidate.line < units.line), None)
+    words = [candidate for candidate in candidates if not _holds_number(candidate, table)]
+    return next(
+        (candidate for candidate in words if candidate.is_sure()), next(iter(words), next(iter(candidates), None))
+    )
 
 
 def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
-    """The lines above the numbers with as many cells as these have columns, the nearest first.
+    """The lines above the numbers with as many cells as columns, the nearest first.
 
-    One with numbers among its cells is none, unless nothing stands between it and the numbers but a line of units.
+    A line with numbers counts only where at most a line of units separates it from the table.
     """
     nearest = True
     for index in range(table.start - 1, -1, -1):
@@ -108,10 +115,10 @@ def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
             continue
         bare = uncommented(lines[index]).strip()
         label = _LABEL.match(bare)
-        said = "" if label is None else "units" if label["units"] else "names"
+        kind = "" if label is None else "units" if label["units"] else "names"
         cells = _cells(bare[label.end() :] if label else bare, table)
         if cells is not None:
-            candidate = _Candidate(index, cells, said)
+            candidate = _Candidate(index, cells, kind)
             if nearest or not _holds_number(candidate, table):
                 yield candidate
             nearest = nearest and candidate.is_units()
@@ -120,7 +127,7 @@ def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
 
 
 def _cells(line: str, table: Table) -> Sequence[str] | None:
-    """The cells of a line above the table, if they can be headings; separated like the table, or else otherwise."""
+    """The cells of a line above the table, if they can be headings; separated like the table, or in another way."""
     cells = split(line, table.separator)
     if table.separator != BLANKS and cells:
         cells = [*cells, *[""] * (line.count(table.separator) + 1 - len(cells))][: max(table.width, len(cells))]
@@ -132,7 +139,7 @@ def _cells(line: str, table: Table) -> Sequence[str] | None:
 
 
 def _full(candidate: _Candidate, table: Table) -> bool:
-    """Whether every column of numbers is named, but for one, which may be an index."""
+    """Whether every column of numbers is named, except at most one, which may be an index."""
     named = [column for column in table.columns if candidate.cells[column]]
     return len(named) >= max(len(table.columns) - 1, 2)
 
@@ -155,7 +162,7 @@ def _require_closed_quotes(lines: Sequence[str], table: Table, file: str) -> Non
         raise FileError(file, f"line {nearest + 1}", str(error)) from None
 
 
-_FEW = 16  # rows that are not worth being taken at once
+_FEW = 16  # rows below which they are read one by one
 _LOOSE = 4096  # rows that are kept as lists
 _APART = 1 << 16  # rows that are kept in parts
 _LEAST = 2  # rows of a group
@@ -165,8 +172,8 @@ Lines = list[tuple[int, str]]  # with their numbers, from 0
 
 @dataclass
 class Section:
-    """Rows under one line of headings: the first and the last line that hold some, from 0; the lines `between` it and
-    the section above; and the row at which each group begins that blank or comment lines part."""
+    """Rows under one line of headings: the first and the last line with rows, from 0; the lines `between` it and the
+    section above; and the first row of each group, separated by blank or comment lines."""
 
     first: int
     last: int
@@ -176,21 +183,21 @@ class Section:
     _loose: list[Sequence[float]] = field(default_factory=list)
     _parts: list[Sequence[Floats]] = field(default_factory=list)
     _in_parts: int = 0
-    _whole: list[Floats] = field(default_factory=list)
+    _columns: list[Floats] = field(default_factory=list)
 
     @property
     def group_starts(self) -> tuple[int, ...]:
-        """Empty where there is one group, or one too short to be one, as where every second line is blank."""
+        """Empty for a single group, and where one is too short, as where every second line is blank."""
         ends = [*self._starts[1:], self._count]
         short = any(end - start < _LEAST for start, end in zip(self._starts, ends, strict=True))
         return () if short or not 1 < len(self._starts) <= _MOST_GROUPS else tuple(self._starts)
 
-    def begin_group(self) -> None:
-        """The next row begins a group."""
+    def start_group(self) -> None:
+        """Let the next row start a group."""
         self._starts.append(self._count)
 
     def add(self, last: int, row: Sequence[float]) -> None:
-        """Take a row."""
+        """Add a row."""
         self.last = last
         self._count += 1
         self._loose.append(row)
@@ -198,7 +205,7 @@ class Section:
             self._gather()
 
     def add_rows(self, last: int, columns: Sequence[Floats]) -> None:
-        """Take many rows by their columns."""
+        """Add many rows by their columns."""
         self._gather()
         self.last = last
         self._count += len(columns[0])
@@ -209,7 +216,7 @@ class Section:
         self._gather()
         if self._parts:
             self._join()
-        return self._whole
+        return self._columns
 
     def _gather(self) -> None:
         if self._loose:
@@ -223,17 +230,17 @@ class Section:
             self._join()
 
     def _join(self) -> None:
-        """Lengthen the columns in their place by the parts, so that a long file is not in memory twice."""
-        self._whole = self._whole or [np.empty(0) for _ in self._parts[0]]
-        for place, column in enumerate(self._whole):
+        """Append the parts to the columns in place, so that a long file is not in memory twice."""
+        self._columns = self._columns or [np.empty(0) for _ in self._parts[0]]
+        for index, column in enumerate(self._columns):
             column.resize(self._count, refcheck=False)
-            np.concatenate([part[place] for part in self._parts], out=column[-self._in_parts :])
+            np.concatenate([part[index] for part in self._parts], out=column[-self._in_parts :])
         self._parts, self._in_parts = [], 0
 
 
 @dataclass
 class TextColumn:
-    """A column that holds text in some rows: in how many, the first of them, and an example."""
+    """A column with text in some rows: their number, the first of them, and an example."""
 
     count: int = 0
     first: tuple[int, str] | None = None
@@ -241,10 +248,10 @@ class TextColumn:
 
 
 class SectionReader:
-    """Takes the lines of a file from the table's start on.
+    """Reads the lines of a file from the table's start on.
 
-    Raises FileError at the first line that is no row and has rows above and under it, unless it is blank, a comment, or
-    followed by the `headings`.
+    Raises FileError at the first line between rows that is no row, unless it is blank, a comment, or followed by the
+    `headings`.
     """
 
     def __init__(self, table: Table, headings: frozenset[str], file: str) -> None:
@@ -258,7 +265,7 @@ class SectionReader:
         self.count = 0
 
     def take_all(self, source: BlockText) -> None:
-        """Take the lines of a text."""
+        """Read the lines of a text."""
         first = 0
         for block in source.blocks():
             lines = block.split("\n")
@@ -268,7 +275,7 @@ class SectionReader:
             first += len(lines)
 
     def _take(self, first: int, lines: Sequence[str]) -> None:
-        """Take lines, of which the first is at an index."""
+        """Read lines, the first of which has the index `first`."""
         rows = PlainRows(lines, self._style)
         taken = 0
         for line, start, end in rows.runs():
@@ -298,26 +305,26 @@ class SectionReader:
             self._see(column, index, [line], [cells[column] if column < len(cells) else ""])
 
     def _section(self, index: int) -> Section:
-        """The section that a row at an index belongs to."""
-        foreign = [one for one in self.under if one[1].strip() and not is_comment(one[1])]
+        """The section of the row at an index."""
+        foreign = [line for line in self.under if line[1].strip() and not is_comment(line[1])]
         if foreign and not any(line.strip() in self._headings for _, line in foreign):
             raise no_row(*foreign[0], self._table, self._file)
         if foreign or not self.sections:
             self.sections.append(Section(index, index, self.under if self.sections else []))
-            self.sections[-1].begin_group()
+            self.sections[-1].start_group()
         elif self.under:
-            self.sections[-1].begin_group()
+            self.sections[-1].start_group()
         self.under = []
         return self.sections[-1]
 
     def _see(self, column: int, first: int, lines: Sequence[str], cells: Sequence[str]) -> None:
-        """Note what a column of text holds in some rows."""
-        told = self.texts[column]
+        """Record the text of a column in some rows."""
+        text_column = self.texts[column]
         for cell, count in Counter(cells).items():
             if text.number(cell, self._table.decimal) is not None:
                 continue
-            told.count += count
-            told.example = told.example or cell.strip()
-            if told.first is None:
-                place = cells.index(cell)
-                told.first = (first + place, lines[place])
+            text_column.count += count
+            text_column.example = text_column.example or cell.strip()
+            if text_column.first is None:
+                index = cells.index(cell)
+                text_column.first = (first + index, lines[index])

@@ -1,7 +1,7 @@
 """LabVIEW TDMS, read by npTDMS: each group is a block of channels.
 
-A TDMS file is a row of segments, each with its length in front. An acquisition that was interrupted leaves the last
-one without length, or shorter than it says: what comes before is read, with a warning.
+A TDMS file is a sequence of segments, each preceded by its length. An interrupted acquisition leaves the last one
+without length, or shorter than stated: the segments before it are read, with a warning.
 """
 
 import io
@@ -26,10 +26,12 @@ _BIG_ENDIAN = 1 << 6  # in the table of contents of a segment
 
 def read(stream: BinaryIO, file: str) -> Contents:
     """The channels of a TDMS file; raises FileError that names the byte or channel."""
-    whole, warnings = _whole_segments(stream, file)
+    complete_bytes, warnings = _complete_segments(stream, file)
     stream.seek(0)
-    with damage_said(file, f"segments up to byte {whole}", lambda error: f"no TDMS: {type(error).__name__}: {error}"):
-        tdms = TdmsFile.read(io.BytesIO(stream.read(whole)), raw_timestamps=True)
+    with damage_said(
+        file, f"segments up to byte {complete_bytes}", lambda error: f"no TDMS: {type(error).__name__}: {error}"
+    ):
+        tdms = TdmsFile.read(io.BytesIO(stream.read(complete_bytes)), raw_timestamps=True)
         blocks = tuple(_block(group, tdms.properties, file) for group in tdms.groups())
     properties = _properties("", tdms.properties)
     for group in tdms.groups():
@@ -37,8 +39,8 @@ def read(stream: BinaryIO, file: str) -> Contents:
     return Contents(tuple(block for block in blocks if block.channels), properties, tuple(warnings))
 
 
-def _whole_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
-    """The bytes up to the end of the last whole segment, and a warning if there are more."""
+def _complete_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
+    """The number of bytes up to the end of the last complete segment, and a warning if there are more."""
     size = stream.seek(0, io.SEEK_END)
     position = 0
     while position < size:
@@ -65,20 +67,22 @@ def _whole_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
 def _block(group: TdmsGroup, about_file: Mapping[str, Any], file: str) -> Block:
     stored = [channel for channel in group.channels() if channel.dtype.kind in "iufc" and len(channel) > 0]
     starts = [_start(channel) for channel in stored]
-    known = [start for start in starts if start is not None]
+    known_starts = [start for start in starts if start is not None]
     channels = [
-        replace(_channel(channel, file), starts_s=(start - min(known)).total_seconds() if start is not None else 0.0)
+        replace(
+            _channel(channel, file), starts_s=(start - min(known_starts)).total_seconds() if start is not None else 0.0
+        )
         for channel, start in zip(stored, starts, strict=True)
     ]
     rates = {channel.sample_rate_hz for channel in channels} - {None}
     rate = rates.pop() if len(rates) == 1 else None
     others = (_moment(given) for given in (group.properties.get("DateTime"), about_file.get("DateTime")))
-    began = min(known) if known else next((moment for moment in others if moment is not None), None)
-    return Block(group.name, with_distinct_names(channels), rate, None if began is None else _iso(began))
+    start_time = min(known_starts) if known_starts else next((moment for moment in others if moment is not None), None)
+    return Block(group.name, with_distinct_names(channels), rate, None if start_time is None else _iso(start_time))
 
 
 def _start(channel: TdmsChannel) -> datetime | None:
-    """When a waveform's first sample was taken: its start, and the offset from it."""
+    """The time of a waveform's first sample: its start plus its offset."""
     start, offset = _moment(channel.properties.get("wf_start_time")), channel.properties.get("wf_start_offset", 0.0)
     if start is None or not isinstance(offset, int | float) or not abs(offset) < _LONGEST_S:
         return start
@@ -86,7 +90,7 @@ def _start(channel: TdmsChannel) -> datetime | None:
 
 
 def _moment(given: Any) -> datetime | None:
-    """A time stamp, which TDMS keeps in UTC; None where it is none, or of a clock that was not set."""
+    """A time stamp, in UTC; None where it is none, or of a clock that was not set."""
     if not isinstance(given, TdmsTimestamp):
         return None
     try:

@@ -1,14 +1,8 @@
-"""Columns and lines of the campaign template.
+"""Columns and lines of the CSV template of campaigns.
 
-An FRF in columns of its magnitude and its phase, which stand for its real and imaginary part.
-
-The columns of the CSV template: which field each heading means, and what is no field.
-
-Headings are read in capitals or not. `indenter_diameter_mm` is halved, a magnitude with a phase is a complex value, a
-date and a time of day are `recorded_at`. A column without a heading that only counts its rows, as spreadsheets write
-it, or is empty, and a column of words that names no field, are left out.
-
-The lines of the CSV template as rows of cells, which may be gone through any number of times.
+Headings are read in capitals or not. `indenter_diameter_mm` is halved; magnitude and phase become real and imaginary
+part; a date and a time of day become `recorded_at`. A column without a heading that only counts the rows, as
+spreadsheets write it, or is empty, and a column of words that names no field, are left out.
 """
 
 import cmath
@@ -28,7 +22,7 @@ from underskin.recordings.readers.unit_labels import in_brackets, lab_field, uni
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
 IN_DEGREES = "frf_phase_deg"
 PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
-_NAME, _SHORT_NAME = "frf_phase", "phase"  # the second only beside a magnitude
+_NAME, _SHORT_NAME = "frf_phase", "phase"  # the second only with a magnitude
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
 _TURN = 2 * math.pi
 _EITHER = f"{IN_DEGREES} or {PHASE}"
@@ -49,24 +43,24 @@ def polar_field(heading: str) -> Meaning:
 
 
 def with_short_phase(headings: Sequence[str], meanings: Sequence[Meaning]) -> list[Meaning]:
-    """The meanings; beside a magnitude without its phase, a heading such as `Phase [deg]` is that."""
-    fields = {meant[0] for meant in meanings if meant is not None}
+    """The meanings; next to a magnitude without its phase, a heading such as `Phase [deg]` is that phase."""
+    fields = {meaning[0] for meaning in meanings if meaning is not None}
     if MAGNITUDE not in fields or PHASE in fields:
         return list(meanings)
-    found: list[Meaning] = []
-    for heading, meant in zip(headings, meanings, strict=True):
+    completed: list[Meaning] = []
+    for heading, meaning in zip(headings, meanings, strict=True):
         name, label = _name_and_unit(heading)
-        is_phase = meant is None and name == _SHORT_NAME and label in _ANGLES
-        found.append((PHASE, _ANGLES[label]) if is_phase else meant)
-    return found
+        is_phase = meaning is None and name == _SHORT_NAME and label in _ANGLES
+        completed.append((PHASE, _ANGLES[label]) if is_phase else meaning)
+    return completed
 
 
 def phase_in(label: str) -> str:
-    """The heading of a phase in a unit; empty where that is no angle."""
+    """The heading of a phase in a unit; empty where the unit is no angle."""
     return "" if label not in _ANGLES else PHASE if label == "rad" else IN_DEGREES
 
 
-def is_phase_alone(heading: str) -> bool:
+def is_phase_without_unit(heading: str) -> bool:
     """Whether a heading is a phase without its unit."""
     return heading.strip().lower().replace(" ", "_") == _NAME
 
@@ -80,12 +74,12 @@ def angle_by_values(heading: str, largest: float) -> float:
 
 
 def lacking(field: str) -> str:
-    """What must stand beside magnitude or phase, in words."""
+    """The missing counterpart of magnitude or phase, in words."""
     return f"needs {_EITHER if field == MAGNITUDE else MAGNITUDE} beside it"
 
 
 def with_parts(line: dict[str, Any]) -> dict[str, Any]:
-    """The values of a row, real and imaginary part in place of magnitude and phase."""
+    """The values of a row with real and imaginary part instead of magnitude and phase."""
     if MAGNITUDE not in line:
         return line
     others = {field: value for field, value in line.items() if field not in (MAGNITUDE, PHASE)}
@@ -99,22 +93,22 @@ def with_parts(line: dict[str, Any]) -> dict[str, Any]:
 
 
 def _name_and_unit(heading: str) -> tuple[str, str]:
-    """The name of a heading in small letters, and its unit: in brackets, or an angle behind the last underscore."""
+    """The name of a heading in lower case, and its unit: in brackets, or an angle after the last underscore."""
     bracketed = in_brackets(heading)
     if bracketed is not None:
         return bracketed[0].lower().replace(" ", "_"), bracketed[1]
-    whole = heading.strip().lower().replace(" ", "_")
-    name, _, label = whole.rpartition("_")
-    return (name, label) if label in _ANGLES else (whole, "")
+    name_with_unit = heading.strip().lower().replace(" ", "_")
+    name, _, label = name_with_unit.rpartition("_")
+    return (name, label) if label in _ANGLES else (name_with_unit, "")
 
 
-FURTHER = "conditions."  # what else the lab noted, a column each
+FURTHER = "conditions."  # prefix of a lab's own columns
 DATE, CLOCK = "date", "time of day"
 _DATED = {"date": DATE, "datum": DATE, "time": CLOCK, "uhrzeit": CLOCK}
 READ_AS_DEGREES = "is read as degrees: it has values beyond 2π"
 NO_NAME = ("", "unnamed: 0")  # the second by pandas
-_ALIKE = 0.8  # of a heading and a field, from which on the one may be meant for the other
-# What each FRF needs, without the unit, by its field
+_ALIKE = 0.8  # similarity of a heading and a field from which on a misspelling is assumed
+# Required fields of an FRF, by field, without the unit
 _NEEDED = {
     "indenter_radius_mm": "indenter_radius",
     "preload_n": "preload",
@@ -127,25 +121,25 @@ _NO_AMPLITUDE = re.compile(r"\b(p[- ]?p|pk[- ]?pk|peak.to.peak|rms)\b")
 
 @dataclass(frozen=True)
 class Column:
-    """Where a column is, its field, the factor to the field's unit, and the heading as written."""
+    """The `index` of a column, its field, the factor to the field's unit, and the heading as written."""
 
-    place: int
+    index: int
     field: str
     factor: float
     heading: str
 
 
 class NoField(ValueError):
-    """A heading that cannot be read; the message says why, `place` which one."""
+    """A heading that cannot be read; the message says why, `index` is its position."""
 
-    def __init__(self, place: int, reason: str) -> None:
+    def __init__(self, index: int, reason: str) -> None:
         super().__init__(reason)
-        self.place = place
+        self.index = index
 
 
 @dataclass
 class _Nameless:
-    """What stands in the cells of a column that names no field, empty ones left out."""
+    """Statistics of the non-empty cells of a column that names no field."""
 
     count: int = 0
     example: str = ""
@@ -154,7 +148,7 @@ class _Nameless:
     counts_from: float | None = None  # the first number, as long as each is one more than that above it
 
     def see(self, cell: str, decimal: str) -> None:
-        """Take the next cell."""
+        """Add the next cell."""
         number = text.number(cell, decimal)
         if not self.count:
             self.example, self.counts_from = cell, number
@@ -174,67 +168,66 @@ class _Nameless:
 def columns(
     headings: Sequence[str],
     under: Callable[[Sequence[int]], Iterable[Sequence[str]]],
-    known: Collection[str],
+    field_names: Collection[str],
     decimal: str,
 ) -> tuple[list[Column], list[str]]:
-    """The columns that hold fields, and which are left out, in words; `under` gives the cells at some places, row by
-    row.
+    """The columns that hold fields, and messages on the others; `under` gives the cells at some columns row by row.
 
     Raises NoField.
     """
-    found: dict[str, Column] = {}
-    left_out: list[str] = []
-    meanings = fields_of(headings, known)
-    if not any(meant is not None and meant[0] == "recorded_at" for meant in meanings):
+    by_field: dict[str, Column] = {}
+    messages: list[str] = []
+    meanings = fields_of(headings, field_names)
+    if not any(meaning is not None and meaning[0] == "recorded_at" for meaning in meanings):
         meanings = _dated(headings, meanings)
-    present = {meant[0] for meant in meanings if meant is not None}
-    others = {place: _Nameless() for place, meant in enumerate(meanings) if meant is None}
+    present = {meaning[0] for meaning in meanings if meaning is not None}
+    others = {index: _Nameless() for index, meaning in enumerate(meanings) if meaning is None}
     for row in under(list(others)) if others else ():
         for cell, column in zip(row, others.values(), strict=True):
             if cell:
                 column.see(cell, decimal)
-    for place, (heading, meant) in enumerate(zip(headings, meanings, strict=True)):
-        if meant is None and is_phase_alone(heading):
+    for index, (heading, meaning) in enumerate(zip(headings, meanings, strict=True)):
+        if meaning is None and is_phase_without_unit(heading):
             try:
-                meant = PHASE, angle_by_values(heading, others[place].largest)
+                meaning = PHASE, angle_by_values(heading, others[index].largest)
             except ValueError as error:
-                raise NoField(place, str(error)) from None
-            left_out.append(f"{heading!r} {READ_AS_DEGREES}")
-        if meant is None:
-            left_out += _without(place, heading, others[place], known, present)
+                raise NoField(index, str(error)) from None
+            messages.append(f"{heading!r} {READ_AS_DEGREES}")
+        if meaning is None:
+            messages += _without(index, heading, others[index], field_names, present)
             continue
-        field, factor = meant
-        if field in found:
-            raise NoField(place, f"{heading!r} is a second column of {field}")
-        found[field] = Column(place, field, factor, heading)
-    _require_whole(found)
-    return list(found.values()), left_out
+        field, factor = meaning
+        if field in by_field:
+            raise NoField(index, f"{heading!r} is a second column of {field}")
+        by_field[field] = Column(index, field, factor, heading)
+    _require_complete(by_field)
+    return list(by_field.values()), messages
 
 
-def fields_of(headings: Sequence[str], known: Collection[str]) -> list[Meaning]:
-    """The field of each heading and the factor to its unit; of a phase also by the magnitude beside it."""
-    return with_short_phase(headings, [field_of(heading, known) for heading in headings])
+def fields_of(headings: Sequence[str], field_names: Collection[str]) -> list[Meaning]:
+    """The field of each heading and the factor to its unit; a phase is also recognised by its magnitude."""
+    return with_short_phase(headings, [field_of(heading, field_names) for heading in headings])
 
 
-def field_of(heading: str, known: Collection[str]) -> Meaning:
+def field_of(heading: str, field_names: Collection[str]) -> Meaning:
     """The field of a heading and the factor to its unit; None where it names none."""
     heading = heading.strip()
     if heading.lower().startswith(FURTHER):
         return FURTHER + heading[len(FURTHER) :], 1.0
     lower = heading.lower()
-    if (whole := lower.replace(" ", "_")) in known:
-        return whole, 1.0
+    if (name := lower.replace(" ", "_")) in field_names:
+        return name, 1.0
     return polar_field(heading) or lab_field(heading) or lab_field(lower)
 
 
 def misspelt(heading: str, fields: Iterable[str]) -> str | None:
-    """The field that a heading which names none is nearly the name of."""
+    """The field that a heading may be a misspelling of."""
     alike = get_close_matches(_plain(heading), list(fields), 1, _ALIKE)
     return alike[0] if alike else None
 
 
 def halved(headings: Iterable[str]) -> list[str]:
-    """That diameters among the headings of fields are halved, in words."""
+    """Messages that diameters among the headings are halved."""
     return [f"{heading!r} is halved" for heading in headings if _plain(heading).startswith("indenter_diameter")]
 
 
@@ -243,40 +236,45 @@ def _plain(heading: str) -> str:
 
 
 def _dated(headings: Sequence[str], meanings: Sequence[Meaning]) -> list[Meaning]:
-    """The meanings, those of a date and of the time of day beside it too; without a date, a time is none of the day."""
+    """The meanings including a date and its time of day; without a date, a time is no time of day."""
     dated = [_DATED.get(heading.strip().lower()) for heading in headings]
     if DATE not in dated:
         return list(meanings)
-    return [(of, 1.0) if meant is None and of is not None else meant for of, meant in zip(dated, meanings, strict=True)]
+    return [
+        (field, 1.0) if meaning is None and field is not None else meaning
+        for field, meaning in zip(dated, meanings, strict=True)
+    ]
 
 
 def in_small_letters(name: str) -> str:
-    """A name whose letters may be capitals, but those of the unit in brackets behind it as they are."""
-    bracket = min((place for mark in "[(" if (place := name.find(mark)) >= 0), default=len(name))
+    """A name in lower case, with its unit in brackets unchanged."""
+    bracket = min((position for mark in "[(" if (position := name.find(mark)) >= 0), default=len(name))
     return name[:bracket].lower() + name[bracket:]
 
 
 def _without(
-    place: int, heading: str, column: _Nameless, known: Collection[str], present: Collection[str]
+    index: int, heading: str, column: _Nameless, field_names: Collection[str], present: Collection[str]
 ) -> list[str]:
-    """That a column which names none of the fields is left out, in words, if it matters; raises NoField where that
-    loses something. `present` are the fields of the other columns."""
+    """A message that a column without a field is left out, if it matters; raises NoField where data would be lost.
+    `present` are the fields of the other columns."""
     if heading.strip().lower() in NO_NAME:
-        if column.count and not (place == 0 and column.is_index):
-            raise NoField(place, f"has no heading, but cells such as {column.example!r}")
+        if column.count and not (index == 0 and column.is_index):
+            raise NoField(index, f"has no heading, but cells such as {column.example!r}")
         return []
-    none = f"{heading!r} is no field, or its unit is not of the field"
+    reason = f"{heading!r} is no field, or its unit is not of the field"
     words = heading.lower().replace("_", " ")
     if "force" in words and _NO_AMPLITUDE.search(words):
-        raise NoField(place, f"{none}; dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms")
-    if alike := misspelt(heading, [*known, MAGNITUDE, PHASE, IN_DEGREES]):
-        raise NoField(place, f"{none}; did you mean {alike}?")
+        raise NoField(index, f"{reason}; dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms")
+    if alike := misspelt(heading, [*field_names, MAGNITUDE, PHASE, IN_DEGREES]):
+        raise NoField(index, f"{reason}; did you mean {alike}?")
     keep = f"{FURTHER}NAME keeps a column of anything else"
     if column.has_numbers:
         lacking = _lacking(heading, present)
         raise NoField(
-            place,
-            f"{none}; is it {' or '.join(lacking)}, which the table lacks? {keep}" if lacking else f"{none}; {keep}",
+            index,
+            f"{reason}; is it {' or '.join(lacking)}, which the table lacks? {keep}"
+            if lacking
+            else f"{reason}; {keep}",
         )
     if not column.count:
         return []
@@ -284,28 +282,28 @@ def _without(
 
 
 def _lacking(heading: str, present: Collection[str]) -> list[str]:
-    """The fields of an FRF that a table has not and that the unit of a heading is one of."""
-    labelled = in_brackets(heading)
-    if labelled is None or "displacement_mm" in present:
+    """The missing fields of an FRF whose dimension is that of a heading's unit."""
+    bracketed = in_brackets(heading)
+    if bracketed is None or "displacement_mm" in present:
         return []
-    phase = phase_in(labelled[1])
+    phase = phase_in(bracketed[1])
     if phase and not {PHASE, PARTS[1]} & {*present}:
         return [phase]
     has = {*present, *([MAGNITUDE] if PARTS[0] in present else [])}
     return [
         field
         for field, name in _NEEDED.items()
-        if field not in has and field_of(f"{name} [{labelled[1]}]", ()) is not None
+        if field not in has and field_of(f"{name} [{bracketed[1]}]", ()) is not None
     ]
 
 
-def _require_whole(found: dict[str, Column]) -> None:
-    """That a magnitude has its phase, and that no parts stand beside them."""
-    given = [found[name] for name in (MAGNITUDE, PHASE) if name in found]
+def _require_complete(by_field: dict[str, Column]) -> None:
+    """Raise NoField for a magnitude without its phase, and for both with real and imaginary parts."""
+    given = [by_field[name] for name in (MAGNITUDE, PHASE) if name in by_field]
     if len(given) == 1:
-        raise NoField(given[0].place, f"{given[0].heading!r} {lacking(given[0].field)}")
-    if given and any(part in found for part in PARTS):
-        raise NoField(given[0].place, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
+        raise NoField(given[0].index, f"{given[0].heading!r} {lacking(given[0].field)}")
+    if given and any(part in by_field for part in PARTS):
+        raise NoField(given[0].index, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
 
 
 _FIRST_LINE = 2000
@@ -314,8 +312,8 @@ _SEPARATORS = ("\t", ";", ",")
 
 
 def separator_of(start: str) -> str | None:
-    """The separator of a template that begins so; None where this is none."""
-    first = next((line for line in text.lines(start[:_FIRST_LINE]) if not _says_nothing(line)), "")
+    """The separator of a template with this start; None where it is no template."""
+    first = next((line for line in text.lines(start[:_FIRST_LINE]) if not _is_empty_line(line)), "")
     return next((mark for mark in _SEPARATORS if _first_cells(first, mark) == ["schema", SCHEMA]), None)
 
 
@@ -326,19 +324,19 @@ def _first_cells(line: str, separator: str) -> list[str]:
         return []
 
 
-def _says_nothing(line: str) -> bool:
-    """Whether a line is blank, a comment, or tells a spreadsheet its separator."""
+def _is_empty_line(line: str) -> bool:
+    """Whether a line is blank, a comment, or states the separator for spreadsheets."""
     bare = line.strip().strip('"')
     return not bare or bare.startswith("#") or _TO_SPREADSHEETS.fullmatch(bare) is not None
 
 
 def is_note(row: Sequence[str]) -> bool:
-    """Whether a row may be a note: it begins with its first cell, and none holds a number."""
+    """Whether a row may be a note: its first cell is not empty, and no cell holds a number."""
     return bool(row[0]) and not any(text.is_grouped(cell) or _is_number(cell) for cell in row)
 
 
-def note_told(number: int, row: Sequence[str]) -> str:
-    """That a note on a line, counted from 1, is left out, in words."""
+def note_message(number: int, row: Sequence[str]) -> str:
+    """The message that a note on a line, counted from 1, is left out."""
     return f"line {number} under the table, {', '.join(filter(None, row))!r}, is left out"
 
 
@@ -347,7 +345,7 @@ def _is_number(cell: str) -> bool:
 
 
 class TemplateLines:
-    """The lines, and the cells of each; a line that says nothing has one empty cell."""
+    """The lines of the template as cells, any number of times; an empty line or comment has one empty cell."""
 
     def __init__(self, source: BlockText, separator: str, file: str) -> None:
         self._source = source
@@ -363,15 +361,15 @@ class TemplateLines:
         try:
             cells = text.cells(line, self.separator)
         except ValueError as error:
-            if not _says_nothing(line):
+            if not _is_empty_line(line):
                 raise FileError(self._file, f"line {index + 1}", str(error)) from None
             cells = [""]
-        # An id may begin with #, as numbers of presses do: then numbers follow it.
+        # An id may start with #, like the number of a press: then numbers follow it.
         counts = any(map(_is_number, cells[1:]))
-        return cells if counts or not _says_nothing(line) else [""]
+        return cells if counts or not _is_empty_line(line) else [""]
 
     def holding(self, mark: str) -> Iterator[list[str]]:
-        """The cells of the lines that hold a mark."""
+        """The cells of the lines that contain a mark."""
         first = 0
         for block in self._source.blocks():
             lines = block.split("\n")
@@ -382,29 +380,29 @@ class TemplateLines:
             first += len(lines)
 
     def blocks(self, start: int, end: int | None = None) -> Iterator[tuple[int, list[str]]]:
-        """The lines from one index to another, some at a time, with the index of the first of them."""
+        """The lines from `start` to `end` in blocks, each with the index of its first line."""
         first = 0
         for block in self._source.blocks():
             lines = block.split("\n")
-            some = lines[max(0, start - first) : None if end is None else max(0, end - first)]
-            if some:
-                yield max(start, first), some
+            selected = lines[max(0, start - first) : None if end is None else max(0, end - first)]
+            if selected:
+                yield max(start, first), selected
             first += len(lines)
 
-    def under(self, places: Sequence[int], width: int, start: int, end: int) -> Iterator[list[str]]:
-        """The cells at some of `width` places, of each line from one index to another."""
+    def under(self, indices: Sequence[int], width: int, start: int, end: int) -> Iterator[list[str]]:
+        """The cells at some of `width` columns of each line from `start` to `end`."""
         style = RowStyle(self.separator, ".", (), width, is_template=True)
         for first, lines in self.blocks(start, end):
             rows = PlainRows(lines, style)
             taken = 0
-            for line, row, behind in rows.runs():
-                yield from self._under(places, first + taken, lines[taken:line])
-                columns = [[cell.strip() for cell in rows.texts(place, row, behind)] for place in places]
+            for line, row, end_row in rows.runs():
+                yield from self._under(indices, first + taken, lines[taken:line])
+                columns = [[cell.strip() for cell in rows.texts(index, row, end_row)] for index in indices]
                 yield from map(list, zip(*columns, strict=True))
-                taken = line + behind - row
-            yield from self._under(places, first + taken, lines[taken:])
+                taken = line + end_row - row
+            yield from self._under(indices, first + taken, lines[taken:])
 
-    def _under(self, places: Sequence[int], first: int, lines: Sequence[str]) -> Iterator[list[str]]:
+    def _under(self, indices: Sequence[int], first: int, lines: Sequence[str]) -> Iterator[list[str]]:
         for index, line in enumerate(lines, start=first):
             cells = self.cells(index, line)
-            yield [cells[place] if place < len(cells) else "" for place in places]
+            yield [cells[column] if column < len(cells) else "" for column in indices]

@@ -1,7 +1,4 @@
-"""Text as instruments write it: byte order marks, old code pages, cells in quotes, decimal commas.
-
-Whether a text was cut within its last number, as by a full disk or a connection that broke.
-"""
+"""Text as instruments write it: byte order marks, old code pages, cells in quotes, decimal commas, truncated ends."""
 
 import csv
 import re
@@ -19,14 +16,14 @@ _BOMS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-1
 
 
 def content(stream: BinaryIO, file: str) -> str:
-    """The text of a whole open file."""
+    """The text of an open file."""
     stream.seek(0)
     return decode(stream.read(), file)
 
 
 def decode(data: bytes, file: str) -> str:
-    """The text of a file: UTF-8, UTF-16 where a byte order mark or every second byte says so, else Latin-1, which older
-    instruments write.
+    """The text of a file: UTF-8, UTF-16 by a byte order mark or zero bytes, else Latin-1, which older instruments
+    write.
 
     Raises FileError where the bytes are no text.
     """
@@ -47,8 +44,7 @@ def decode(data: bytes, file: str) -> str:
 
 
 def marked_encoding(head: bytes) -> tuple[str, int] | None:
-    """The encoding that the first bytes of a text say, and where the text begins behind their mark; None where they
-    say none."""
+    """The encoding given by the first bytes of a text, and the offset of the text after the mark; None without one."""
     for mark, encoding in _BOMS.items():
         if head.startswith(mark):
             return encoding, len(mark)
@@ -57,8 +53,8 @@ def marked_encoding(head: bytes) -> tuple[str, int] | None:
 
 
 def _unmarked(data: bytes) -> str:
-    """The encoding of a text in UTF-16 that has no byte order mark: every second byte is zero in what is mostly ASCII;
-    empty where it is none."""
+    """The encoding of UTF-16 without a byte order mark, in which every second byte of mostly ASCII text is zero; empty
+    otherwise."""
     first, second = (data[start:_LOOKED_AT:2].count(0) for start in (0, 1))
     half = len(data[:_LOOKED_AT]) // 2
     if max(first, second) < _MOSTLY * half or min(first, second):
@@ -67,7 +63,7 @@ def _unmarked(data: bytes) -> str:
 
 
 def no_text(file: str, place: int, encoding: str, reason: str) -> FileError:
-    """What is wrong with a text at a byte, counted from behind its mark."""
+    """The error for invalid text at a byte, counted from after its mark."""
     return FileError(file, f"byte {place}", f"is no {encoding.upper()} text: {reason}")
 
 
@@ -100,8 +96,9 @@ def _quoted(line: str, separator: str) -> list[str]:
 def decimal_mark(holding: Callable[[str], Iterable[Sequence[str]]], separator: str) -> str:
     """The decimal mark of a table, by its cells; `holding` gives the rows in which a mark may be.
 
-    A comma where a cell is a number only that way and cannot have its thousands apart instead. Beside semicolons, which
-    stand for commas that are decimal marks, any such cell says so; between commas none does where others have points.
+    A comma where a cell is a number only that way, and not possibly one with separated thousands. With semicolons, used
+    where commas are decimal marks, any such cell suffices; with commas as separators none does where others have
+    points.
     """
     if separator == "," and _has_number(holding("."), "."):
         return "."
@@ -109,7 +106,7 @@ def decimal_mark(holding: Callable[[str], Iterable[Sequence[str]]], separator: s
 
 
 def _has_number(rows: Iterable[Sequence[str]], decimal: str, *, grouped: bool = False) -> bool:
-    """Whether a cell is a number with this decimal mark; `grouped`: even if that may part its thousands instead."""
+    """Whether a cell is a number with this decimal mark; `grouped`: even if it may separate thousands instead."""
     return any(
         decimal in cell and number(cell, decimal) is not None and (grouped or not is_grouped(cell))
         for row in rows
@@ -118,12 +115,12 @@ def _has_number(rows: Iterable[Sequence[str]], decimal: str, *, grouped: bool = 
 
 
 def is_grouped(cell: str) -> bool:
-    """Whether a cell such as 16,000 is a whole number with its thousands apart, or a number with a decimal comma."""
+    """Whether a cell such as 16,000 may be an integer with separated thousands or a number with a decimal comma."""
     return _GROUPED.fullmatch(cell) is not None
 
 
 def ungrouped(cell: str) -> str:
-    """What is asked of a cell like that."""
+    """The request to rewrite an ambiguous cell."""
     return f"can be {cell.replace(',', '')} or {cell.replace(',', '.', 1)}: write it without a comma"
 
 
@@ -140,14 +137,14 @@ def number(cell: str, decimal: str) -> float | None:
 
 
 _END = 1 << 16  # bytes at the end
-_FEWEST, _MOST = 3, 50  # lines above that say how many digits numbers have
+_FEWEST, _MOST = 3, 50  # lines above that determine the number of digits
 _SEPARATORS = "\t;, "
 _CUT_NUMBER = re.compile(r"[+-]?\d*(?:[.,](?P<decimals>\d*))?(?:[eE][+-]?(?P<exponent>\d*))?")
 
 
 def warning(stream: BinaryIO) -> str:
-    """In words, that the last line has no end and its last number fewer digits behind the mark, or in the exponent,
-    than each above it; empty where that is not so."""
+    """A warning that the file may be truncated: the last line has no end, and its last number fewer decimals or digits
+    of the exponent than each above it; else empty."""
     size = stream.seek(0, 2)
     stream.seek(max(size - _END, 0))
     *above, last = lines(stream.read().replace(b"\0", b"").decode("latin-1"))
@@ -155,19 +152,19 @@ def warning(stream: BinaryIO) -> str:
     if not separator:
         return ""
     cell = last.rpartition(separator)[2]
-    own = _digits(cell)
+    last_digits = _digits(cell)
     rows = [line.rstrip() for line in above[-_MOST:] if line.count(separator) == last.count(separator)]
-    others = [found for row in rows if (found := _digits(row.rpartition(separator)[2])) is not None]
-    if own is None or len(others) < _FEWEST:
+    others = [digits_of_row for row in rows if (digits_of_row := _digits(row.rpartition(separator)[2])) is not None]
+    if last_digits is None or len(others) < _FEWEST:
         return ""
     fewest = [min(digits) for digits in zip(*others, strict=True)]
-    if all(mine >= least for mine, least in zip(own, fewest, strict=True)):
+    if all(actual >= least for actual, least in zip(last_digits, fewest, strict=True)):
         return ""
     ends = f"the file ends without the end of a line, in {cell!r}"
     return f"{ends}, which has fewer digits than the numbers above it: it may be cut there"
 
 
 def _digits(cell: str) -> tuple[int, int] | None:
-    """How many a number has behind the mark and in the exponent; None of what is none."""
-    found = _CUT_NUMBER.fullmatch(cell)
-    return None if not cell or found is None else (len(found["decimals"] or ""), len(found["exponent"] or ""))
+    """The numbers of decimals and of digits of the exponent; None where the cell is no number."""
+    parts = _CUT_NUMBER.fullmatch(cell)
+    return None if not cell or parts is None else (len(parts["decimals"] or ""), len(parts["exponent"] or ""))

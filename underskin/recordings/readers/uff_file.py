@@ -1,11 +1,10 @@
 """Universal files, dataset 58 (functions at nodal DOFs) as text and binary, read by pyuff.
 
 Each dataset is a channel, named by its first description line; those on one abscissa are a block. Even spacing in time
-gives the block's sample rate; any other abscissa is a channel of its own (`frequency` for spectra).
-
-Of several FRFs each is a block of its own, named by that line, with the channels `frequency`, `FRF` and, where there is
-one of the same degrees of freedom, `coherence`: each is a recording, and all are mapped alike. Where their units
-differ, the channel is called by its own, `FRF pC/N`.
+gives the block's sample rate; any other abscissa is a channel (`frequency` for spectra). Several FRFs are one block
+each, named by that line, with the channels `frequency`, `FRF` and, where there is one of the same degrees of freedom,
+`coherence`: each is a recording, and all are mapped alike. Where their units differ, the channel is named with its
+unit, `FRF pC/N`.
 """
 
 import os
@@ -38,16 +37,18 @@ def read(stream: BinaryIO, file: str) -> Contents:
         raise FileError(file, "", f"holds no whole dataset {_FUNCTION}; its datasets: {types or 'none'}")
     if len(functions) < len(types):
         notes.append(f"datasets other than {_FUNCTION} are left out: {sorted(set(types) - {_FUNCTION})}")
-    frfs = [one for one in functions if int(one["func_type"]) == _FRF and np.iscomplexobj(one["data"])]
+    frfs = [
+        function for function in functions if int(function["func_type"]) == _FRF and np.iscomplexobj(function["data"])
+    ]
     if len(frfs) < 2:
         return Contents(_blocks(functions), {}, tuple(notes))
-    blocks, used = _each_alone(frfs, functions)
+    blocks, used = _separate_frfs(frfs, functions)
     others = [function for function in functions if function["number"] not in used]
     notes.append(f"holds {len(frfs)} FRFs, each a part of its own: {_some([name for name, _ in blocks])}")
     properties = {f"{name}.{key}": value for name, frf in blocks for key, value in _about(frf).items()}
-    alike = len({_unit(frf) for frf in frfs}) == 1
-    alone = tuple(_frf_block(name, frf, "FRF" if alike else f"FRF {_unit(frf)}") for name, frf in blocks)
-    return Contents((*alone, *_blocks(others)), properties, tuple(notes))
+    one_unit = len({_unit(frf) for frf in frfs}) == 1
+    frf_blocks = tuple(_frf_block(name, frf, "FRF" if one_unit else f"FRF {_unit(frf)}") for name, frf in blocks)
+    return Contents((*frf_blocks, *_blocks(others)), properties, tuple(notes))
 
 
 def _cut_off(stream: BinaryIO) -> list[str]:
@@ -71,17 +72,24 @@ def _function(universal: Any, index: int, file: str) -> dict[str, Any]:
     return {**function, "x": function["x"][:announced], "data": function["data"][:announced], "number": index + 1}
 
 
-def _each_alone(
+def _separate_frfs(
     frfs: list[dict[str, Any]], functions: list[dict[str, Any]]
 ) -> tuple[list[tuple[str, dict[str, Any]]], set[int]]:
-    """The FRFs, each by a name of its own and with its coherence, and the numbers of the datasets in them."""
+    """The FRFs with distinct names and their coherence, and the numbers of the datasets used."""
     waiting = [function for function in functions if int(function["func_type"]) == _COHERENCE]
     named: dict[str, dict[str, Any]] = {}
     used = set()
     for frf in frfs:
-        mate = next((one for one in waiting if _freedom(one) == _freedom(frf) and _same_abscissa(one, frf)), None)
+        mate = next(
+            (
+                candidate
+                for candidate in waiting
+                if _freedom(candidate) == _freedom(frf) and _same_abscissa(candidate, frf)
+            ),
+            None,
+        )
         if mate is not None:
-            waiting = [one for one in waiting if one is not mate]
+            waiting = [candidate for candidate in waiting if candidate is not mate]
             used.add(mate["number"])
         used.add(frf["number"])
         name = _name(frf)
@@ -94,14 +102,14 @@ def _freedom(function: dict[str, Any]) -> tuple[int, ...]:
 
 
 def _about(frf: dict[str, Any]) -> dict[str, str]:
-    """What the dataset says of itself, for a rig description to take fields from."""
+    """The properties of a dataset, for use in a rig description."""
     lines = {f"description {number}": _text(frf[f"id{number}"]) for number in range(1, 6)}
     places = {"response": _place(frf, "rsp"), "reference": _place(frf, "ref")}
     return {name: text for name, text in (lines | places).items() if text}
 
 
 def _place(frf: dict[str, Any], of: str) -> str:
-    """A node with its entity's name, where it has one."""
+    """The entity's name of a node, or its number."""
     entity = _text(frf[f"{of}_ent_name"])
     return entity if entity else str(int(frf[f"{of}_node"]))
 
@@ -132,8 +140,8 @@ def _blocks(functions: list[dict[str, Any]]) -> tuple[Block, ...]:
     return tuple(_block(group) for group in together)
 
 
-def _same_abscissa(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    return _axis(one) == _axis(other) and np.array_equal(one["x"], other["x"])
+def _same_abscissa(first: dict[str, Any], second: dict[str, Any]) -> bool:
+    return _axis(first) == _axis(second) and np.array_equal(first["x"], second["x"])
 
 
 def _axis(function: dict[str, Any]) -> int:

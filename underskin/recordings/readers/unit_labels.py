@@ -1,15 +1,8 @@
-"""Units as files write them.
+"""Units as instruments label them: `[mV]`, `Load (N)`, `height_m`, `m/s^2`, `Force (lbs)`, `Newtons`, `dB re 1 pC/N`.
 
-Units written out: the words of several languages, and common abbreviations, for the units of `unit_labels`.
-
-A word is looked up in small letters. An SI unit's word may have a prefix in words before it (`millinewtons`).
-
-Units as instruments label them: `[mV]`, `Load (N)`, `height_m`, `m/s^2`, `Force (lbs)`, `Newtons`, `dB re 1 pC/N`.
-
-A symbol counts as it is written (mN is not MN). A label that is no symbol may be a word; one in the
-wrong letters, `MHZ`, has every meaning that its letters have.
-
-Products and quotients of units, as arithmetic on channels makes them: N/m times m is N.
+A symbol is case-sensitive (mN is not MN). Other labels may be words of several languages or common abbreviations,
+looked up in lower case; an SI unit's word may have a prefix in words (`millinewtons`). A symbol in the wrong letters,
+`MHZ`, has every meaning that its letters have. Products and quotients of units are exponents: N/m times m is N.
 """
 
 import math
@@ -27,7 +20,7 @@ STANDARD_GRAVITY = 9.80665  # m/s²
 _POUND = 4.4482216152605  # N, of a pound-force
 _INCH = 25.4e-3  # m
 
-# Of each SI unit, in English, French, German, Italian, Spanish, Russian, Chinese and Japanese where they differ.
+# Words of each SI unit in English, French, German, Italian, Spanish, Russian, Chinese and Japanese where they differ.
 _SI_WORDS: Mapping[str, str] = {
     "m": "meter meters metre metres mètre mètres metro metri metros метр м 米",
     "N": "newton newtons newtones ньютон ньютоны н niuton niutony 뉴턴 牛顿 牛 ニュートン",
@@ -133,11 +126,11 @@ _BASES = {
     "V": "voltage",
     "A": "current",
 }
-_GRAM_FORCE = ("force", 1e-3 * STANDARD_GRAVITY)  # what g of a load cell means
+_GRAM_FORCE = ("force", 1e-3 * STANDARD_GRAVITY)  # g of a load cell
 _ROUNDING = 1e-9  # relative, of quotients of prefixes
 _LONGEST = 40
 _NO_UNITS = ("n/a",)  # although either side is one
-_WHOLE = {
+_COMPOUND_UNITS = {
     "cm": ("length", 1e-2),
     "dm": ("length", 1e-1),
     "daN": ("force", 10.0),
@@ -184,40 +177,43 @@ _BRACKETS = re.compile(r"[\[(]((?:[^\[\]()]|\([^\[\]()]*\))*)[\])]")
 
 @dataclass(frozen=True)
 class Unit:
-    """What a unit measures (`force`, `charge/force`) and its factor to SI."""
+    """The dimension of a unit (`force`, `charge/force`) and its factor to SI."""
 
     dimension: str
     to_si: float
 
 
 def unit(label: str) -> Unit | None:
-    """The unit that a label means, or None where it is none that is known here, or may be several."""
-    known = meanings(label)
-    return known[0] if len(known) == 1 else None
+    """The unit of a label; None where it is unknown or ambiguous."""
+    candidates = meanings(label)
+    return candidates[0] if len(candidates) == 1 else None
 
 
 def meanings(label: str) -> tuple[Unit, ...]:
-    """Every unit that a label may mean: one where it is written as a unit is, several where its letters are not those
-    of one (MHZ: mHz or MHz), none where it is no unit."""
+    """All units that a label may mean: one for a correctly written unit, several where its letters are ambiguous (MHZ:
+    mHz or MHz), none where it is no unit."""
     return () if len(label) > _LONGEST else _meanings(label)
 
 
 @lru_cache(maxsize=4096)
 def _meanings(label: str) -> tuple[Unit, ...]:
     label = _LEAD.sub("", unicodedata.normalize("NFKC", label).strip().rstrip(".")).strip()
-    whole = _IN_BRACKETS.match(label)
-    if whole is not None and not whole["name"]:
-        label = whole["unit"].strip()
+    bracketed = _IN_BRACKETS.match(label)
+    if bracketed is not None and not bracketed["name"]:
+        label = bracketed["unit"].strip()
     if label.casefold() in _NO_UNITS:
         return ()
     if _DECIBEL.fullmatch(label):
         return (Unit(DECIBEL, 1.0),)
-    plain = _single(label)
-    if plain is not None:
-        return (plain,)
+    single = _single(label)
+    if single is not None:
+        return (single,)
     for above, below in _fractions(label):
         both = product(meanings(above), meanings(below))
-        ratios = [Unit(f"{one.dimension}/{other.dimension}", one.to_si / other.to_si) for one, other in both]
+        ratios = [
+            Unit(f"{numerator.dimension}/{denominator.dimension}", numerator.to_si / denominator.to_si)
+            for numerator, denominator in both
+        ]
         if ratios:
             return tuple(dict.fromkeys(ratios))
     without = _AMPLITUDE.sub("", label)
@@ -227,9 +223,9 @@ def _meanings(label: str) -> tuple[Unit, ...]:
 
 
 def _single(label: str) -> Unit | None:
-    """The unit of a symbol as it is written, or of a word."""
-    if label in _WHOLE:
-        return Unit(*_WHOLE[label])
+    """The unit of a symbol as written, or of a word."""
+    if label in _COMPOUND_UNITS:
+        return Unit(*_COMPOUND_UNITS[label])
     for base, dimension in _BASES.items():
         prefix = label.removesuffix(base)
         if prefix != label and prefix in _PREFIXES:
@@ -251,42 +247,42 @@ def _fractions(label: str) -> Iterator[tuple[str, str]]:
 
 
 def _in_other_letters(label: str) -> tuple[Unit, ...]:
-    """What a symbol in other capitals may mean: KHZ, mpa, Mpa."""
+    """The meanings of a symbol in other capitals: KHZ, mpa, Mpa."""
     is_plain = len(label) > 2 or label.isupper() or label.islower()  # Nm is not nm
     return _FOLDED.get(label.casefold(), ()) if is_plain and (len(label) > 1 or label in "nv") else ()
 
 
 def _folded() -> dict[str, tuple[Unit, ...]]:
-    """The units by their symbols in small letters, each with its usual prefixes."""
-    found: dict[str, tuple[Unit, ...]] = {}
+    """The units by their symbols in lower case, each with its usual prefixes."""
+    units: dict[str, tuple[Unit, ...]] = {}
     for base, prefixes in _USUAL_PREFIXES.items():
         for prefix in ("", *prefixes):
             name = f"{prefix}{base}".casefold()
-            found[name] = (*found.get(name, ()), Unit(_BASES[base], _PREFIXES[prefix]))
-    return found
+            units[name] = (*units.get(name, ()), Unit(_BASES[base], _PREFIXES[prefix]))
+    return units
 
 
 _FOLDED = _folded()
 
 
 def field_unit(field: str) -> Unit:
-    """The unit that a campaign field is kept in."""
-    known = unit(LAB[field].unit)
-    assert known is not None
-    return known
+    """The unit of a campaign field."""
+    parsed = unit(LAB[field].unit)
+    assert parsed is not None
+    return parsed
 
 
 def labelled_unit(heading: str) -> str:
-    """The unit in a column's heading, or none (empty): in brackets, the last that hold a unit, or else those at its
-    end; or, where it is a known one, behind its last underscore, a stroke, a comma, a colon or "in" (Kraft / mN), or
-    its last word (Force lbs)."""
+    """The unit in a column's heading, empty without one: in the last brackets that hold a unit, or else those at its
+    end; or a known unit after the last underscore, a slash, a comma, a colon or "in" (Kraft / mN), or the last word
+    (Force lbs)."""
     if heading in LAB:
         return LAB[heading].unit
     tail = heading[-LONGEST_NAME:]
-    inside = [text.strip() for text in _BRACKETS.findall(tail)]
-    known = [text for text in inside if meanings(text)]
-    if known or _IN_BRACKETS.match(tail):
-        return known[-1] if known else inside[-1]
+    bracketed = [text.strip() for text in _BRACKETS.findall(tail)]
+    units = [text for text in bracketed if meanings(text)]
+    if units or _IN_BRACKETS.match(tail):
+        return units[-1] if units else bracketed[-1]
     if _SAYS_DECIBEL.search(tail):
         return "dB"
     _, underscore, last = heading.rpartition("_")
@@ -294,8 +290,8 @@ def labelled_unit(heading: str) -> str:
         return last
     behind = _BEHIND.fullmatch(tail)
     if behind is not None and unit(behind["unit"]) is not None:
-        whole = heading.split()[-1]  # FRF pC/N is not in N
-        return whole if "/" in whole and unit(whole) is not None else behind["unit"]
+        last_word = heading.split()[-1]  # FRF pC/N is not in N
+        return last_word if "/" in last_word and unit(last_word) is not None else behind["unit"]
     word = _LAST_WORD.fullmatch(tail.strip())
     if word is not None and word["unit"].lower() not in _NO_LAST_WORD and unit(word["unit"]) is not None:
         return word["unit"]
@@ -303,29 +299,29 @@ def labelled_unit(heading: str) -> str:
 
 
 def contradicts(label: str, stated: str, heading: str, dimension: str) -> bool:
-    """Whether a channel's label is none of the stated unit, for a quantity of this dimension.
+    """Whether a channel's label contradicts the stated unit, for a quantity of this dimension.
 
-    The end of a heading that does not mark it as a unit may be the name of an axis, a channel or a statistic (F_m, Q_A,
-    Load cycles). It contradicts where it measures the quantity, or what was stated, or is a signal: decibels, or a
+    An unmarked end of a heading may be the name of an axis, a channel or a statistic (F_m, Q_A, Load cycles). It
+    contradicts only where it has the dimension of the quantity or of the stated unit, or is a signal: decibels, or a
     voltage with a prefix.
     """
     labelled, meant = meanings(label), unit(stated)
     if label == "g":
         labelled += (Unit(*_GRAM_FORCE),)
-    if not labelled or (meant is not None and any(_same(one, meant) for one in labelled)):
+    if not labelled or (meant is not None and any(_same(meaning, meant) for meaning in labelled)):
         return False
     if _is_marked(label, heading):
         return True
-    told = {dimension, DECIBEL, *(["voltage"] if len(label) > 1 else []), *([meant.dimension] if meant else [])}
-    return any(one.dimension in told for one in labelled)
+    dimensions = {dimension, DECIBEL, *(["voltage"] if len(label) > 1 else []), *([meant.dimension] if meant else [])}
+    return any(meaning.dimension in dimensions for meaning in labelled)
 
 
-def _same(one: Unit, other: Unit) -> bool:
-    return one.dimension == other.dimension and math.isclose(one.to_si, other.to_si, rel_tol=_ROUNDING)
+def _same(first: Unit, second: Unit) -> bool:
+    return first.dimension == second.dimension and math.isclose(first.to_si, second.to_si, rel_tol=_ROUNDING)
 
 
 def _is_marked(label: str, heading: str) -> bool:
-    """Whether a label is more than the end of a heading: the file's own, a field's, in brackets or behind a stroke."""
+    """Whether a label is marked as a unit: by the file, by a field, in brackets or after a slash."""
     if heading in LAB or label != labelled_unit(heading):
         return True
     in_brackets = [text.strip() for text in _BRACKETS.findall(heading[-LONGEST_NAME:])]
@@ -333,13 +329,13 @@ def _is_marked(label: str, heading: str) -> bool:
 
 
 def without_brackets(cell: str) -> str:
-    """A cell without the brackets around the whole of it: `(ms)` is `ms`, `(pC)/N` stays."""
-    whole = _IN_BRACKETS.match(cell.strip())
-    return cell.strip() if whole is None or whole["name"] else whole["unit"].strip()
+    """A cell without brackets that enclose all of it: `(ms)` is `ms`, `(pC)/N` is unchanged."""
+    bracketed = _IN_BRACKETS.match(cell.strip())
+    return cell.strip() if bracketed is None or bracketed["name"] else bracketed["unit"].strip()
 
 
 def in_brackets(heading: str) -> tuple[str, str] | None:
-    """The name and the unit in brackets behind it; None where there is none."""
+    """The name and the unit in brackets after it; None without one."""
     bracketed = _IN_BRACKETS.match(heading[-LONGEST_NAME:])
     return None if bracketed is None else (bracketed["name"].strip(), bracketed["unit"].strip())
 
@@ -348,7 +344,7 @@ def lab_field(heading: str) -> tuple[str, float] | None:
     """The campaign field of a heading and the factor to its unit: `preload [mN]` is `preload_n`, 0.001, and
     `indenter_diameter_mm` is `indenter_radius_mm`, 0.5.
 
-    None where the heading names no field that has a unit, or a unit of another dimension.
+    None where the heading names no field with a unit, or has a unit of another dimension.
     """
     if heading.lower().replace(" ", "_").startswith(_DIAMETER):
         radius = lab_field(_RADIUS + heading[len(_DIAMETER) :])
@@ -359,8 +355,8 @@ def lab_field(heading: str) -> tuple[str, float] | None:
     given = unit(bracketed[1])
     stem = bracketed[0].lower().replace(" ", "_")
     for name in LAB:
-        known = field_unit(name) if name.startswith(f"{stem}_") and given else None
-        if known and given and known.dimension == given.dimension and stem == _stem(name):
+        candidate = field_unit(name) if name.startswith(f"{stem}_") and given else None
+        if candidate and given and candidate.dimension == given.dimension and stem == _stem(name):
             return name, given.to_si / LAB[name].to_si
     return None
 
@@ -392,18 +388,20 @@ _SI_RATIOS = (_FRF, *(f"{above}/{below}" for above, below in product(_PARTS, _PA
 
 def times(first: Exponents, second: Exponents, sign: int = 1) -> Exponents:
     """The exponents of a product; of the quotient where `sign` is -1."""
-    length, force, charge, time = (one + sign * other for one, other in zip(first, second, strict=True))
+    length, force, charge, time = (
+        exponent + sign * second_exponent for exponent, second_exponent in zip(first, second, strict=True)
+    )
     return length, force, charge, time
 
 
 def exponents(label: str) -> Exponents | None:
-    """Those of a unit, `1` for a number without one; None where the unit is not known here."""
+    """The exponents of a unit, `1` for a number without one; None for an unknown unit."""
     if label == "1":
         return NO_DIMENSION
-    known = unit(label)
-    if known is None:
+    parsed = unit(label)
+    if parsed is None:
         return None
-    parts = [_EXPONENTS.get(part) for part in known.dimension.split("/")]
+    parts = [_EXPONENTS.get(part) for part in parsed.dimension.split("/")]
     result, *below = parts
     for part in below:
         result = None if result is None or part is None else times(result, part, -1)
@@ -411,7 +409,7 @@ def exponents(label: str) -> Exponents | None:
 
 
 def ratio_of(label: str, signal: str, quantity: str) -> Exponents | None:
-    """The exponents of label/signal · quantity; None where a unit is not known here."""
+    """The exponents of label/signal · quantity; None where a unit is unknown."""
     given, divided, measured = exponents(label), exponents(signal), exponents(quantity)
     if given is None or divided is None or measured is None:
         return None
@@ -419,7 +417,7 @@ def ratio_of(label: str, signal: str, quantity: str) -> Exponents | None:
 
 
 def label_of(dimension: Exponents, preferred: Iterable[str]) -> str | None:
-    """A unit of these exponents: the first preferred one that has them, else that of SI; empty where they are all 0.
+    """A unit of these exponents: the first preferred one that has them, else one of SI; empty where they are all 0.
 
     None where no single unit, and no quotient of two, has them.
     """

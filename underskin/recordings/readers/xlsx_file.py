@@ -1,14 +1,9 @@
-"""The sheets of a workbook (.xlsx, .xlsm) as tables of text: a line a row, cells separated by tabs.
+"""Workbooks (.xlsx, .xlsm): each visible sheet as text, a line a row, cells separated by tabs, read like CSV.
 
-Formulas count by the value that the spreadsheet program kept; nothing is computed, no macro and no link is followed.
-Dates are in the lab's time zone. A workbook is a ZIP archive of XML: what it unfolds to is limited, and XML that
-declares entities is refused.
-
-Workbooks (.xlsx, .xlsm): each sheet is read as the CSV that it would be saved as.
-
-One sheet may be the campaign of csv_template.py, or what stands above its table, and another the table. Otherwise each
-sheet with a table of numbers is a block by the sheet's name, as csv_file.py reads it; others are left out, with a
-warning.
+One sheet may be the campaign of csv_template.py, or its head, with the table on another sheet. Otherwise each sheet
+with a table of numbers is a block named after the sheet, read by csv_file.py; others are left out with a warning.
+Formulas count by their stored value; no macro or link is followed. Dates are in the lab's time zone. A workbook is a
+ZIP archive of XML: its unpacked size is limited, and XML that declares entities is rejected.
 """
 
 import re
@@ -44,9 +39,9 @@ _BLANKS = re.compile(r"\s+")
 
 
 class WorkbookSheets:
-    """The visible sheets of an open workbook; `notes`: what the user should know.
+    """The visible sheets of an open workbook; `notes`: warnings for the user.
 
-    Raises FileError where it is none, is damaged, or unfolds to more than the settings allow.
+    Raises FileError where it is none, is damaged, or unpacks to more than the settings allow.
     """
 
     def __init__(self, stream: BinaryIO, file: str) -> None:
@@ -57,7 +52,7 @@ class WorkbookSheets:
             with zipfile.ZipFile(stream) as archive:
                 has_formulas = self._inspected(archive, stream.seek(0, 2))
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # about what is not read
+                warnings.simplefilter("ignore")  # about unread parts
                 self._books = [self._opened(stream, values=True)]
                 if has_formulas:
                     self._books.append(self._opened(stream, values=False))
@@ -67,19 +62,19 @@ class WorkbookSheets:
         return openpyxl.load_workbook(stream, read_only=True, data_only=values, keep_links=False)
 
     def _inspected(self, archive: zipfile.ZipFile, size: int) -> bool:
-        """Whether any sheet has a formula; every part is unfolded once, before anything understands it."""
+        """Whether any sheet has a formula; every part is unpacked once, before it is parsed."""
         names = archive.namelist()
         if _WORKBOOK not in names:
-            known = (what for name, what in _OTHERS.items() if name in names)
-            raise FileError(self._file, "", next(known, "is a ZIP archive: send the files in it"))
-        left = most = ParsingLimits.from_environment().content_bytes(size)
+            descriptions = (what for name, what in _OTHERS.items() if name in names)
+            raise FileError(self._file, "", next(descriptions, "is a ZIP archive: send the files in it"))
+        remaining = most = ParsingLimits.from_environment().content_bytes(size)
         formulas = False
         for name in names:
             with archive.open(name) as part:
                 end = b""
                 while data := part.read(_BLOCK):
-                    left -= len(data)
-                    if left < 0:
+                    remaining -= len(data)
+                    if remaining < 0:
                         reason = f"it unfolds to more than {most / 1e6:.0f} MB, too much for a file of its size"
                         raise FileError(self._file, name, f"{reason} ({EXPANSION})")
                     seen, end = end + data, data[-_OVERLAP:]
@@ -90,7 +85,7 @@ class WorkbookSheets:
 
     def texts(self) -> Iterator[tuple[str, str]]:
         """Each visible sheet that has any cell: its name and its text; raises FileError that names sheet and cell."""
-        for number, sheet in enumerate(self._books[0].worksheets):
+        for index, sheet in enumerate(self._books[0].worksheets):
             if sheet.sheet_state != "visible":
                 self.notes.append(f"sheet {sheet.title!r} is hidden, and is left out")
                 continue
@@ -99,7 +94,7 @@ class WorkbookSheets:
                 damage_said(self._file, f"sheet {sheet.title!r}", lambda error: f"is damaged: {error}"),
             ):
                 warnings.simplefilter("ignore")
-                sheets = [book.worksheets[number] for book in self._books]
+                sheets = [book.worksheets[index] for book in self._books]
                 lines = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
             while lines and not lines[-1]:
                 lines.pop()
@@ -107,7 +102,7 @@ class WorkbookSheets:
                 yield sheet.title, "\n".join(lines)
 
     def _rows(self, sheets: Sequence[Any]) -> Iterator[Sequence[Any]]:
-        """The values of each row of a sheet; `sheets`: the sheet, and where there are formulas the same with them."""
+        """The values of each row of a sheet; `sheets`: the sheet with values and, if there are any, with formulas."""
         for sheet in sheets:
             sheet.reset_dimensions()  # what is declared may be wrong
         if len(sheets) == 1:
@@ -115,7 +110,7 @@ class WorkbookSheets:
             return
         for row, written in zip(*(sheet.iter_rows() for sheet in sheets), strict=True):
             for cell, as_written in zip(row, written, strict=True):
-                # A text formula may well have kept an empty text.
+                # A text formula may have an empty text as its value.
                 if cell.value is None and as_written.data_type == "f" and cell.data_type != "str":
                     reason = "holds a formula without a value: open the workbook in a spreadsheet program and save it"
                     raise FileError(self._file, f"sheet {cell.parent.title!r}, cell {cell.coordinate}", reason)
@@ -140,9 +135,9 @@ class WorkbookSheets:
         return f'"{written.replace(chr(34), chr(34) * 2)}"' if '"' in written else written
 
     def _zoned(self, moment: datetime) -> str:
-        told = f"times in cells are taken to be in the zone {self._zone} (UNDERSKIN_TIME_ZONE)"
-        if told not in self.notes:
-            self.notes.append(told)
+        note = f"times in cells are taken to be in the zone {self._zone} (UNDERSKIN_TIME_ZONE)"
+        if note not in self.notes:
+            self.notes.append(note)
         return moment.replace(microsecond=0, tzinfo=self._zone).isoformat()
 
 
@@ -166,14 +161,16 @@ def read(stream: BinaryIO, file: str) -> Contents | Document:
 
 
 def sheet_text(stream: BinaryIO, sheet: str | None = None) -> dict[str, Any]:
-    """The `text` of a visible sheet with anything in it, cells separated by tabs: that of a name, or the only one;
-    raises FileError."""
+    """The `text` of a visible non-empty sheet with cells separated by tabs: the named or the only one; raises
+    FileError."""
     sheets = dict(WorkbookSheets(stream, "").texts())
     wanted = list(sheets) if sheet is None else [name for name in sheets if name == sheet]
     if len(wanted) != 1:
-        found = f"those with anything in them: {_listed(list(sheets))}" if sheets else "none has anything in it"
-        must = "one sheet with columns, or be sent with the name of one" if sheet is None else f"a sheet {sheet!r}"
-        raise FileError("", "", f"must have {must}; {found}")
+        available = f"those with anything in them: {_listed(list(sheets))}" if sheets else "none has anything in it"
+        requirement = (
+            "one sheet with columns, or be sent with the name of one" if sheet is None else f"a sheet {sheet!r}"
+        )
+        raise FileError("", "", f"must have {requirement}; {available}")
     return {"text": sheets[wanted[0]]}
 
 
@@ -182,7 +179,7 @@ def _listed(names: list[str]) -> str:
 
 
 def _with_table(name: str, sheets: dict[str, str]) -> tuple[str, str]:
-    """Takes a campaign off the sheets, with the table on the next sheet where its own has none: where it stands, in
+    """Remove the campaign's sheet from `sheets`, with the only sheet that has a table where it has none: its place in
     words, and its text."""
     text = sheets.pop(name)
     tables = [other for other, below in sheets.items() if csv_template.has_table(below.partition("\n")[0])]
@@ -224,14 +221,14 @@ def _tables(sheets: dict[str, str], file: str) -> Contents:
         replace(block, name=f"{name} {block.name}".strip()) for name, table in tables.items() for block in table.blocks
     )
     properties = {key: value for name, table in tables.items() for key, value in _about(name, table, len(tables))}
-    told = [f"sheet {name!r}: {warning}" for name, table in tables.items() for warning in table.warnings]
-    left = [f"{error.place} is left out: it {error.reason}" for error in errors]
+    messages = [f"sheet {name!r}: {warning}" for name, table in tables.items() for warning in table.warnings]
+    omitted = [f"{error.place} is left out: it {error.reason}" for error in errors]
     layout = "; ".join(f"sheet {name!r}: {table.layout}" for name, table in tables.items())
-    return Contents(blocks, properties, (*told, *left), layout)
+    return Contents(blocks, properties, (*messages, *omitted), layout)
 
 
 def _about(name: str, table: Contents, sheets: int) -> list[tuple[str, str | float]]:
-    """What a sheet says about itself, by its name, that of its only part too; of an only sheet also without."""
+    """The properties of a sheet, prefixed by the names of its blocks; those of an only sheet also without prefix."""
     parts = [f"{name} {block.name}".strip() for block in table.blocks]
     numbered = tuple(f"{block.name}." for block in table.blocks if block.name)
     about = []
