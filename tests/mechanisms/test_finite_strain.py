@@ -101,7 +101,7 @@ def test_depth_beyond_the_table(names: list[str]) -> None:
 def test_whole_sphere(over_radius: float) -> None:
     """The softening of a sphere that is pressed deep is the same in the fit of one curve as in a diagnosis."""
     radius, depth = 2e-3, over_radius * 2e-3
-    law = SphereLaw(radius, None, 0.5, load_contact().softening, whole=True)
+    law = SphereLaw(radius, None, 0.5, load_contact().softening, full_sphere=True)
     sphere = Sphere(np.full((1, 1, 1), 1.0), np.full((1, 1), radius), deep=1.0, strain_share=1.0)
     a = sphere.radius_at(np.full((1, 1, 1), depth), None)
     assert law(np.array([depth])) == pytest.approx(sphere.at(a)[0].ravel(), rel=1e-4)

@@ -112,7 +112,7 @@ class AdoptedModel:
         require_fields(self.mechanisms, conditions, "the adopted model")
         values: dict[str, float] = {}
         for mechanism in mechanisms:
-            known |= mechanism.transfer(self.parameters[mechanism.name], conditions)
+            values |= mechanism.transfer(self.parameters[mechanism.name], conditions)
         inside = np.ones(len(frf_of(conditions)), dtype=bool)
         if self.law is not None:
             law, inside = bound_to(self.law, conditions, table, tuple(CATALOGUE.values()))
