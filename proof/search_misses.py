@@ -84,8 +84,8 @@ def searched(document: Result) -> tuple[FittingProblem, Search] | None:
     inspected = inspect(campaign, table)
     if inspected.lacking:
         return None
-    problem, frf = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
-    return problem, search(problem, frf)
+    problem = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
+    return problem, search(problem)
 
 
 def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, Any]) -> Explanation:
@@ -96,7 +96,7 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
     ordered = tuple(name for name in problem.lines.mechanisms.named if name in names)
     (first,) = problem.explain([Request(ordered)])
     assert first is not None  # without alternatives, no fit is pruned
-    requests = [Request(ordered, larger=with_true_values(first, effects))]
+    requests = [Request(ordered, initial=with_true_values(first, effects))]
     if len(ordered) > 1:
         single_fits = problem.explain([Request((name,)) for name in ordered])
         requests += [Request(ordered, parent) for parent in single_fits if parent is not None]

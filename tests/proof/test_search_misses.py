@@ -1,6 +1,5 @@
 """Misses of the search: told where the hidden set was left out, and none where scatter of position misled it."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -11,7 +10,7 @@ from proof.text_wide import is_miss
 from proof.true_starts import true_values
 from rig.wide_tails import WIDE
 from tests.support.cases import first
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import search
 
@@ -76,8 +75,8 @@ def test_fit_stopped_hopeless_taken_up_scatter() -> None:
 def test_search_leaves_hidden_set_out_misses(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search that leaves the hidden set out misses it."""
 
-    def shorter(problem: FittingProblem, known: Sequence[Explanation]) -> Search:
-        found = search(problem, known)
+    def shorter(problem: FittingProblem) -> Search:
+        found = search(problem)
         return replace(found, explanations=tuple(entry for entry in found.explanations if len(entry.names) < 2))
 
     monkeypatch.setattr("proof.search_misses.search", shorter)

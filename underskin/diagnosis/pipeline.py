@@ -143,14 +143,14 @@ def _searched(
     inspected: Inspected, table: SigmaTable, mechanisms: ActiveCatalogue, others: OtherKinds
 ) -> KindsTogether:
     """The search on FRFs, with what other kinds tell."""
-    alone, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
+    alone = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
 
     def fitted(
         beside: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
     ) -> tuple[FittingProblem, Search]:
         """Beside other kinds under the same noise, so that evidences can be compared."""
         if beside is None:
-            return alone, search(alone, known)
+            return alone, search(alone)
         problem = FittingProblem(alone.lines, table, beside)
         return problem, search(problem, required_sets=required_sets)
 

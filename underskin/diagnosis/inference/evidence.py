@@ -7,29 +7,16 @@ outside the bounds), H the information on the mean parameters and the Hessian in
 probability that a normal with this mean and H⁻¹ gives to the bounds: one bound after another, each with the moments
 left by the ones before (exact for one bound; Mendell and Elston 1974).
 
-The evidence of one hypothesis: Laplace's method, and integrals over parameters whose posterior is not Gaussian.
+The position scatter is integrated over: its prior is flat between two values, and often the recordings do not
+determine it; the posterior of the gain scatter is then not Gaussian either. There Z is the integral over the logarithms
+of both, at the most probable prediction, from which the quadratic of the mean parameters leads on: sums at equal
+strides, as good as exact for what falls to nothing both ways.
 
-A parameter on a logarithmic scale that the lines hardly determine (the time of a small step, the onset of a small loss)
-is one: the others follow it along a curve, and where the effect is small it is free. There Z is the integral over that
-parameter of the evidence that Laplace's method gives with it held.
-
-The positioning scatter is another: its prior is flat between two values, and often the recordings do not determine it;
-the gain scatter's posterior is then not Gaussian either. There Z is the integral over the logarithms of both, at the
-most probable prediction, from which the quadratic of the mean parameters leads on.
-
-Integrals are sums at equal strides, as good as exact for what falls to nothing both ways.
-
-Posteriors that the bounds of one parameter end, and not the recordings: integrated over that parameter.
-
-Indentations tell E/(1 − ν²), so that E and ν trade along a ridge, which ν between its bounds cuts short. A quadratic
-knows no bounds, and would leave E as unknown as the ridge is long.
-
-A parameter's posterior over all values of the sensors' spread, which two sensors leave open by a factor.
-
-At its most probable value the spread is too small: that is where the sensors that were recorded differ least from their
-mean. At each of a grid of values the mean parameters are normal, at most a Newton step away.
-
-Where a parameter's 95 % interval ends by the profile of the posterior, which need not be Gaussian.
+Indentations determine E/(1 − ν²), so that E and ν trade along a ridge, which ν between its bounds cuts short: a
+parameter that trades against one between bounds is integrated over that (`parts`). The posterior of a parameter over
+all values of the sensors' spread, which two sensors leave open by a factor, is a mixture over a grid of that spread
+(`marginalise_sensor_spread`). Where a parameter's 95 % interval reaches no effect, the profile of the posterior, which
+need not be Gaussian, ends it (`profile_end`).
 """
 
 from collections.abc import Callable, Sequence
@@ -282,9 +269,6 @@ def _log_between(a: float, b: float) -> float:
     return float(upper + np.log1p(-np.exp(min(lower - upper, -1e-15))))
 
 
-_TRUSTED = 1.0  # gain in log posterior within which an integral was begun at the most probable point
-_LOOSE = 0.3  # standard deviation beyond which a logarithmic parameter is integrated over: a factor of 1.35
-_FEWEST_STRIDES = 8  # from one bound to the other
 _GONE = 4.0  # nats below the greatest at which an integral ends
 _LONGEST_STRIDE = 0.3  # of scatter's logarithm: twice the deviation with which its prior falls off
 _GAIN_STRIDES = 8  # either way: 2.4 of the logarithm at most, and the prior's flat part is 1.6 wide
@@ -298,13 +282,8 @@ def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
 
 
 def integrated(evidence: Sequence[Evidence]) -> list[Evidence]:
-    """Over all values of a parameter that the lines leave loose, where there is one, and of the positioning scatter."""
+    """Over all values of the position scatter, where there is one."""
     whole = list(evidence)
-    for group in _alike(whole, [_loosest(entry) is not None for entry in whole]):
-        for number, entry in zip(
-            group, _integrate_over_weak_parameter([whole[number] for number in group]), strict=True
-        ):
-            whole[number] = entry
     for group in _alike(whole, [entry.hypothesis.has_position_scatter for entry in whole]):
         for number, entry in zip(group, _over_position([whole[number] for number in group]), strict=True):
             whole[number] = entry
@@ -368,66 +347,6 @@ def _work_out(integrals: Sequence[_Integral], log_values: Callable[[list[int], F
         numbers, values = [number for number, _ in wanted], np.array([value for _, value in wanted])
         for (number, value), log_value in zip(wanted, log_values(numbers, values).tolist(), strict=True):
             integrals[number].log_values[value] = log_value
-
-
-def _integrate_over_weak_parameter(evidence: list[Evidence]) -> list[Evidence]:
-    """With log ∫ Z(x) p(x) dx over the loosest parameter x of each.
-
-    Where the integral comes upon a point more probable than that around which it was begun, it begins again from there.
-    """
-    places = [_loosest(entry) for entry in evidence]
-    known = [place for place in places if place is not None]
-    held = Fitter([entry.hypothesis for entry in evidence], held=[(place,) for place in known])
-    integrals = []
-    for number, (entry, place) in enumerate(zip(evidence, known, strict=True)):
-        low, high = held.low[number, place], held.high[number, place]
-        deviation = float(np.sqrt(np.diag(entry.covariance)[entry.hypothesis.mean_indices.index(place)]))
-        stride = min(deviation, (high - low) / _FEWEST_STRIDES)
-        integrals.append(_Integral(float(entry.point.fit[place]), stride, low, high))
-    better: dict[int, Evidence] = {}
-
-    def log_values(numbers: list[int], values: Floats) -> Floats:
-        points = held_points(held, evidence, known, numbers, values)
-        begun = held.update_noise_levels(held.evaluate(points), 1)
-        found = around(held, held.descend(begun, 1, _within_reach))
-        own = [held.hypotheses[number].model.parameters[known[number]] for number in numbers]
-        priors = [entry.log_prior(value) for entry, value in zip(own, values.tolist(), strict=True)]
-        for number, entry, prior in zip(numbers, found, priors, strict=True):
-            cost = entry.cost - prior
-            if cost < min(evidence[number].cost - _TRUSTED, better[number].cost if number in better else np.inf):
-                better[number] = replace(entry, cost=cost)
-        return np.array([entry.log_evidence + prior for entry, prior in zip(found, priors, strict=True)])
-
-    _work_out(integrals, log_values)
-    whole = [
-        replace(entry, log_evidence=integral.log_total) for entry, integral in zip(evidence, integrals, strict=True)
-    ]
-    for number, entry in better.items():
-        fitter = Fitter([entry.hypothesis])
-        settled = fitter.update_noise_levels(fitter.evaluate(fitter.at(entry.point)), 1)
-        if settled.cost[0] < evidence[number].cost - _TRUSTED:
-            again = around(fitter, settled)
-            whole[number] = _integrate_over_weak_parameter(again)[0] if _loosest(again[0]) is not None else again[0]
-    return whole
-
-
-def _within_reach(at: Evaluated) -> Floats:
-    """The cost that points must get below to count in the integrals that they belong to."""
-    least = np.full(at.points.owner.max() + 1, np.inf)
-    np.minimum.at(least, at.points.owner, at.cost)
-    return np.asarray(least[at.points.owner] + _GONE + _TRUSTED)
-
-
-def _loosest(evidence: Evidence) -> int | None:
-    """The place of the mechanisms' logarithmic parameter whose standard deviation is the largest, where that counts."""
-    hypothesis = evidence.hypothesis
-    deviations = {
-        place: float(np.sqrt(variance))
-        for place, variance in zip(hypothesis.mean_indices, np.diag(evidence.covariance), strict=True)
-        if place < hypothesis.mechanism_parameter_count and hypothesis.model.parameters[place].scale == "log"
-    }
-    place = max(deviations, key=lambda place: deviations[place], default=None)
-    return place if place is not None and deviations[place] > _LOOSE else None
 
 
 def held_points(

@@ -284,7 +284,7 @@ class Request:
     parent: Explanation | None = None
     alone: Explanation | None = None
     begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
-    larger: Explanation | None = None  # a set with one mechanism more, from whose fit this one begins
+    initial: Explanation | None = None  # from whose parameters the fit begins
     kept: bool = False  # fitted to its end however far behind it begins, and explained though it gains nothing
 
     @property
@@ -427,7 +427,7 @@ class FittingProblem:
 
 
 def integrated(explanations: Sequence[Explanation]) -> list[Explanation]:
-    """With the evidence of each fit that counts over all values of what the lines leave loose."""
+    """With the evidence of each fit that counts over all values of the position scatter."""
     counting = []
     for number, entry in enumerate(explanations):
         least = max(prior + fit.log_evidence for prior, fit in entry.each) - _COUNTS
@@ -478,9 +478,9 @@ def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -
         for number in members:
             parent, begin = requests[number].parent, requests[number].begin
             known = None if parent is None else {name: parent.own(name) for name in parent.names}
-            larger = requests[number].larger
-            if larger is not None:
-                known, begin = {name: larger.own(name) for name in requests[number].names}, larger.point
+            initial = requests[number].initial
+            if initial is not None:
+                known, begin = {name: initial.own(name) for name in requests[number].names}, initial.point
             added = requests[number].alone
             alone = {} if added is None else {name: added.own(name) for name in added.names}
             beginnings.append(StartingPoint(known, parent.point if parent and begin is None else begin, alone))
