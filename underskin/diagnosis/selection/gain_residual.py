@@ -75,13 +75,13 @@ class SensorPairs:
 
 @dataclass(frozen=True, eq=False)
 class _WithoutLaw:
-    """At several scatters, with what is fixed taken out: C = A + F Fᵀ and A = V + τ² S Sᵀ, V the variances, τ the
-    spread of the sensors S, and F the `fixed` columns.
+    """The residual r at several scatters without a law, the model's parameters and sensors' gains marginalised.
 
-    `log_density` of the residual r (scatters,); A⁻¹ = V⁻¹ − Σ uₙ uₙᵀ over sensors, with `shared` u (scatters, pairs);
-    C⁻¹ = A⁻¹ − Tᵀ T with `taken` T = L⁻¹ Fᵀ A⁻¹, L Lᵀ = 1 + Fᵀ A⁻¹ F (scatters, columns, recordings); `root` V^(−½)
-    and `weighed` C⁻¹ r (scatters, recordings). Time and memory grow with the recordings, however many sensors they are
-    of.
+    Its covariance is C = A + F Fᵀ, A = V + τ² S Sᵀ: V the variances, S the sensors, τ their spread, F the `fixed`
+    columns. `log_density` of r (scatters,); A⁻¹ = V⁻¹ − Σ uₙ uₙᵀ over sensors, with `sensor_columns` u (scatters,
+    pairs); C⁻¹ = A⁻¹ − Tᵀ T with `projector` T = L⁻¹ Fᵀ A⁻¹, L Lᵀ = 1 + Fᵀ A⁻¹ F (scatters, columns, recordings);
+    `root` V^(−½) and `weighted` C⁻¹ r (scatters, recordings). Time and memory grow with the number of recordings, not
+    of sensors.
     """
 
     log_density: Floats
