@@ -28,14 +28,14 @@ from underskin.diagnosis.validation.cross_validation import (
     above_noise,
     held_out,
     largest_floor_percent,
-    of_nearest_law,
+    nearest_law_findings,
 )
 from underskin.diagnosis.validation.signatures import (
     Signatures,
     confounding,
     hidden_shifts,
-    left_open,
     power,
+    remaining_confounding,
     without_seating,
 )
 from underskin.findings.codes import Reason
@@ -215,7 +215,7 @@ def _work_out(
     undescribed = leader.explanation is None and result.law is None
     begun = begun.with_findings(*_scatter(problem, shown))
     shape = describe(problem, shown) if undescribed else None
-    begun = begun.with_findings(*(of_nearest_law(problem, result, nothing) if undescribed else ()))
+    begun = begun.with_findings(*(nearest_law_findings(problem, result, nothing) if undescribed else ()))
     return replace(
         begun.with_findings(*above_noise(problem, shown, groups)),
         search=result,
@@ -224,7 +224,7 @@ def _work_out(
         region=ranges,
         effect=size,
         groups=groups,
-        confounded=left_open(confounded, result.answers),
+        confounded=remaining_confounding(confounded, result.answers),
         power=power(signatures, shown, result.supported),
         shifts=hidden_shifts(problem, signatures, shown, result.supported, telling_modulus(begun.joined, shown.names)),
         shape=shape,

@@ -336,7 +336,7 @@ _MOST_INTEGRATED, _INTEGRATION_MARGIN = 4, 6.0  # laws whose evidence is integra
 
 
 def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
-    """Fitted explanations with a law that may matter, the most probable first; none where no law can be tested."""
+    """Fitted explanations with a law that may matter; none where no law can be tested."""
     null = next(explanation for explanation in search.explanations if not explanation.names)
     ranked = sorted(
         (explanation for explanation in search.explanations if search.is_supported(explanation)), key=search.log_weight
