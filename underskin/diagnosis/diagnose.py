@@ -29,28 +29,28 @@ def diagnose(
     limits: RigLimits = pipeline.NO_LIMITS,
     progress: Progress = lambda _: None,
 ) -> Report:
-    """The report (`report/1`) on where recordings and model disagree, and what physics the model left out.
+    """The report (`report/1`) on where recordings and model disagree, and which physics the model lacks.
 
     FRFs are diagnosed where the campaign has any, else its indentation curves, else its compressions; recordings of the
-    other kinds count with them. The same input gives the same report.
+    other kinds are used as well. The same input gives the same report.
 
     Parameters
     ----------
     campaign
-        A campaign, or what `read_file` returned: then the recordings that were refused are among the findings.
+        A campaign, or the result of `read_file`: then recordings that were refused are among the findings.
     table
-        σ; default: the shipped one.
+        σ table; default: the shipped one.
     without
         Mechanisms to leave out of the catalogue.
     limits
-        What the rig can do, for the experiment to make next.
+        Capabilities of the rig, for the experiment to make next.
     progress
-        Called with the share that is done, 0 to 1.
+        Called with the completed share, 0 to 1.
 
     Raises
     ------
     InvalidInput
-        A mechanism `without` that the catalogue does not have.
+        A mechanism in `without` that is not in the catalogue.
     """
     campaign, refused = (campaign.campaign, campaign.problems) if isinstance(campaign, Reading) else (campaign, [])
     result = pipeline.diagnose(campaign, table or load_table(), progress, limits, without)
@@ -72,15 +72,15 @@ def diagnose_together(
     campaigns
         At least two, one of them with FRFs.
     name
-        What the report calls them.
+        The campaigns' common name in the report.
 
     Raises
     ------
     InvalidInput
         Fewer than two campaigns, none with FRFs, skins that are declared differently, or FRFs in two campaigns.
     """
-    read = [_campaign(one) for one in campaigns]
-    document = several.diagnose_together(read, table or load_table(), name, without, progress)
+    campaigns_read = [_campaign(campaign) for campaign in campaigns]
+    document = several.diagnose_together(campaigns_read, table or load_table(), name, without, progress)
     return _with_refused(document, campaigns)
 
 
@@ -92,16 +92,16 @@ def diagnose_fleet(
     without: Collection[str] = (),
     progress: Progress = lambda _: None,
 ) -> Report:
-    """The report on skins of one make, by their ids: what they share, and which of them depart; as for `diagnose`.
+    """The report on skins of one make, by their ids: what they share, and which deviate; parameters as for `diagnose`.
 
     Raises
     ------
     InvalidInput
         Fewer than two skins, or campaigns of a skin that cannot be diagnosed together.
     """
-    read = {skin: [_campaign(one) for one in campaigns] for skin, campaigns in skins.items()}
-    document = fleet.diagnose_fleet(read, table or load_table(), name, without, progress)
-    return _with_refused(document, [one for campaigns in skins.values() for one in campaigns])
+    campaigns_by_skin = {skin: [_campaign(campaign) for campaign in campaigns] for skin, campaigns in skins.items()}
+    document = fleet.diagnose_fleet(campaigns_by_skin, table or load_table(), name, without, progress)
+    return _with_refused(document, [campaign for campaigns in skins.values() for campaign in campaigns])
 
 
 def _campaign(campaign: Campaign | Reading) -> Campaign:
@@ -109,11 +109,13 @@ def _campaign(campaign: Campaign | Reading) -> Campaign:
 
 
 def _with_refused(document: Mapping[str, object], campaigns: Sequence[Campaign | Reading]) -> Report:
-    """With the recordings that were refused when they were read first among the findings, after their campaign."""
+    """The report with recordings that were refused on reading first among its findings, with their campaign."""
     refused = []
-    for reading in [one for one in campaigns if isinstance(one, Reading)]:
-        own = (entry.in_report() for entry in pipeline.refused(reading.problems))
-        refused += [{**finding, "statement": f"{reading.campaign.name}: {finding['statement']}"} for finding in own]
+    for reading in [campaign for campaign in campaigns if isinstance(campaign, Reading)]:
+        refusals = (finding.in_report() for finding in pipeline.refused(reading.problems))
+        refused += [
+            {**finding, "statement": f"{reading.campaign.name}: {finding['statement']}"} for finding in refusals
+        ]
     findings = document["findings"]
     assert isinstance(findings, list)
     return Report.of({**document, "findings": [*refused, *findings]})

@@ -28,14 +28,14 @@ from underskin.diagnosis.validation.cross_validation import (
     above_noise,
     held_out,
     largest_floor_percent,
-    of_nearest_law,
+    nearest_law_findings,
 )
 from underskin.diagnosis.validation.signatures import (
     Signatures,
     confounding,
     hidden_shifts,
-    left_open,
     power,
+    remaining_confounding,
     without_seating,
 )
 from underskin.findings.codes import Reason
@@ -49,8 +49,8 @@ from underskin.recordings.plausibility import implausible
 from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 
-_KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first that there is gives the verdict
-_LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
+_KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first one present gives the verdict
+_LEAST_RECORDINGS = 3  # FRFs: of two, d33 absorbs what is common, and the scatter of gain the difference
 _UNUSUAL_SCATTER = 2.0  # times the gain scatter of a poor rig
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
@@ -65,129 +65,131 @@ def diagnose(
     limits: RigLimits = NO_LIMITS,
     without: Collection[str] = (),
 ) -> DiagnosisResult:
-    """What recordings and model disagree about, and what physics was left out.
+    """Where recordings and model disagree, and which physics the model lacks.
 
-    FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. What the
-    other kinds tell of the same material counts with them (selection/search.py). From a campaign that holds
-    nothing usable nothing is concluded. Deterministic, but for a campaign that states times to come
-    (`recordings/plausibility.py`). Mechanisms `without` which it is to be explained are left out of the catalogue.
+    FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. The other
+    kinds count as further data on the same material (selection/search.py). Without usable recordings there is no
+    verdict. Deterministic, except for a campaign that states future times (`recordings/plausibility.py`). The
+    mechanisms `without` are left out of the catalogue.
 
-    Raises InvalidInput where one of those is not in it.
+    Raises InvalidInput where one of those is not in the catalogue.
     """
-    diagnosis = _diagnosed(prepared(campaign).campaign, table, progress, limits, ActiveCatalogue(without))
+    diagnosis = _diagnose(prepared(campaign).campaign, table, progress, limits, ActiveCatalogue(without))
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
-def _diagnosed(
+def _diagnose(
     campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits, mechanisms: ActiveCatalogue
 ) -> DiagnosisResult:
     progress(0.05)
-    possible = without_extremes(campaign)
+    within_limits = without_extremes(campaign)
     declared = campaign.skin.d33_pc_per_n
-    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table, mechanisms), declared)
-    if possible.findings and possible.lacking:
-        return replace(begun, lacking=possible.lacking)
-    campaign = possible.campaign
-    kinds = [kind for kind in _KINDS if any(entry.kind == kind for entry in campaign.recordings)]
+    partial = DiagnosisResult(campaign.name, within_limits.findings, _provenance(table, mechanisms), declared)
+    if within_limits.findings and within_limits.lacking:
+        return replace(partial, lacking=within_limits.lacking)
+    campaign = within_limits.campaign
+    kinds = [kind for kind in _KINDS if any(recording.kind == kind for recording in campaign.recordings)]
     curves: dict[Kind, Campaign] = {}
     for kind in kinds:
         if kind == "frf":
             continue
         usable, unusable = without_unusable(campaign, kind)
         consistent = without_inconsistent(usable, kind)
-        begun = begun.with_findings(*unusable, *consistent.findings)
+        partial = partial.with_findings(*unusable, *consistent.findings)
         if (unusable or consistent.findings) and consistent.lacking and kind == kinds[0]:
-            return replace(begun, lacking=consistent.lacking)
+            return replace(partial, lacking=consistent.lacking)
         if curve_lines(consistent.campaign, kind).recordings:
             curves[kind] = consistent.campaign
     if kinds and "frf" not in kinds and not curves:
-        return replace(begun, lacking=Lacking(Lack.NO_CURVE))
+        return replace(partial, lacking=Lacking(Lack.NO_CURVE))
     if "frf" in kinds or not curves:
-        return _of_frf(
-            begun, campaign, table, mechanisms, OtherKinds(curves, table, mechanisms.without), progress, limits
+        return _diagnose_frf(
+            partial, campaign, table, mechanisms, OtherKinds(curves, table, mechanisms.without), progress, limits
         )
     kind = next(iter(curves))
-    others = OtherKinds({other: own for other, own in curves.items() if other != kind}, table, mechanisms.without)
-    return _of_curves(begun, curves[kind], kind, table, mechanisms, others, progress, limits)
+    other_kinds = OtherKinds(
+        {other: curves_of_kind for other, curves_of_kind in curves.items() if other != kind}, table, mechanisms.without
+    )
+    return _diagnose_curves(partial, curves[kind], kind, table, mechanisms, other_kinds, progress, limits)
 
 
-def _of_frf(
-    begun: DiagnosisResult,
+def _diagnose_frf(
+    partial: DiagnosisResult,
     campaign: Campaign,
     table: SigmaTable,
     mechanisms: ActiveCatalogue,
-    others: OtherKinds,
+    other_kinds: OtherKinds,
     progress: Progress,
     limits: RigLimits,
 ) -> DiagnosisResult:
-    frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
-    inspected = inspect(replace(campaign, recordings=frf), table)
+    frf = tuple(recording for recording in campaign.recordings if isinstance(recording, FrfRecording))
+    inspection = inspect(replace(campaign, recordings=frf), table)
     joined: KindsTogether | None = None
-    while not inspected.lacking:
-        joined = _searched(inspected, table, mechanisms, others)
-        if not inspected.beyond:
+    while not inspection.lacking:
+        joined = _search_frf(inspection, table, mechanisms, other_kinds)
+        if not inspection.beyond:
             break
-        kept = inspected.beyond & inside_tables_under_posterior(joined.problem, joined.search)
-        if kept == inspected.beyond:
+        beyond = inspection.beyond & inside_tables_under_posterior(joined.problem, joined.search)
+        if beyond == inspection.beyond:
             break
-        inspected = inspect(replace(campaign, recordings=frf), table, kept)
-    begun = replace(begun.with_findings(*inspected.findings), level_unsure=inspected.unsure)
-    if joined is None or inspected.lacking:
-        return replace(begun, lacking=inspected.lacking)
+        inspection = inspect(replace(campaign, recordings=frf), table, beyond)
+    partial = replace(partial.with_findings(*inspection.findings), level_unsure=inspection.unsure)
+    if joined is None or inspection.lacking:
+        return replace(partial, lacking=inspection.lacking)
     problem, result = joined.problem, joined.search
     result = replace(result, laws=tuple(with_laws(problem, result)))
-    return _work_out(replace(begun, joined=joined), problem, result, progress, limits)
+    return _complete(replace(partial, joined=joined), problem, result, progress, limits)
 
 
-def _searched(
-    inspected: Inspected, table: SigmaTable, mechanisms: ActiveCatalogue, others: OtherKinds
+def _search_frf(
+    inspection: Inspected, table: SigmaTable, mechanisms: ActiveCatalogue, other_kinds: OtherKinds
 ) -> KindsTogether:
-    """The search on FRFs, with what other kinds tell."""
-    alone = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
+    """The search on FRFs, together with other kinds."""
+    problem_alone = frf_problem(inspection.campaign, inspection.uneven, table, mechanisms)
 
-    def fitted(
-        beside: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
+    def fit(
+        curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
     ) -> tuple[FittingProblem, Search]:
-        """Beside other kinds under the same noise, so that evidences can be compared."""
-        if beside is None:
-            return alone, search(alone)
-        problem = FittingProblem(alone.lines, table, beside)
+        """With other kinds under the same noise, so that evidences can be compared."""
+        if curve_likelihood is None:
+            return problem_alone, search(problem_alone)
+        problem = FittingProblem(problem_alone.lines, table, curve_likelihood)
         return problem, search(problem, required_sets=required_sets)
 
-    return others.joined(fitted)
+    return other_kinds.joined(fit)
 
 
-def _of_curves(
-    begun: DiagnosisResult,
+def _diagnose_curves(
+    partial: DiagnosisResult,
     campaign: Campaign,
     kind: Kind,
     table: SigmaTable,
     mechanisms: ActiveCatalogue,
-    others: OtherKinds,
+    other_kinds: OtherKinds,
     progress: Progress,
     limits: RigLimits,
 ) -> DiagnosisResult:
     mechanisms.bind(campaign, table, kind)
     rows = replace(curve_lines(campaign, kind), mechanisms=mechanisms)
 
-    def fitted(
-        beside: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
+    def fit(
+        curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
     ) -> tuple[FittingProblem, Search]:
-        problem = FittingProblem(rows, table, beside)
+        problem = FittingProblem(rows, table, curve_likelihood)
         return problem, search(problem, required_sets=required_sets)
 
-    joined = others.joined(fitted)
+    joined = other_kinds.joined(fit)
     problem, result = joined.problem, joined.search
-    seated = without_seating(campaign, result.answers[0].names, table) if kind == "compression" else None
-    if seated is not None:
-        problem, seating = seated
-        begun, result = begun.with_findings(seating), search(problem)
+    unseated = without_seating(campaign, result.answers[0].names, table) if kind == "compression" else None
+    if unseated is not None:
+        problem, seating_finding = unseated
+        partial, result = partial.with_findings(seating_finding), search(problem)
     result = replace(result, laws=tuple(with_laws(problem, result)))
-    return _work_out(replace(begun, curves=campaign, joined=joined), problem, result, progress, limits)
+    return _complete(replace(partial, curves=campaign, joined=joined), problem, result, progress, limits)
 
 
-def _work_out(
-    begun: DiagnosisResult, problem: FittingProblem, result: Search, progress: Progress, limits: RigLimits
+def _complete(
+    partial: DiagnosisResult, problem: FittingProblem, result: Search, progress: Progress, limits: RigLimits
 ) -> DiagnosisResult:
     """All steps after the search."""
     progress(0.65)
@@ -195,90 +197,92 @@ def _work_out(
     confounded = confounding(signatures)
     progress(0.7)
     leader = result.answers[0]
-    nothing = next(entry for entry in result.explanations if not entry.names)
-    shown = result.fit_behind(leader)
-    axes, ranges, size = _located(problem, nothing, shown.best.levels)
+    null = next(explanation for explanation in result.explanations if not explanation.names)
+    stated = result.fit_behind(leader)
+    axes, ranges, size = _locate(problem, null, stated.best.levels)
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
-    showing = [entry for entry in ranked if result.is_supported(entry)]
-    groups = held_out(problem, result, showing, nothing)
+    supported = [explanation for explanation in ranked if result.is_supported(explanation)]
+    groups = held_out(problem, result, supported, null)
     progress(0.95)
-    result = replace(result, other_tip=_other_tips(begun, problem))
+    result = replace(result, other_tip=_other_tip_share(partial, problem))
     leader = result.answers[0]
-    shown = result.fit_behind(leader)
-    floor = largest_floor_percent(problem, nothing, groups)
-    if leader.explanation is nothing and floor > _LARGEST_FLOOR:
-        return replace(begun, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
-    if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
-        few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
-        return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few), few=result, problem=problem)
+    stated = result.fit_behind(leader)
+    floor = largest_floor_percent(problem, null, groups)
+    if leader.explanation is null and floor > _LARGEST_FLOOR:
+        return replace(partial, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
+    if leader.explanation is null and problem.kind == "frf" and problem.lines.recordings < _LEAST_RECORDINGS:
+        few = {"recordings": problem.lines.recordings, "least": _LEAST_RECORDINGS}
+        return replace(partial, lacking=Lacking(Lack.FEW_TO_AGREE, few), few=result, problem=problem)
     undescribed = leader.explanation is None and result.law is None
-    begun = begun.with_findings(*_scatter(problem, shown))
-    shape = describe(problem, shown) if undescribed else None
-    begun = begun.with_findings(*(of_nearest_law(problem, result, nothing) if undescribed else ()))
+    partial = partial.with_findings(*_scatter_findings(problem, stated))
+    shape = describe(problem, stated) if undescribed else None
+    partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
     return replace(
-        begun.with_findings(*above_noise(problem, shown, groups)),
+        partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,
         problem=problem,
         axes=axes,
         region=ranges,
         effect=size,
         groups=groups,
-        confounded=left_open(confounded, result.answers),
-        power=power(signatures, shown, result.supported),
-        shifts=hidden_shifts(problem, signatures, shown, result.supported, telling_modulus(begun.joined, shown.names)),
+        confounded=remaining_confounding(confounded, result.answers),
+        power=power(signatures, stated, result.supported),
+        shifts=hidden_shifts(
+            problem, signatures, stated, result.supported, telling_modulus(partial.joined, stated.names)
+        ),
         shape=shape,
         plan=plan(problem, result, limits),
     )
 
 
-def _located(
-    problem: FittingProblem, nothing: Explanation, levels: NoiseLevels
+def _locate(
+    problem: FittingProblem, null: Explanation, levels: NoiseLevels
 ) -> tuple[list[AxisResult], dict[str, list[float | str]], EffectSize]:
-    """Where the recordings depart from the base model, and by how much there; `levels` are those of the answer."""
+    """Where the recordings deviate from the base model, and by how much there; `levels` are those of the answer."""
     gain = float(np.clip(levels.gain, 0.005, 0.05))
-    against_base = residuals(problem, nothing, gain, levels.position)
+    against_base = residuals(problem, null, gain, levels.position)
     axes = locate(problem.lines, against_base)
     ranges = region(problem.lines, against_base, axes)
-    prediction = row_prediction(problem, nothing)
+    prediction = row_prediction(problem, null)
     return axes, ranges, effect(problem.lines, prediction, in_region(problem.lines, ranges), gain, levels.level)
 
 
-def _scatter(problem: FittingProblem, shown: Explanation) -> list[Finding]:
-    """Of FRFs: a gain that scatters from recording to recording by far more than that of rigs."""
-    gain, usual = shown.best.levels.gain, GAIN_RANGE[1]
+def _scatter_findings(problem: FittingProblem, stated: Explanation) -> list[Finding]:
+    """Of FRFs: a gain that scatters between recordings by far more than that of usual rigs."""
+    gain, usual = stated.best.levels.gain, GAIN_RANGE[1]
     if problem.kind != "frf" or gain <= _UNUSUAL_SCATTER * usual:
         return []
     return [Finding(Reason.UNUSUAL_SCATTER, "", "frf", {"percent": 100 * gain, "usual": 100 * usual})]
 
 
-def _other_tips(begun: DiagnosisResult, problem: FittingProblem) -> float:
-    """The share of curves whose tip looks like a cone, which no mechanism lists."""
-    tips = {finding.recording for finding in begun.findings if finding.reason is Reason.TIP_SHAPE}
+def _other_tip_share(partial: DiagnosisResult, problem: FittingProblem) -> float:
+    """The share of curves whose tip looks like a cone, for which there is no mechanism."""
+    tips = {finding.recording for finding in partial.findings if finding.reason is Reason.TIP_SHAPE}
     return min(len(tips) / problem.lines.recordings, 1.0)
 
 
 def refused(problems: Sequence[RecordingProblem]) -> list[Finding]:
-    """Recordings that were refused when they were read, as findings."""
+    """Recordings that were refused on reading, as findings."""
     return [
         Finding(
             Reason.REFUSED,
-            entry.recording,
-            entry.field,
-            {"field": entry.field, "value": entry.value, "allowed": entry.allowed},
+            problem.recording,
+            problem.field,
+            {"field": problem.field, "value": problem.value, "allowed": problem.allowed},
         )
-        for entry in problems
+        for problem in problems
     ]
 
 
 def with_refused(diagnosis: DiagnosisResult, problems: Sequence[RecordingProblem]) -> DiagnosisResult:
-    """The diagnosis with recordings that were refused when they were read named first among its findings."""
+    """The diagnosis with recordings that were refused on reading first among its findings."""
     lacking = diagnosis.lacking
     if lacking and problems:
         lacking = replace(
             lacking,
-            refused_recordings=len({entry.recording for entry in problems}),
-            refused_fields=tuple(dict.fromkeys(entry.field for entry in problems)),
+            refused_recordings=len({problem.recording for problem in problems}),
+            refused_fields=tuple(dict.fromkeys(problem.field for problem in problems)),
         )
     return replace(diagnosis, findings=(*refused(problems), *diagnosis.findings), lacking=lacking)
 

@@ -21,7 +21,7 @@ from underskin.diagnosis.reporting.numbers import (
     with_hidden,
 )
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.other_kinds import OfCurves, hidden_factors, may_hide
+from underskin.diagnosis.selection.other_kinds import CurvePosterior, hidden_factors, may_hide
 from underskin.diagnosis.selection.search import KindsTogether
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.cross_validation import NOISY
@@ -264,7 +264,9 @@ def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any
         return []
     rows = []
     for kind in joined.beside.kinds:
-        curves = joined.beside.told_alone(kind) if joined.apart_is_likelier else joined.beside.told(kind, leading)
+        curves = (
+            joined.beside.posterior_alone(kind) if joined.apart_is_likelier else joined.beside.posterior(kind, leading)
+        )
         explanation = curves.best
         parameters = [
             _of_elastomer(parameter_with_interval(explanation, parameter_index(explanation, "youngs_modulus")), curves)
@@ -276,7 +278,7 @@ def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any
     return rows if first_modulus is None else [first_modulus, *rows]
 
 
-def _of_elastomer(modulus: Mapping[str, Any], curves: OfCurves) -> dict[str, Any]:
+def _of_elastomer(modulus: Mapping[str, Any], curves: CurvePosterior) -> dict[str, Any]:
     """With an interval that allows for hidden mechanisms, and for a difference between block and skin."""
     return with_hidden(modulus, curves.hidden, curves.tolerance)
 
@@ -333,10 +335,10 @@ def mechanisms_of_curves(joined: KindsTogether, names: Sequence[str], leading: S
     rows = []
     for kind in () if joined.beside is None else joined.beside.kinds:
         assert joined.beside is not None
-        curves = joined.beside.told(kind, leading)
+        curves = joined.beside.posterior(kind, leading)
         rows += [
-            _of_mechanism(name, explanation, curves.each[0][0])
-            for explanation, _ in curves.each
+            _of_mechanism(name, explanation, curves.fits[0][0])
+            for explanation, _ in curves.fits
             for name in names
             if name in explanation.names
         ]

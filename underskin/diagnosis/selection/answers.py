@@ -165,7 +165,7 @@ class Search:
             return [answer]
         return [
             Answer(answer.explanation, answer.probability * share, names)
-            for names, share in self.other_kinds.alone(answer.explanation.names)
+            for names, share in self.other_kinds.curve_only_sets(answer.explanation.names)
             if share > _NEGLIGIBLE
         ]
 

@@ -1,21 +1,14 @@
-"""What the other kinds of recordings of a campaign say of one kind's parameters.
+"""Posteriors of the parameters that recordings of several kinds share, as likelihoods for the kind that is diagnosed.
 
-A layer whose thickness indentations tell for themselves, beside recordings that may tell of another than declared.
+Curves of a block or of the skin and FRFs are of one material: one modulus, one adhesion, one law. By Bayes' rule the
+evidence of a set of mechanisms on all recordings is that of the curves times that of the FRFs under what the curves
+leave of the shared parameters. Laplace's approximation of the curves' posterior, divided by the prior, is the
+likelihood under which the FRFs are fitted (hypothesis.py).
 
-The thickness may be declared wrongly, which FRFs tell (`thickness_error`). What indentations that feel the base tell of
-it must then be known, and may not stand in their modulus.
-
-What curves of one kind, beside recordings of another, tell of the elastomer that is common to both.
-
-The curves are searched with the modulus free, as if they were alone; each subset of the mechanisms that act on both
-kinds then leaves something to be known. Mechanisms of the curves alone (a stage that gives) are summed over; so are
-those that an apparent modulus may hide whatever the curves look like (friction at the platens).
-
-What curves of a block, or of the skin, tell of the skin's FRFs: one material, so one modulus, one adhesion, one law.
-
-By Bayes' rule the evidence of a set of mechanisms on all recordings is that of the curves, times that of the FRFs under
-what the curves leave of the parameters that both have. Laplace's approximation of the curves' posterior,
-divided by the prior, is the likelihood (hypothesis.py) that the FRFs are fitted under.
+The curves are searched with the modulus free. Each subset of the mechanisms that act on both kinds has a posterior;
+mechanisms of the curves alone (compliance of a stage) are summed over, and so are those that an apparent modulus may
+hide whatever the curves look like (friction at the platens). The thickness of indented layers is free too: it may be
+declared wrongly, which FRFs tell (`thickness_error`), and must not be absorbed by the modulus.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -60,72 +53,76 @@ class LayerOfUnknownThickness(LayeredContact):
         return False
 
     def on_curve(self, curve: Curve, values: Values) -> None:
-        """Press the layer of that thickness."""
+        """Contact with a layer of that thickness."""
         super().on_curve(curve, values)
         if curve.thickness is not None:
             curve.thickness = curve.thickness * values[UNKNOWN_THICKNESS.name]
 
 
-_BATCH = 0.02  # by how much the modulus of one elastomer differs from piece to piece (sd of its logarithm)
-_EXTRAPOLATED = 0.15  # of what a law takes off a modulus at no strain: laws of one fit differ by that
-_RATIO = 0.9  # correlation of quantities that are known as a ratio alone
-_HIDES = 0.5  # prior of what does not show: platens are oiled as often as they are not
+_BETWEEN_SPECIMENS = 0.02  # sd of the logarithm of the modulus from piece to piece of one elastomer
+_EXTRAPOLATION = 0.15  # of the reduction of a modulus extrapolated to no strain: differs so between laws of one fit
+_RATIO = 0.9  # correlation from which on only the ratio of two quantities is known
+_HIDDEN_PRIOR = 0.5  # prior of a mechanism that cannot show: platens are oiled as often as they are not
 MODULUS_ERROR, MODULUS = "modulus_error", ("", "youngs_modulus")
 
-Quantity = tuple[str, str]  # a mechanism, or none, and what is known of it
+Quantity = tuple[str, str]  # a mechanism, or "", and the name of its parameter
 
 
 @dataclass(frozen=True, eq=False)
-class OfCurves:
-    """What one subset of the mechanisms that act on both kinds leaves to be known.
+class CurvePosterior:
+    """The posterior of the shared quantities under one subset of the mechanisms that act on both kinds.
 
-    `each` set of mechanisms that holds it and none else but the curves' own, with its log prior times evidence, that
-    without these first; `mean` (quantities,) and `covariance` of the `quantities` over all of them; `tolerance` is the
-    standard deviation by which the logarithm of the modulus may differ from the skin's; `hidden` are by how much the
-    logarithm of the apparent modulus may be too large by mechanisms that do not show, with their probabilities.
+    `fits`: the sets of mechanisms that add to the subset only mechanisms of the curves alone, each with its log of
+    prior times evidence, the subset itself first; `mean` (quantities,) and `covariance` of the `quantities` over all of
+    them; `tolerance`: standard deviation of the logarithm of the modulus against the skin's; `hidden`: by how much the
+    logarithm of the apparent modulus may be too large through mechanisms that do not show, with probabilities.
     """
 
-    each: tuple[tuple[Explanation, float], ...]
+    fits: tuple[tuple[Explanation, float], ...]
     quantities: tuple[Quantity, ...]
     mean: Floats
     covariance: Floats
-    tolerance: float = _BATCH
+    tolerance: float = _BETWEEN_SPECIMENS
     hidden: tuple[tuple[float, float], ...] = ((0.0, 1.0),)
 
     @property
     def best(self) -> Explanation:
-        """The most probable set's fit."""
-        return max(self.each, key=lambda entry: entry[1])[0]
+        """The fit of the most probable set."""
+        return max(self.fits, key=lambda fit: fit[1])[0]
 
     @property
     def modulus_deviation(self) -> float:
         """Standard deviation of the logarithm of the skin's modulus."""
         return float(np.hypot(np.sqrt(self.covariance[0, 0]), self.tolerance))
 
-    def is_ratio(self, row: int) -> bool:
-        """Whether a quantity is known as a ratio to another one of its mechanism alone."""
-        mechanism = self.quantities[row][0]
+    def is_ratio(self, index: int) -> bool:
+        """Whether only the ratio of a quantity to another one of its mechanism is known."""
+        mechanism = self.quantities[index][0]
         deviation = np.sqrt(np.diag(self.covariance))
-        alike = np.abs(self.covariance[row]) > _RATIO * deviation[row] * deviation
-        return any(alike[other] and one[0] == mechanism for other, one in enumerate(self.quantities) if other != row)
+        correlated = np.abs(self.covariance[index]) > _RATIO * deviation[index] * deviation
+        return any(
+            correlated[other] and quantity[0] == mechanism
+            for other, quantity in enumerate(self.quantities)
+            if other != index
+        )
 
     @property
     def log_weight(self) -> float:
-        """The logarithm of the sum over the curves' own mechanisms."""
-        return float(np.logaddexp.reduce([weight for _, weight in self.each]))
+        """Log of prior times evidence, summed over the mechanisms of the curves alone."""
+        return float(np.logaddexp.reduce([weight for _, weight in self.fits]))
 
 
 class OtherKind:
     """The curves of one kind in a campaign that is diagnosed by recordings of another."""
 
     def __init__(self, kind: Kind, problem: FittingProblem, explanations: Sequence[Explanation]) -> None:
-        """Curves with the modulus free (`of_curves`), and the sets of mechanisms that were found to explain them."""
+        """Curves with the modulus free (`free_modulus_problem`), and the explanations that a search found for them."""
         self.kind, self.problem = kind, problem
-        self._explanations = {frozenset(entry.names): entry for entry in explanations}
+        self._explanations = {frozenset(explanation.names): explanation for explanation in explanations}
         mechanisms, conditions = problem.lines.mechanisms, problem.lines.campaign
         self.supported = tuple(name for name in mechanisms.named if self._supports(name))
         self._may_hide = may_hide(mechanisms, conditions, self.supported)
-        self.found: dict[frozenset[str], OfCurves] = {}
+        self.posteriors: dict[frozenset[str], CurvePosterior] = {}
 
     def _supports(self, name: str) -> bool:
         try:
@@ -134,80 +131,93 @@ class OtherKind:
             return False
         return True
 
-    def told(self, names: Collection[str], of_both: Sequence[str]) -> OfCurves:
-        """Under a set of mechanisms of those that act on both kinds; the curves' own ones may be there beside."""
-        key = frozenset(name for name in names if name in self.supported and name in of_both)
-        if key not in self.found:
-            self.found[key] = self._tolerant(self._fitted(key, of_both), key, of_both)
-        return self.found[key]
+    def posterior(self, names: Collection[str], shared: Sequence[str]) -> CurvePosterior:
+        """Under a set of the mechanisms `shared` by both kinds, summed over those of the curves alone."""
+        key = frozenset(name for name in names if name in self.supported and name in shared)
+        if key not in self.posteriors:
+            self.posteriors[key] = self._with_extrapolation_tolerance(self._posterior_of(key, shared), key, shared)
+        return self.posteriors[key]
 
-    def tell_all(self, of_both: Sequence[str]) -> None:
-        """Under every set that was found, so that `found` holds them."""
+    def fit_all(self, shared: Sequence[str]) -> None:
+        """Fill `posteriors` for every set that was searched."""
         for names in tuple(self._explanations):
-            self.told(names, of_both)
+            self.posterior(names, shared)
 
-    def _tolerant(self, told: OfCurves, names: frozenset[str], of_both: Sequence[str]) -> OfCurves:
-        """Where a law extrapolates the modulus to no strain: as unsure as a good part of what it takes off."""
+    def _with_extrapolation_tolerance(
+        self, posterior: CurvePosterior, names: frozenset[str], shared: Sequence[str]
+    ) -> CurvePosterior:
+        """Widened where a law extrapolates the modulus to no strain, by a part of how much the law reduces it."""
         plain = [name for name in names if not self.problem.lines.mechanisms[name].extrapolates_modulus]
         if len(plain) == len(names):
-            return told
-        taken_off = float(told.mean[0] - self.told(plain, of_both).mean[0])  # what hides is in both
-        return replace(told, tolerance=float(np.hypot(_BATCH, _EXTRAPOLATED * taken_off)))
+            return posterior
+        reduction = float(posterior.mean[0] - self.posterior(plain, shared).mean[0])  # hidden mechanisms cancel
+        return replace(posterior, tolerance=float(np.hypot(_BETWEEN_SPECIMENS, _EXTRAPOLATION * reduction)))
 
-    def _fitted(self, both: frozenset[str], of_both: Sequence[str]) -> OfCurves:
-        alone = {name for name in self.supported if name not in of_both and name not in self._may_hide}
-        without = self._explained(both)
-        shown = without.log_evidence + least_evidence(without)
-        beside = [
-            entry
-            for names, entry in self._explanations.items()
-            if names > both and names - both <= alone and entry.log_evidence > shown
+    def _posterior_of(self, names: frozenset[str], shared: Sequence[str]) -> CurvePosterior:
+        curve_only = {name for name in self.supported if name not in shared and name not in self._may_hide}
+        smallest = self._explanation(names)
+        least = smallest.log_evidence + least_evidence(smallest)
+        larger_fits = [
+            explanation
+            for larger, explanation in self._explanations.items()
+            if larger > names and larger - names <= curve_only and explanation.log_evidence > least
         ]
-        each = tuple(
-            (entry, entry.log_evidence + log_prior(len(entry.names) - len(both), len(alone)))
-            for entry in (without, *beside)
+        fits = tuple(
+            (explanation, explanation.log_evidence + log_prior(len(explanation.names) - len(names), len(curve_only)))
+            for explanation in (smallest, *larger_fits)
         )
-        quantities, mean, covariance = _mixture(each, both)
-        hidden = hidden_factors(self._may_hide, both)
+        quantities, mean, covariance = _mixture(fits, names)
+        hidden = hidden_factors(self._may_hide, names)
         values, shares = np.array(hidden).T
         mean[0] -= shares @ values
         covariance[0, 0] += shares @ values**2 - (shares @ values) ** 2
-        return OfCurves(each, quantities, mean, covariance, hidden=hidden)
+        return CurvePosterior(fits, quantities, mean, covariance, hidden=hidden)
 
-    def _explained(self, names: frozenset[str]) -> Explanation:
+    def _explanation(self, names: frozenset[str]) -> Explanation:
         if names not in self._explanations:
             ordered = tuple(name for name in self.supported if name in names)
             smaller = [self._explanations.get(names - {name}) for name in ordered]
-            parent = max((one for one in smaller if one), key=lambda one: one.log_evidence, default=None)
-            begin = self._explanations[frozenset()].point
-            requests = [Request(ordered, begin=begin, kept=True), Request(ordered, parent, kept=True)]
-            found = self.problem.explain(requests if parent else requests[:1])
-            explanation = max((one for one in found if one), key=lambda one: one.log_evidence)
-            self._explanations[names] = explanation
+            parent = max(
+                (explanation for explanation in smaller if explanation),
+                key=lambda explanation: explanation.log_evidence,
+                default=None,
+            )
+            start = self._explanations[frozenset()].point
+            requests = [Request(ordered, begin=start, kept=True), Request(ordered, parent, kept=True)]
+            fits = self.problem.explain(requests if parent else requests[:1])
+            best = max(
+                (explanation for explanation in fits if explanation), key=lambda explanation: explanation.log_evidence
+            )
+            self._explanations[names] = best
         return self._explanations[names]
 
 
 def may_hide(
     mechanisms: ActiveCatalogue, conditions: Conditions, names: Iterable[str]
 ) -> Mapping[str, Sequence[float]]:
-    """Mechanisms that an apparent modulus may hide, with the logarithms of by how much it may be too large."""
+    """Mechanisms that an apparent modulus may hide, with logarithms of the factor by which it may be too large."""
     hidden = {name: mechanisms[name].hidden_in_modulus(conditions) for name in names}
     return {name: values for name, values in hidden.items() if values}
 
 
 def hidden_factors(hiding: Mapping[str, Sequence[float]], shown: Collection[str]) -> tuple[tuple[float, float], ...]:
-    """By how much the logarithm of an apparent modulus may be too large by mechanisms of `hiding` that are not among
-    those `shown`, with probabilities."""
+    """Logarithms of the factor by which an apparent modulus may be too large, with probabilities.
+
+    Over the mechanisms of `hiding` that are not among those `shown`.
+    """
     hidden = [(0.0, 1.0)]
     for values in (values for name, values in hiding.items() if name not in shown):
-        each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
-        hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
+        options = [(0.0, 1 - _HIDDEN_PRIOR), *((value, _HIDDEN_PRIOR / len(values)) for value in values)]
+        hidden = [
+            (log_factor + option, weight * option_weight)
+            for log_factor, weight in hidden
+            for option, option_weight in options
+        ]
     return tuple(hidden)
 
 
-def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
-    """The curves of one kind of a campaign, its modulus free and, of a layer, its thickness; mechanisms `without` which
-    all is to be explained."""
+def free_modulus_problem(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
+    """The curves of one kind with the modulus free, and of a layer the thickness; `without` some mechanisms."""
     mechanisms = ActiveCatalogue({MODULUS_ERROR, *without})
     free = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=None))
     mechanisms.bind(free, table, kind)
@@ -216,41 +226,49 @@ def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequen
 
 
 def _mixture(
-    each: Sequence[tuple[Explanation, float]], both: frozenset[str]
+    fits: Sequence[tuple[Explanation, float]], shared: frozenset[str]
 ) -> tuple[tuple[Quantity, ...], Floats, Floats]:
-    """Mean and covariance of what both kinds know, over sets with their log weights."""
-    weights = np.array([weight for _, weight in each])
+    """Shared quantities, their mean and covariance over sets with their log weights."""
+    weights = np.array([weight for _, weight in fits])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
-    posteriors = [_posterior(entry, both) for entry, _ in each]
-    return posteriors[0][0], *moments(shares, [mean for _, mean, _ in posteriors], [one for _, _, one in posteriors])
+    posteriors = [_posterior(explanation, shared) for explanation, _ in fits]
+    return posteriors[0][0], *moments(
+        shares, [mean for _, mean, _ in posteriors], [covariance for _, _, covariance in posteriors]
+    )
 
 
-def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Quantity, ...], Floats, Floats]:
-    """Mean and covariance of what both kinds know: the modulus' logarithm, the parameters of mechanisms."""
+def _posterior(explanation: Explanation, shared: frozenset[str]) -> tuple[tuple[Quantity, ...], Floats, Floats]:
+    """Shared quantities (logarithm of the modulus, parameters of mechanisms), their mean and covariance."""
     modulus = [entry.name for entry in explanation.model.parameters].index("youngs_modulus")
-    each = parts(explanation.best, modulus)
-    known = [_quantities(explanation, part.fit, both, modulus) for part in each]
+    components = parts(explanation.best, modulus)
+    expansions = [_quantities(explanation, part.fit, shared, modulus) for part in components]
     mean_indices = explanation.best.hypothesis.mean_indices
-    slopes = [rows[:, mean_indices] for _, _, rows in known]
-    covariances = [one @ part.covariance @ one.T for one, part in zip(slopes, each, strict=True)]
-    return known[0][0], *moments(np.array([part.share for part in each]), [mean for _, mean, _ in known], covariances)
+    slopes = [rows[:, mean_indices] for _, _, rows in expansions]
+    covariances = [jacobian @ part.covariance @ jacobian.T for jacobian, part in zip(slopes, components, strict=True)]
+    return expansions[0][0], *moments(
+        np.array([part.share for part in components]), [mean for _, mean, _ in expansions], covariances
+    )
 
 
 def _quantities(
-    explanation: Explanation, fit: Floats, both: frozenset[str], modulus: int
+    explanation: Explanation, fit: Floats, shared: frozenset[str], modulus: int
 ) -> tuple[tuple[Quantity, ...], Floats, Floats]:
-    """What both kinds know, its values at a point and their slopes over the fit coordinates (quantities, parameters);
-    the place of the modulus is given."""
+    """Shared quantities, their values at a point and slopes over the fit coordinates (quantities, parameters).
+
+    `modulus` is the index of the modulus among the parameters.
+    """
     parameters, lines = explanation.model.parameters, explanation.best.hypothesis.lines
     quantities: list[Quantity] = [MODULUS]
     values = [fit[modulus] + np.log(to_si("youngs_modulus_mpa", 1.0))]
     rows = [np.eye(len(fit))[modulus]]
-    for name, place in parameter_slices(explanation.names, lines).items():
-        if name not in both:
+    for name, span in parameter_slices(explanation.names, lines).items():
+        if name not in shared:
             continue
         seeds = {
-            entry.name: Differentiated(np.array([entry.from_fit(fit[index])]), _unit(entry, fit, index, len(fit)))
-            for index, entry in zip(range(place.start, place.stop), parameters[place], strict=True)
+            parameter.name: Differentiated(
+                np.array([parameter.from_fit(fit[index])]), _unit_slope(parameter, fit, index, len(fit))
+            )
+            for index, parameter in zip(range(span.start, span.stop), parameters[span], strict=True)
         }
         for key, quantity in lines.mechanisms[name].shared_parameters(lines.kind, seeds).items():
             quantities.append((name, key))
@@ -259,207 +277,249 @@ def _quantities(
     return tuple(quantities), np.array(values), np.array(rows)
 
 
-def _unit(entry: Parameter, fit: Floats, index: int, count: int) -> Floats:
+def _unit_slope(parameter: Parameter, fit: Floats, index: int, count: int) -> Floats:
     slopes = np.zeros((count, 1))
-    slopes[index] = entry.from_fit(fit[index]) if entry.scale == "log" else 1.0
+    slopes[index] = parameter.from_fit(fit[index]) if parameter.scale == "log" else 1.0
     return slopes
 
 
-_INFORMED = 0.8  # of a prior's deviation, above which a posterior's says nothing
-_ASKED_FOR, _BEHIND = 3, 12.0  # sets of a kind of curves, and how far behind the best one in nats
-_MODULUS_SD = 1.5  # of the logarithm of a modulus that nobody declared
+_INFORMATIVE = 0.8  # of a prior's standard deviation: a posterior that is wider is not informative
+_MOST_SETS, _EVIDENCE_MARGIN = 3, 12.0  # sets of a kind of curves, and how far behind the best one [nats]
+_MODULUS_SD = 1.5  # of the logarithm of a modulus that is not declared
 _LEAST_CORRELATION = 1e-11  # eigenvalue of correlations: less is rounding
 
-# Of a prior as a normal one: mean, variance, whether it is flat (then the variance is that of one as high), and by how
-# much the logarithm of its density at the curves' mean exceeds that normal one's
+# A prior as a normal one: mean, variance, whether it is flat (then the variance is that of a normal one of the same
+# height), and by how much its log density at the curves' mean exceeds that of the normal one
 Moments = tuple[float, float, bool, float]
 
 
 class CurveLikelihood:
-    """What the curves of all other kinds tell of models of one kind."""
+    """The likelihood of the parameters of one kind's models, from the curves of all other kinds."""
 
-    def __init__(self, kinds: Sequence[OtherKind], alone: Sequence[Explanation]) -> None:
-        """Of at least one kind; `alone` are the sets that were fitted to the recordings without these."""
+    def __init__(self, kinds: Sequence[OtherKind], explanations: Sequence[Explanation]) -> None:
+        """Of at least one kind; `explanations` are fits to the diagnosed recordings without these kinds."""
         self.kinds = tuple(kinds)
-        self._alone = sorted(alone, key=lambda entry: -entry.log_evidence)
-        self._of_both: dict[Kind, tuple[str, ...]] = {}
+        self._explanations = sorted(explanations, key=lambda explanation: -explanation.log_evidence)
+        self._shared: dict[Kind, tuple[str, ...]] = {}
 
     def __call__(self, model: Model, lines: Lines) -> Gaussian:
-        """Of this model's parameters, in their fit coordinates."""
+        """In the fit coordinates of this model's parameters."""
         self._bind(lines)
-        each = [self._of_kind(kind, model, lines) for kind in self.kinds]
-        return sum(each[1:], each[0])
+        likelihoods = [self._kind_likelihood(kind, model, lines) for kind in self.kinds]
+        return sum(likelihoods[1:], likelihoods[0])
 
     def _bind(self, lines: Lines) -> None:
-        for kind in self.kinds if not self._of_both else ():
-            self._of_both[kind.kind] = tuple(name for name in kind.supported if _acts_on(name, lines))
-            kind.tell_all(self._of_both[kind.kind])
+        for kind in self.kinds if not self._shared else ():
+            self._shared[kind.kind] = tuple(name for name in kind.supported if _acts_on(name, lines))
+            kind.fit_all(self._shared[kind.kind])
 
-    def told(self, kind: OtherKind, names: Sequence[str]) -> OfCurves:
-        """What curves of a kind say under a set of mechanisms."""
-        return kind.told(names, self._of_both[kind.kind])
+    def posterior(self, kind: OtherKind, names: Sequence[str]) -> CurvePosterior:
+        """Of the curves of a kind under a set of mechanisms."""
+        return kind.posterior(names, self._shared[kind.kind])
 
-    def told_alone(self, kind: OtherKind) -> OfCurves:
-        """What curves of a kind say under the set that they alone find the most probable."""
-        return self.told(kind, tuple(self._most_probable(kind)[0]))
+    def posterior_alone(self, kind: OtherKind) -> CurvePosterior:
+        """Of the curves of a kind under the set that is the most probable by these curves alone."""
+        return self.posterior(kind, tuple(self._most_probable(kind)[0]))
 
-    def required_sets(self, lines: Lines, alone: Sequence[frozenset[str]]) -> list[frozenset[str]]:
-        """Sets by which recordings of both kinds may be explained: what the curves find the most probable and nothing,
-        each by itself or with an error of the modulus, and with the sets that explain the other recordings `alone`."""
+    def required_sets(self, lines: Lines, first_kind_sets: Sequence[frozenset[str]]) -> list[frozenset[str]]:
+        """Sets of mechanisms that are tried on all kinds together.
+
+        The most probable sets of the curves and the empty set, each alone and with the sets that explain the first
+        kind, without and with an error of the modulus.
+        """
         self._bind(lines)
-        nothing: frozenset[str] = frozenset()
+        empty: frozenset[str] = frozenset()
         errors = frozenset(name for name in (MODULUS_ERROR,) if _acts_on(name, lines))
-        found = dict.fromkeys([*(names for kind in self.kinds for names in self._most_probable(kind)), nothing])
-        each = [names | own | further for names in found for own in (nothing, *alone) for further in (nothing, errors)]
-        return [names for names in dict.fromkeys(each) if len(names) <= LARGEST]
+        curve_sets = dict.fromkeys([*(names for kind in self.kinds for names in self._most_probable(kind)), empty])
+        sets = [
+            names | first_kind_set | error
+            for names in curve_sets
+            for first_kind_set in (empty, *first_kind_sets)
+            for error in (empty, errors)
+        ]
+        return [names for names in dict.fromkeys(sets) if len(names) <= LARGEST]
 
     def _most_probable(self, kind: OtherKind) -> list[frozenset[str]]:
-        """The sets by the curves alone, as far as they count."""
-        both = len(self._of_both[kind.kind])
-        weights = {names: told.log_weight + log_prior(len(names), both) for names, told in kind.found.items()}
+        """The most probable sets by the curves alone, at most `_MOST_SETS`."""
+        supported = len(self._shared[kind.kind])
+        weights = {
+            names: posterior.log_weight + log_prior(len(names), supported)
+            for names, posterior in kind.posteriors.items()
+        }
         ranked = sorted(weights, key=lambda names: -weights[names])
-        return [names for names in ranked[:_ASKED_FOR] if weights[names] > weights[ranked[0]] - _BEHIND]
+        return [names for names in ranked[:_MOST_SETS] if weights[names] > weights[ranked[0]] - _EVIDENCE_MARGIN]
 
     def log_evidence_apart(self, kind: OtherKind, names: Sequence[str], supported: int) -> float:
-        """Of the curves of a kind with a material of their own, where recordings of another kind have a set of
-        mechanisms, of so many `supported`: those that the curves have besides cost what they would cost there."""
-        own = frozenset(names)
+        """Of the curves of a kind with a material of their own, where the first kind has a set of mechanisms.
+
+        Of `supported` mechanisms; those that only the curves need have the same prior as in the first kind's sets.
+        """
+        first_kind_set = frozenset(names)
         return float(
             np.logaddexp.reduce(
                 [
-                    told.log_weight + log_prior(len(own | both), supported) - log_prior(len(own), supported)
-                    for both, told in kind.found.items()
-                    if len(own | both) <= LARGEST
+                    posterior.log_weight
+                    + log_prior(len(first_kind_set | shared_set), supported)
+                    - log_prior(len(first_kind_set), supported)
+                    for shared_set, posterior in kind.posteriors.items()
+                    if len(first_kind_set | shared_set) <= LARGEST
                 ]
             )
         )
 
-    def alone(self, names: Sequence[str]) -> list[tuple[tuple[str, ...], float]]:
-        """The sets of the curves' own mechanisms beside those of an answer, with their probabilities."""
-        combined: list[tuple[tuple[str, ...], float]] = [((), 1.0)]
+    def curve_only_sets(self, names: Sequence[str]) -> list[tuple[tuple[str, ...], float]]:
+        """Sets of mechanisms of the curves that are not in an answer, with their probabilities."""
+        products: list[tuple[tuple[str, ...], float]] = [((), 1.0)]
         for kind in self.kinds:
-            told = self.told(kind, names)
-            own = [
-                (tuple(name for name in fit.names if name not in names), float(np.exp(weight - told.log_weight)))
-                for fit, weight in told.each
+            posterior = self.posterior(kind, names)
+            fits = [
+                (tuple(name for name in fit.names if name not in names), float(np.exp(weight - posterior.log_weight)))
+                for fit, weight in posterior.fits
             ]
-            combined = [((*one, *other), share * more) for one, share in combined for other, more in own]
-        return combined
+            products = [
+                ((*names_of_others, *curve_only), share * fit_share)
+                for names_of_others, share in products
+                for curve_only, fit_share in fits
+            ]
+        return products
 
-    def _of_kind(self, kind: OtherKind, model: Model, lines: Lines) -> Gaussian:
-        told = self.told(kind, model.names)
-        matrix, offset, priors = _in_model(told, model, lines, self._begun(model.names, lines))
-        return _likelihood(told, matrix, offset, priors)
+    def _kind_likelihood(self, kind: OtherKind, model: Model, lines: Lines) -> Gaussian:
+        posterior = self.posterior(kind, model.names)
+        matrix, offset, priors = _in_model(posterior, model, lines, self._initial_values(model.names, lines))
+        return _likelihood(posterior, matrix, offset, priors)
 
-    def _begun(self, names: Sequence[str], lines: Lines) -> dict[Quantity, tuple[float, float]]:
-        """Fit coordinates of mechanisms' parameters, and their variances, where the recordings alone have them: under
-        this set, or else under the best one that holds the mechanism."""
-        begun: dict[Quantity, tuple[float, float]] = {}
-        for entry in sorted(self._alone, key=lambda entry: frozenset(entry.names) != frozenset(names)):
-            variances = dict(zip(entry.best.hypothesis.mean_indices, np.diag(entry.best.covariance), strict=True))
-            for mechanism, places in parameter_slices(entry.names, lines).items():
-                for place in range(places.start, places.stop):
-                    key = (mechanism, entry.model.parameters[place].name)
-                    begun.setdefault(key, (float(entry.point.fit[place]), float(variances.get(place, np.inf))))
-        return begun
+    def _initial_values(self, names: Sequence[str], lines: Lines) -> dict[Quantity, tuple[float, float]]:
+        """Fit coordinates of mechanisms' parameters and their variances by the first kind alone.
+
+        Under this set of mechanisms, else under the best one that holds the mechanism.
+        """
+        initial_values: dict[Quantity, tuple[float, float]] = {}
+        for explanation in sorted(
+            self._explanations, key=lambda explanation: frozenset(explanation.names) != frozenset(names)
+        ):
+            variances = dict(
+                zip(explanation.best.hypothesis.mean_indices, np.diag(explanation.best.covariance), strict=True)
+            )
+            for mechanism, span in parameter_slices(explanation.names, lines).items():
+                for index in range(span.start, span.stop):
+                    key = (mechanism, explanation.model.parameters[index].name)
+                    initial_values.setdefault(
+                        key, (float(explanation.point.fit[index]), float(variances.get(index, np.inf)))
+                    )
+        return initial_values
 
 
 def _acts_on(name: str, lines: Lines) -> bool:
     mechanism = lines.mechanisms.named.get(name)
-    known = mechanism is not None and lines.kind in mechanism.kinds
-    return known and mechanism is not None and mechanism.unsupported(lines.campaign, lines.kind) is None
+    acts = mechanism is not None and lines.kind in mechanism.kinds
+    return acts and mechanism is not None and mechanism.unsupported(lines.campaign, lines.kind) is None
 
 
 def _in_model(
-    told: OfCurves, model: Model, lines: Lines, begun: Mapping[Quantity, tuple[float, float]]
+    posterior: CurvePosterior, model: Model, lines: Lines, initial_values: Mapping[Quantity, tuple[float, float]]
 ) -> tuple[Floats, Floats, list[Moments]]:
-    """The quantities as matrix · x + offset of the model's fit coordinates, and what is known of each without any
-    recording; a row of zeros where the model has no such quantity. `begun`: fit coordinates by the recordings alone,
-    and their variances."""
-    quantities = told.quantities
-    places = parameter_slices(model.names, lines)
-    names = [entry.name for entry in model.parameters]
+    """The quantities as matrix · x + offset of the model's fit coordinates x, and the prior of each.
+
+    A row of zeros where the model has no such quantity. `initial_values`: fit coordinates by the first kind alone, and
+    their variances.
+    """
+    quantities = posterior.quantities
+    spans = parameter_slices(model.names, lines)
+    names = [parameter.name for parameter in model.parameters]
     matrix, offset = np.zeros((len(quantities), len(names))), np.zeros(len(quantities))
     priors: list[Moments] = []
     for row, (mechanism, key) in enumerate(quantities):
         if (mechanism, key) == MODULUS:
             declared = lines.campaign.skin.youngs_modulus_mpa
             matrix[row, names.index("youngs_modulus")] = 1.0
-            if MODULUS_ERROR in places:
-                matrix[row, places[MODULUS_ERROR].start] = 1.0
+            if MODULUS_ERROR in spans:
+                matrix[row, spans[MODULUS_ERROR].start] = 1.0
             offset[row] = np.log(to_si("youngs_modulus_mpa", 1.0 if declared is None else declared))
-            priors.append((float(told.mean[row]), _MODULUS_SD**2, False, 0.0))
+            priors.append((float(posterior.mean[row]), _MODULUS_SD**2, False, 0.0))
             continue
         if (mechanism, key) == THICKNESS:
             matrix[row, names.index("thickness")] = 1.0
-            if THICKNESS_ERROR in places:
-                matrix[row, places[THICKNESS_ERROR].start] = 1.0
-            priors.append(_moments(UNKNOWN_THICKNESS, float(told.mean[row])))
+            if THICKNESS_ERROR in spans:
+                matrix[row, spans[THICKNESS_ERROR].start] = 1.0
+            priors.append(_moments(UNKNOWN_THICKNESS, float(posterior.mean[row])))
             continue
-        own = places.get(mechanism, slice(0, 0))
-        found = [index for index in range(own.start, own.stop) if names[index] == key]
-        if found:
-            entry = model.parameters[found[0]]
-            matrix[row, found[0]], offset[row] = _tangent(told, row, entry, begun.get((mechanism, key)))
-            priors.append(_moments(entry, float(told.mean[row])))
+        span = spans.get(mechanism, slice(0, 0))
+        indices = [index for index in range(span.start, span.stop) if names[index] == key]
+        if indices:
+            parameter = model.parameters[indices[0]]
+            matrix[row, indices[0]], offset[row] = _tangent(
+                posterior, row, parameter, initial_values.get((mechanism, key))
+            )
+            priors.append(_moments(parameter, float(posterior.mean[row])))
         else:
             priors.append((0.0, 0.0, False, 0.0))
     return matrix, offset, priors
 
 
-def _tangent(told: OfCurves, row: int, entry: Parameter, begun: tuple[float, float] | None) -> tuple[float, float]:
+def _tangent(
+    posterior: CurvePosterior, row: int, parameter: Parameter, initial: tuple[float, float] | None
+) -> tuple[float, float]:
     """Slope and offset of a quantity over its fit coordinate.
 
-    A fraction that is known as a ratio to a time alone, as of curves that are short beside it, is known along a line
-    that is straight in its logarithm: m ln(x/m) + m in place of x. Its tangent is about where the recordings alone have
-    it, if they tell it better than the curves do; else the fit will be about the curves' mean, where both are one.
+    A fraction of which only the ratio to a time is known, as from curves that are short against that time, is known
+    along a line that is straight in its logarithm: m ln(x/m) + m in place of x. The tangent is taken at the value of
+    the first kind alone if that is more precise than the curves'; else the fit is near the curves' mean, where the
+    tangent is the identity.
     """
-    mean, (at, variance) = float(told.mean[row]), begun or (0.0, np.inf)
-    if entry.scale == "log" or not told.is_ratio(row) or min(mean, at) <= 0 or variance > told.covariance[row, row]:
+    mean, (start, variance) = float(posterior.mean[row]), initial or (0.0, np.inf)
+    if (
+        parameter.scale == "log"
+        or not posterior.is_ratio(row)
+        or min(mean, start) <= 0
+        or variance > posterior.covariance[row, row]
+    ):
         return 1.0, 0.0
-    return mean / at, mean * float(np.log(at / mean))
+    return mean / start, mean * float(np.log(start / mean))
 
 
-def _moments(entry: Parameter, mean: float) -> Moments:
-    low, high = entry.bounds
+def _moments(parameter: Parameter, mean: float) -> Moments:
+    low, high = parameter.bounds
     inside = float(np.clip(mean, low, high))
-    precision, centre = quadratic_of_prior(entry, inside)
+    precision, centre = quadratic_of_prior(parameter, inside)
     if not precision:
         return (low + high) / 2, (high - low) ** 2 / (2 * np.pi), True, 0.0
     normal = 0.5 * float(np.log(precision / (2 * np.pi)) - precision * (inside - centre) ** 2)
-    return centre, 1 / precision, False, entry.log_prior(inside) - normal
+    return centre, 1 / precision, False, parameter.log_prior(inside) - normal
 
 
-def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence[Moments]) -> Gaussian:
-    """ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence; normal."""
-    centre, variance, flat, higher = (np.array(column) for column in zip(*priors, strict=True))
+def _likelihood(posterior: CurvePosterior, matrix: Floats, offset: Floats, priors: Sequence[Moments]) -> Gaussian:
+    """Normal ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence."""
+    centre, variance, flat, log_height_ratio = (np.array(column) for column in zip(*priors, strict=True))
     flat = flat.astype(bool)
     widest = np.where(flat, variance * (2 * np.pi / 12), variance)  # between bounds: a uniform distribution's
-    known = matrix.any(axis=1) & (np.diag(told.covariance) < _INFORMED**2 * widest)
-    if not known.any():
-        return Gaussian(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), told.log_weight)
-    after = _inverse(told.covariance[np.ix_(known, known)])
-    centre, variance, flat = centre[known], variance[known], flat[known]
-    before = np.diag(np.where(flat, 0.0, 1 / variance))
-    precision = _definite(after - before)
-    mean = np.linalg.solve(precision, after @ told.mean[known] - before @ centre)
-    # The evidence is the integral of the likelihood over the prior, a flat one as a normal one of the same height
+    informative = matrix.any(axis=1) & (np.diag(posterior.covariance) < _INFORMATIVE**2 * widest)
+    if not informative.any():
+        return Gaussian(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), posterior.log_weight)
+    posterior_precision = _inverse(posterior.covariance[np.ix_(informative, informative)])
+    centre, variance, flat = centre[informative], variance[informative], flat[informative]
+    prior_precision = np.diag(np.where(flat, 0.0, 1 / variance))
+    precision = _definite(posterior_precision - prior_precision)
+    mean = np.linalg.solve(precision, posterior_precision @ posterior.mean[informative] - prior_precision @ centre)
+    # The evidence is the integral of the likelihood over the prior; a flat prior as a normal one of the same height
     prior = np.diag(variance)
-    away = mean - centre
+    shift = mean - centre
     volume = np.linalg.slogdet(np.eye(len(mean)) + precision @ prior)[1]
-    height = told.log_weight + 0.5 * volume - float(higher[known].sum())
-    height += 0.5 * away @ np.linalg.solve(np.linalg.inv(precision) + prior, np.where(flat, 0.0, away))
-    tolerance = np.array([told.tolerance**2 * (told.quantities[row] == MODULUS) for row in np.flatnonzero(known)])
-    return Gaussian.of(mean, precision, float(height)).of_mean(tolerance).over(matrix[known], offset[known])
+    height = posterior.log_weight + 0.5 * volume - float(log_height_ratio[informative].sum())
+    height += 0.5 * shift @ np.linalg.solve(np.linalg.inv(precision) + prior, np.where(flat, 0.0, shift))
+    tolerance = np.array(
+        [posterior.tolerance**2 * (posterior.quantities[row] == MODULUS) for row in np.flatnonzero(informative)]
+    )
+    return Gaussian.of(mean, precision, float(height)).of_mean(tolerance).over(matrix[informative], offset[informative])
 
 
 def _inverse(covariance: Floats) -> Floats:
-    """Of a covariance, whose correlations may be nearly singular: quantities that are known as a ratio alone."""
+    """Inverse of a covariance whose correlations may be nearly singular (only a ratio of quantities is known)."""
     deviation = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(deviation, deviation))
     return np.asarray((vectors / np.maximum(values, _LEAST_CORRELATION)) @ vectors.T / np.outer(deviation, deviation))
 
 
 def _definite(precision: Floats) -> Floats:
+    """With eigenvalues of at least 1e-9."""
     values, vectors = np.linalg.eigh(precision)
     return np.asarray((vectors * np.maximum(values, 1e-9)) @ vectors.T)

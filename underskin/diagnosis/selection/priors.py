@@ -1,6 +1,6 @@
-"""The priors over sets of mechanisms, and what a mechanism must bring to be named.
+"""Priors over sets of mechanisms, and the evidence that a mechanism needs to be named.
 
-Within a size, every set of mechanisms that the campaign supports is equally probable.
+All sets of one size of the mechanisms that the campaign supports are equally probable.
 """
 
 import math
@@ -9,18 +9,21 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
 
-# "Nothing" stands for all that does not show as well, which is every other campaign.
+# "Nothing missing" includes all mechanisms that do not show, hence every other campaign.
 PRIORS = {"nothing_missing": 0.6, "one": 0.252, "two": 0.1, "three": 0.012, "four": 0.001, "none_of_these": 0.035}
-LARGEST = 4  # mechanisms in a set; four only where several kinds of recordings ask for them
-UNSEEN_ODDS = 1.5  # that one more mechanism is there than shows, in what it may do to d33; on the virtual rig about 1.4
+LARGEST = 4  # mechanisms in a set; four only where several kinds of recordings require them
+UNSEEN_ODDS = 1.5  # odds of one more mechanism than shows, for its effect on d33; on the virtual rig about 1.4
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
-_SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no noise model knows
-_DECLARED, _DECLARED_SHOWS = 0.5, 3.0  # prior of a law that follows from declared facts, and nats by which it shows
+_LEAST_ON_CURVES = 5.0  # the same on curves, whose neighbouring samples may share errors outside the noise model
+_DECLARED_PRIOR, _LEAST_OF_DECLARED = (
+    0.5,
+    3.0,
+)  # of a law that follows from declared facts: prior, and nats it must bring
 
 
 def least_evidence(explanation: Explanation) -> float:
-    """Nats of evidence that a mechanism or an unlisted law must bring on recordings of this kind."""
-    return _SHOWS_ON_CURVES if explanation.best.hypothesis.lines.curves else SHOWS
+    """Evidence that a mechanism or an unlisted law must bring on recordings of this kind [nats]."""
+    return _LEAST_ON_CURVES if explanation.best.hypothesis.lines.curves else SHOWS
 
 
 def declared_laws(lines: Lines) -> frozenset[str]:
@@ -32,39 +35,39 @@ def declared_laws(lines: Lines) -> frozenset[str]:
     )
 
 
-def guesses(explanation: Explanation) -> int:
-    """How many mechanisms of a set do not follow from declared facts."""
+def guess_count(explanation: Explanation) -> int:
+    """Number of mechanisms of a set that do not follow from declared facts."""
     return len(set(explanation.names) - declared_laws(explanation.best.hypothesis.lines))
 
 
 def log_prior_of(explanation: Explanation, supported: int) -> float:
-    """The logarithm of the prior of a set among so many mechanisms that the campaign supports."""
+    """Log prior of a set among the `supported` mechanisms of the campaign."""
     declared = declared_laws(explanation.best.hypothesis.lines)
-    return log_prior(guesses(explanation), supported - len(declared)) + len(declared) * math.log(_DECLARED)
+    return log_prior(guess_count(explanation), supported - len(declared)) + len(declared) * math.log(_DECLARED_PRIOR)
 
 
 def log_prior_beneath_of(explanation: Explanation, supported: int, laws: int = 0) -> float:
-    """The same of something undescribed on top of a set, of which so many `laws` are not listed."""
+    """Log prior of an undescribed discrepancy on top of a set, which holds `laws` unlisted laws."""
     declared = declared_laws(explanation.best.hypothesis.lines)
-    size = guesses(explanation) - laws
-    return log_prior_beneath(size, supported - len(declared)) + len(declared) * math.log(_DECLARED)
+    size = guess_count(explanation) - laws
+    return log_prior_beneath(size, supported - len(declared)) + len(declared) * math.log(_DECLARED_PRIOR)
 
 
 def must_gain(explanation: Explanation, name: str) -> float:
-    """Nats of evidence that a mechanism of a set must bring to be named in it."""
+    """Evidence that a mechanism of a set must bring to be named in it [nats]."""
     if name in declared_laws(explanation.best.hypothesis.lines):
-        return _DECLARED_SHOWS
+        return _LEAST_OF_DECLARED
     return least_evidence(explanation)
 
 
 def log_prior(size: int, supported: int) -> float:
-    """The logarithm of the prior of one set of that many mechanisms."""
+    """Log prior of one set of `size` mechanisms."""
     share = PRIORS[("nothing_missing", "one", "two", "three", "four")[size]]
     return math.log(share) - math.log(math.comb(supported, size))
 
 
 def log_prior_beneath(size: int, supported: int) -> float:
-    """The logarithm of the prior of something undescribed on top of one set: a mechanism like any other."""
+    """Log prior of an undescribed discrepancy on top of one set: it counts as one more mechanism."""
     if size == 0:
         return math.log(PRIORS[NONE_OF_THESE])
     return log_prior(size, supported) + math.log(PRIORS[NONE_OF_THESE] * PRIORS["two"] / PRIORS["one"])

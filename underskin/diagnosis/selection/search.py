@@ -23,7 +23,7 @@ from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
 from underskin.diagnosis.inference.fit import LEVEL, SMOOTH, Fitter
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, of_curves
+from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence
 from underskin.mechanisms.base import Kind, Stage, Unsupported
 from underskin.mechanisms.registry import ActiveCatalogue
@@ -242,7 +242,7 @@ class KindsTogether:
         if beside is None:
             return False
         others = [other for other in names if other != name]
-        both = [(beside.told(kind, names), beside.told(kind, others)) for kind in beside.kinds]
+        both = [(beside.posterior(kind, names), beside.posterior(kind, others)) for kind in beside.kinds]
         return any(whole.log_weight > smaller.log_weight + least_evidence(whole.best) for whole, smaller in both)
 
 
@@ -258,7 +258,7 @@ class OtherKinds:
         """Each searched as if it were alone."""
         found = []
         for kind, campaign in self._campaigns.items():
-            problem = of_curves(campaign, kind, self._table, self._without)
+            problem = free_modulus_problem(campaign, kind, self._table, self._without)
             found.append(OtherKind(kind, problem, search(problem).explanations))
         return found
 
@@ -284,7 +284,7 @@ def telling_modulus(joined: KindsTogether | None, names: Sequence[str]) -> froze
     if joined is None or joined.beside is None:
         return frozenset()
     beside = joined.beside
-    return frozenset(kind.kind for kind in beside.kinds if beside.told(kind, names).modulus_deviation < _TOLD)
+    return frozenset(kind.kind for kind in beside.kinds if beside.posterior(kind, names).modulus_deviation < _TOLD)
 
 
 def _log_apart(apart: Search, beside: CurveLikelihood) -> float:

@@ -1,16 +1,12 @@
-"""Predictions of what was left out, and noise that the fit leaves.
+"""Cross-validation on whole groups of recordings, and whether the residual of an explanation is noise.
 
-How well the recordings are predicted before and after, on groups that were left out whole: extrapolation.
+Groups held out: the highest preload, one sphere (the largest), one sensor (the last), the highest band, the latest day;
+parts of each curve; for an unlisted law, which predicts within its range only, thirds along its axis. Without the group
+everything is fitted again: the null hypothesis and the best sets, among which the evidence chooses again.
 
-Groups: the highest preload, one sphere (the largest), one sensor (the last), the highest band, the latest day; of a law
-that nobody listed, thirds along its axis. Without
-the group everything is fitted again: nothing missing, and the choice among the best sets is made again from evidence.
-rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together, of curves with the measured force in place of m below; the noise
-floor is its expectation from the noise alone, for a new recording: gain, positioning and line scatter, and the
-sensors' gains where the sensor was not seen.
-
-What groups held out say of the answers, and of laws that nobody listed, which predict within their range only. Whether
-what an explanation leaves is noise.
+rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together; of curves the measured force replaces m in the denominator. The
+noise floor is its expectation from noise alone for a new recording: gain, positioning and line scatter, and the
+sensors' gains where the sensor was not in the training data.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -33,28 +29,30 @@ from underskin.recordings.campaign import curves_of, frf_of
 from underskin.units import Floats, Indices, Mask
 
 _STRETCHES = 9  # of a curve
-_FURTHEST = 0.6  # of a curve's highest force
-_LOADED, _RETURN = 0.02, 0.02  # of the highest force and of the travel: a way back under load
-_LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
-_LEAST_KEPT = 3  # recordings that must remain
-_BEST = 10  # sets among which the choice is repeated
-_BEHIND = 15.0  # nats
+_HIGH_FORCE = 0.6  # of a curve's highest force
+_LEAST_LOAD, _LEAST_RETURN = 0.02, 0.02  # of the highest force and of the travel: unloading in contact
+_LEAST_SAMPLES = 6  # beyond the highest force, for a hold or an unloading branch
+_LEAST_RECORDINGS = 3  # that must remain
+_MOST_RIVALS = 10  # sets among which the choice is repeated
+_EVIDENCE_MARGIN = 15.0  # of these behind the best one [nats]
 
 
 @dataclass(frozen=True)
 class PredictionScore:
-    """Sums over held-out rows under one way of predicting them: how far off, how large, and what noise would give."""
+    """Sums over held-out rows of squared errors, squared size and their expectation from noise, for one prediction."""
 
     square: float = 0.0  # Σ|y − m|²
     size: float = 0.0  # Σ|m|²
     noise: float = 0.0  # Σ E|y − m|² from noise alone
     log_score: float = 0.0  # Σ log predictive density of the recordings' levels, relative
     recordings: int = 0
-    pickup: float = 0.0  # that part of `noise` which is mains pick-up
-    unsure: float = 0.0  # of curves: Σ of the variance that the parameters leave, which the rest of a curve told
+    pickup: float = 0.0  # the part of `noise` from mains pick-up
+    parameter_variance: float = 0.0  # of curves: Σ of the variance from the parameters, fitted to the rest of the curve
 
     def __add__(self, other: "PredictionScore") -> "PredictionScore":
-        return PredictionScore(*(one + more for one, more in zip(astuple(self), astuple(other), strict=True)))
+        return PredictionScore(
+            *(value + increment for value, increment in zip(astuple(self), astuple(other), strict=True))
+        )
 
     @property
     def rmse_percent(self) -> float:
@@ -63,13 +61,13 @@ class PredictionScore:
 
     @property
     def floor_percent(self) -> float:
-        """What noise alone would give."""
+        """The rmse from noise alone [%]."""
         return 100 * float(np.sqrt(self.noise / self.size)) if self.size > 0 else float("nan")
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """One group: its name, what was chosen without it, and how it was predicted."""
+    """One group: its name, the set `chosen` without it, its prediction by the null hypothesis and by that set."""
 
     group: str
     chosen: tuple[str, ...]
@@ -77,16 +75,18 @@ class HeldOut:
     after: PredictionScore
 
 
-def groups(lines: Lines) -> dict[str, Mask]:
+def rows_of_groups(lines: Lines) -> dict[str, Mask]:
     """The rows of each group that can be left out, with enough recordings remaining."""
     if lines.curves:
-        return _parts_of_curves(lines)
-    entries = frf_of(lines.campaign)
+        return _curve_parts(lines)
+    recordings = frf_of(lines.campaign)
     columns: dict[str, list[Any]] = {
-        "preload_n": [entry.preload_n for entry in entries],
-        "indenter_radius_mm": [entry.indenter_radius_mm for entry in entries],
-        "sensor": [entry.sensor for entry in entries],
-        "recorded_at": [None if entry.recorded_at is None else str(entry.recorded_at)[:10] for entry in entries],
+        "preload_n": [recording.preload_n for recording in recordings],
+        "indenter_radius_mm": [recording.indenter_radius_mm for recording in recordings],
+        "sensor": [recording.sensor for recording in recordings],
+        "recorded_at": [
+            None if recording.recorded_at is None else str(recording.recorded_at)[:10] for recording in recordings
+        ],
     }
     rows_by_group = {
         f"{name} {largest}": np.array([value == largest for value in column])[lines.recording]
@@ -99,200 +99,223 @@ def groups(lines: Lines) -> dict[str, Mask]:
     return {
         name: rows
         for name, rows in rows_by_group.items()
-        if len(np.unique(lines.recording[~rows])) >= _LEAST_KEPT and rows.any()
+        if len(np.unique(lines.recording[~rows])) >= _LEAST_RECORDINGS and rows.any()
     }
 
 
-def _parts_of_curves(lines: Lines) -> dict[str, Mask]:
-    """A curve's contact point is its own, so parts of each are left out: the middle of the way back where there is one,
-    else the later half of what is held, else the highest force."""
+def _curve_parts(lines: Lines) -> dict[str, Mask]:
+    """Parts of every curve, since a contact point is fitted to each.
+
+    The middle of the unloading branch where there is one, else the later half of the hold, else the highest force.
+    """
     force = np.abs(lines.value.real)  # tension is negative
-    back, held = np.zeros(len(force), dtype=bool), np.zeros(len(force), dtype=bool)
-    for own, entry in zip(lines.spans, curves_of(lines.campaign), strict=True):
-        low, high = own.start, own.stop
-        travel = entry.displacement_mm - entry.displacement_mm[0]
+    unloading, hold = np.zeros(len(force), dtype=bool), np.zeros(len(force), dtype=bool)
+    for span, recording in zip(lines.spans, curves_of(lines.campaign), strict=True):
+        first, end = span.start, span.stop
+        travel = recording.displacement_mm - recording.displacement_mm[0]
         if lines.kind == "compression" and -travel.min() > travel.max():  # pulled
             travel = -travel
         turn = int(np.argmax(travel))
-        loaded = np.flatnonzero(force[low + turn : high] > _LOADED * force[low:high].max())
-        last = turn + (int(loaded[-1]) if len(loaded) else 0)
-        peak = int(np.argmax(force[low : low + turn + 1])) if turn else 0
-        if last - turn >= _LEAST_AFTER and travel[turn] - travel[last] > _RETURN * float(np.ptp(travel[: turn + 1])):
-            third = (last - turn) // 3
-            back[low + turn + third : low + turn + 2 * third] = True
-        elif high - low - 1 - peak >= _LEAST_AFTER:
-            held[high - (high - low - 1 - peak) // 2 : high] = True
-    parts = {"the middle of the way back": back, "the later half of what is held": held}
-    if back.any() or held.any():
+        loaded = np.flatnonzero(force[first + turn : end] > _LEAST_LOAD * force[first:end].max())
+        last_loaded = turn + (int(loaded[-1]) if len(loaded) else 0)
+        peak = int(np.argmax(force[first : first + turn + 1])) if turn else 0
+        if last_loaded - turn >= _LEAST_SAMPLES and travel[turn] - travel[last_loaded] > _LEAST_RETURN * float(
+            np.ptp(travel[: turn + 1])
+        ):
+            third = (last_loaded - turn) // 3
+            unloading[first + turn + third : first + turn + 2 * third] = True
+        elif end - first - 1 - peak >= _LEAST_SAMPLES:
+            hold[end - (end - first - 1 - peak) // 2 : end] = True
+    parts = {"the middle of the way back": unloading, "the later half of what is held": hold}
+    if unloading.any() or hold.any():
         return {name: rows for name, rows in parts.items() if rows.any()}
     highest = np.maximum.reduceat(force, lines.first)[lines.recording]
-    return {f"force above {100 * _FURTHEST:.0f} % of the highest": force > _FURTHEST * highest}
+    return {f"force above {100 * _HIGH_FORCE:.0f} % of the highest": force > _HIGH_FORCE * highest}
 
 
 def thirds(lines: Lines, column: Floats) -> dict[str, Mask]:
-    """The rows of every third recording along an axis (recordings,), three times: what lies between is predicted; of
-    few recordings every third line."""
+    """The rows of every third recording along an axis (recordings,), three times: interpolation.
+
+    Of few recordings every third line.
+    """
     names = ("from the first", "from the second", "from the third")
-    if lines.recordings < _LEAST_KEPT + len(names):
+    if lines.recordings < _LEAST_RECORDINGS + len(names):
         line = np.arange(len(lines.value)) - lines.first[lines.recording]
-        thirds = {f"every third line {name}": line % len(names) == place for place, name in enumerate(names)}
-        return {name: rows for name, rows in thirds.items() if rows.any() and not rows.all()}
+        rows_by_name = {f"every third line {name}": line % len(names) == third for third, name in enumerate(names)}
+        return {name: rows for name, rows in rows_by_name.items() if rows.any() and not rows.all()}
     rank = np.argsort(np.argsort(column, kind="stable"), kind="stable")
     return {
-        f"every third recording {name}": (rank % len(names) == place)[lines.recording]
-        for place, name in enumerate(names)
+        f"every third recording {name}": (rank % len(names) == third)[lines.recording]
+        for third, name in enumerate(names)
     }
 
 
 def stretches(lines: Lines) -> dict[str, Mask]:
-    """The rows of every third of nine stretches of each curve, three times: what lies between is predicted."""
+    """The rows of every third of nine stretches of each curve, three times: interpolation."""
     counts = np.bincount(lines.recording)
     row = np.arange(len(lines.value)) - lines.first[lines.recording]
     third = (_STRETCHES * row // counts[lines.recording]) % 3
     names = ("from the first", "from the second", "from the third")
-    return {f"every third stretch {name}": third == place for place, name in enumerate(names)}
+    return {f"every third stretch {name}": third == index for index, name in enumerate(names)}
 
 
 def hold_out(
     problem: FittingProblem,
     ranked: Sequence[Explanation],
-    nothing: Explanation,
+    null: Explanation,
     log_prior: Callable[[Explanation], float],
     rows_by_group: Mapping[str, Mask],
 ) -> list[HeldOut]:
-    """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
-    weights = [entry.log_evidence + log_prior(entry) for entry in ranked]
-    rivals = [entry for entry, w in zip(ranked, weights, strict=True) if w > weights[0] - _BEHIND][:_BEST]
-    each = (_without(problem, name, rows, rivals, nothing, log_prior) for name, rows in rows_by_group.items())
-    return [entry for entry in each if entry is not None]
+    """Predict each group from the rest; `ranked` are the sets fitted to all rows, the best first."""
+    weights = [explanation.log_evidence + log_prior(explanation) for explanation in ranked]
+    rivals = [
+        explanation
+        for explanation, weight in zip(ranked, weights, strict=True)
+        if weight > weights[0] - _EVIDENCE_MARGIN
+    ][:_MOST_RIVALS]
+    predictions = (
+        _hold_out_group(problem, name, rows, rivals, null, log_prior) for name, rows in rows_by_group.items()
+    )
+    return [prediction for prediction in predictions if prediction is not None]
 
 
-def _without(
+def _hold_out_group(
     problem: FittingProblem,
     name: str,
     rows: Mask,
     rivals: Sequence[Explanation],
-    nothing: Explanation,
+    null: Explanation,
     log_prior: Callable[[Explanation], float],
 ) -> HeldOut | None:
     """Predict one group from the rest; None where the rest does not support the null hypothesis."""
-    smaller = FittingProblem(problem.lines.part(~rows), problem.table, problem.beside)
-    entries = {entry.names: entry for entry in (nothing, *rivals)}
-    fits = {entry.names: entry for entry in smaller.refit(list(entries.values())) if entry is not None}
-    if nothing.names not in fits:
+    training = FittingProblem(problem.lines.part(~rows), problem.table, problem.beside)
+    candidates = {explanation.names: explanation for explanation in (null, *rivals)}
+    fits = {
+        explanation.names: explanation
+        for explanation in training.refit(list(candidates.values()))
+        if explanation is not None
+    }
+    if null.names not in fits:
         return None
-    chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(entry))
-    left = problem.lines.part(rows)
-    before, after = (_predict(smaller, fits[names], problem, rows, left) for names in (nothing.names, chosen.names))
+    chosen = max(fits.values(), key=lambda explanation: explanation.log_evidence + log_prior(explanation))
+    held_out_lines = problem.lines.part(rows)
+    before, after = (
+        _predict(training, fits[names], problem, rows, held_out_lines) for names in (null.names, chosen.names)
+    )
     return HeldOut(name, chosen.names, before, after)
 
 
 def _predict(
-    smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask, left: Lines
+    training: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask, held_out_lines: Lines
 ) -> PredictionScore:
-    """Some of the rows, `left` alone, from a fit to others; sensors that were seen keep the gain found for them."""
+    """Of some of the rows, `held_out_lines`, from a fit to others; sensors in the training data keep their gain."""
     model = problem.hypothesis(explanation.names, has_position_scatter=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
     if not isinstance(model, FrfModel):
-        whole = model.predict(point.fit)
-        slopes = whole.slopes[explanation.best.hypothesis.mean_indices][:, rows]
-        unsure = float(np.einsum("ir,ij,jr->", slopes, explanation.best.covariance, slopes))
-        return replace(_predict_curves(problem.lines, levels, whole.value.real, rows, smaller), unsure=unsure)
-    whole = model.predict(point.fit, slopes=False, place=False)
-    seen = np.isin(left.sensor, smaller.lines.sensor)
-    gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
+        prediction = model.predict(point.fit)
+        slopes = prediction.slopes[explanation.best.hypothesis.mean_indices][:, rows]
+        parameter_variance = float(np.einsum("ir,ij,jr->", slopes, explanation.best.covariance, slopes))
+        return replace(
+            _predict_curves(problem.lines, levels, prediction.value.real, rows, training),
+            parameter_variance=parameter_variance,
+        )
+    prediction = model.predict(point.fit, slopes=False, place=False)
+    trained = np.isin(held_out_lines.sensor, training.lines.sensor)
+    gains = np.zeros(max(int(held_out_lines.sensor.max()), int(training.lines.sensor.max())) + 1)
     fitted_gains = explanation.best.sensor_gains
     gains[: len(fitted_gains)] = fitted_gains
     # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
     p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]
-    value = whole.value[rows] * np.exp(gains[left.sensor])[left.recording]
+    value = prediction.value[rows] * np.exp(gains[held_out_lines.sensor])[held_out_lines.recording]
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
-    scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
-    noise = scatter[left.recording] * np.abs(value) ** 2 + 2 * (levels.level * left.deviation) ** 2
-    has_position_scatter = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
-    noise = noise + has_position_scatter[recording] * np.abs(whole.value[rows]) ** 2
+    scatter = levels.gain**2 + np.where(trained, 0.0, levels.spread**2)
+    noise = scatter[held_out_lines.recording] * np.abs(value) ** 2 + 2 * (levels.level * held_out_lines.deviation) ** 2
+    position_variance = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
+    noise = noise + position_variance[recording] * np.abs(prediction.value[rows]) ** 2
     noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
-    pickup_noise = 2 * whole.pickup_variance[rows]
+    pickup_noise = 2 * prediction.pickup_variance[rows]
     noise = noise + pickup_noise
-    square = np.abs(left.value - value) ** 2
-    return replace(_scored(left.first, square, noise, np.abs(value) ** 2), pickup=float(pickup_noise.sum()))
+    square = np.abs(held_out_lines.value - value) ** 2
+    return replace(_score(held_out_lines.first, square, noise, np.abs(value) ** 2), pickup=float(pickup_noise.sum()))
 
 
 def _predict_curves(
-    lines: Lines, levels: NoiseLevels, force: Floats, rows: Mask, smaller: FittingProblem
+    lines: Lines, levels: NoiseLevels, force: Floats, rows: Mask, training: FittingProblem
 ) -> PredictionScore:
-    """Some of the rows, with the gain, the zero and the drift of the cell that the rows fitted to show."""
-    fitted = ~rows if len(smaller.lines.value) < len(lines.value) else rows
+    """Of some of the rows, with the gain, the zero and the drift of the load cell by the fitted rows."""
+    fitted = ~rows if len(training.lines.value) < len(lines.value) else rows
     cell = cell_response(lines, levels, force, fitted)
     assert lines.smooth is not None
     value = cell.reading(lines, force)
     noise = cell.variance + (levels.level * lines.deviation) ** 2 + (levels.smooth * lines.smooth.scale) ** 2
     recording = lines.recording[rows]
     first = np.flatnonzero(np.diff(recording, prepend=-1))
-    # A law may predict no force where there is one, and the zero of force is each explanation's own.
+    # Relative to the measured force: a law may predict none, and each explanation has its own zero of force.
     measured = lines.value.real[rows]
-    return _scored(first, (measured - value[rows]) ** 2, noise[rows], measured**2)
+    return _score(first, (measured - value[rows]) ** 2, noise[rows], measured**2)
 
 
-def _scored(first: Indices, square: Floats, noise: Floats, size: Floats) -> PredictionScore:
-    """From what was missed, what noise would give, and what was predicted (rows,), all squared."""
-    each, expected, sizes = (np.add.reduceat(column, first) for column in (square, noise, size))
+def _score(first: Indices, square: Floats, noise: Floats, size: Floats) -> PredictionScore:
+    """From squared errors, their expectation from noise and the squared size (rows,)."""
+    squares, noises, sizes = (np.add.reduceat(column, first) for column in (square, noise, size))
     sizes = np.maximum(sizes, 1e-300)
-    score = -0.5 * (each / expected + np.log(2 * np.pi * expected / sizes))
+    score = -0.5 * (squares / noises + np.log(2 * np.pi * noises / sizes))
     return PredictionScore(float(square.sum()), float(size.sum()), float(noise.sum()), float(score.sum()), len(first))
 
 
-def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
+def total(groups: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
     """Before and after, over all groups."""
-    none = PredictionScore()
-    return sum((entry.before for entry in held_out), none), sum((entry.after for entry in held_out), none)
+    zero = PredictionScore()
+    return sum((group.before for group in groups), zero), sum((group.after for group in groups), zero)
 
 
 def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
-    """The recordings that the explanation was fitted to."""
-    every = np.ones(len(problem.lines.value), dtype=bool)
-    return _predict(problem, explanation, problem, every, problem.lines)
+    """Of the recordings that the explanation was fitted to."""
+    all_rows = np.ones(len(problem.lines.value), dtype=bool)
+    return _predict(problem, explanation, problem, all_rows, problem.lines)
 
 
-_LAWS_HELD_OUT = 4  # of laws, and of sets of mechanisms, among which the choice is repeated
+_MOST_EXPLANATIONS = 4  # laws, and sets of mechanisms, among which the choice is repeated
 
 
 def held_out(
-    problem: FittingProblem, result: Search, ranked: Sequence[Explanation], nothing: Explanation
+    problem: FittingProblem, result: Search, ranked: Sequence[Explanation], null: Explanation
 ) -> list[HeldOut]:
-    """What groups held out say; of a law that nobody listed, which predicts within its range only, thirds along it."""
+    """Predictions of groups held out; for an unlisted law, valid within its range only, thirds along its axis."""
     law = result.law
     if result.answers[0].explanation is not None or law is None:
-        return hold_out(problem, ranked, nothing, result.log_prior, groups(problem.lines))
-    laws = sorted((entry for entry in result.laws if result.is_supported(entry)), key=result.log_weight, reverse=True)
-    both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
-    return hold_out(problem, both, nothing, result.log_prior, _along(problem, law))
+        return hold_out(problem, ranked, null, result.log_prior, rows_of_groups(problem.lines))
+    laws = sorted((fit for fit in result.laws if result.is_supported(fit)), key=result.log_weight, reverse=True)
+    ranked_together = sorted(
+        [*laws[:_MOST_EXPLANATIONS], *ranked[:_MOST_EXPLANATIONS]], key=result.log_weight, reverse=True
+    )
+    return hold_out(problem, ranked_together, null, result.log_prior, _groups_along_law(problem, law))
 
 
-def _along(problem: FittingProblem, law: Explanation) -> dict[str, Mask]:
-    """The rows of thirds along the axis of a law that nobody listed."""
+def _groups_along_law(problem: FittingProblem, law: Explanation) -> dict[str, Mask]:
+    """The rows of thirds along the axis of an unlisted law; of curves stretches."""
     if problem.lines.curves:
         return stretches(problem.lines)
     leading = law_of(problem, law)
-    ids = [entry.id for entry in problem.lines.campaign.recordings]
+    ids = [recording.id for recording in problem.lines.campaign.recordings]
     column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)
     return thirds(problem.lines, column)
 
 
-def of_nearest_law(problem: FittingProblem, result: Search, nothing: Explanation) -> list[Finding]:
-    """What the nearest law that nobody listed is worth, where none is stated."""
+def nearest_law_findings(problem: FittingProblem, result: Search, null: Explanation) -> list[Finding]:
+    """The held-out error of the nearest unlisted law, where none is stated."""
     nearest = nearest_law(problem, result)
     if nearest is None:
         return []
-    found = nearest.explanation
-    law = None if found is None else law_of(problem, found)
-    if found is None or law is None:
+    explanation = nearest.explanation
+    law = None if explanation is None else law_of(problem, explanation)
+    if explanation is None or law is None:
         return [Finding(Reason.NO_SIMPLE_LAW, "", "", {"tried": nearest.tried})]
 
-    def the_law(entry: Explanation) -> float:
-        return 0.0 if entry.names == found.names else -np.inf
+    def log_prior(candidate: Explanation) -> float:
+        return 0.0 if candidate.names == explanation.names else -np.inf
 
-    groups = hold_out(problem, [found], nothing, the_law, _along(problem, found))
+    groups = hold_out(problem, [explanation], null, log_prior, _groups_along_law(problem, explanation))
     before, after = total(groups)
     if not (np.isfinite(before.rmse_percent) and np.isfinite(after.rmse_percent)):
         return []
@@ -307,7 +330,7 @@ def of_nearest_law(problem: FittingProblem, result: Search, nothing: Explanation
 
 
 _ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
-NOISY = 2.0  # times what the lines' own roughness says
+NOISY = 2.0  # times the noise by the lines' roughness
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 
 
@@ -322,7 +345,7 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
     before, after = total(groups)
     if explanation.names and after.recordings and after.rmse_percent >= before.rmse_percent:
         arguments = {
-            "groups": [entry.group for entry in groups],
+            "groups": [group.group for group in groups],
             "mechanisms": [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names],
             "before_percent": before.rmse_percent,
             "after_percent": after.rmse_percent,
@@ -332,14 +355,14 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
-    """What noise alone would make of the error, in the recordings and in each group held out, the largest [%]."""
-    return max(entry.floor_percent for entry in (in_sample(problem, null), *(entry.before for entry in groups)))
+    """The largest noise floor of the recordings and of the groups held out [%]."""
+    return max(score.floor_percent for score in (in_sample(problem, null), *(score.before for score in groups)))
 
 
 def _smooth_part(problem: FittingProblem, explanation: Explanation) -> tuple[float, float]:
-    """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force.
+    """Of curves: the smooth residual and a sample's noise, both relative to the largest force.
 
-    Noise is at least what neighbouring samples show.
+    The noise is at least that by differences of neighbouring samples.
     """
     lines, levels = problem.lines, explanation.best.levels
     assert lines.smooth is not None
