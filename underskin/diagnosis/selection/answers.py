@@ -25,6 +25,7 @@ from underskin.mechanisms.unlisted.laws import UnlistedLaw
 P_NOT_IN_MODEL_SPACE = 0.015  # probability that none of what was compared is right
 _EQUAL = 0.01  # nats, within which laws are equally probable: those of one course over two axes
 _NEGLIGIBLE = 1e-6  # probability of a set of mechanisms of the curves alone
+_ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
 _STANDS = 0.2  # probability of all answers together by which a contact lies within the tables
 
 
@@ -57,6 +58,17 @@ def leading_first(ranked: Sequence[Answer]) -> list[Answer]:
     most = max(by_kind, key=lambda kind: by_kind[kind])
     leader = next(answer for answer in ranked if answer.kind == most)
     return [leader, *(answer for answer in ranked if answer is not leader)]
+
+
+def remainder(explanation: Explanation) -> tuple[float, float] | None:
+    """Of curves: the smooth residual over the largest force, and over a sample's noise, which is at least that by
+    differences of neighbouring samples; None where it does not stand out."""
+    levels, lines = explanation.best.levels, explanation.best.hypothesis.lines
+    if lines.smooth is None:
+        return None
+    noise = max(levels.level, 1.0) * float(np.median(lines.deviation / lines.smooth.scale))
+    stands_out = levels.smooth > max(_ABOVE_NOISE * noise, _LEAST_REMAINDER)
+    return (levels.smooth, levels.smooth / noise) if stands_out else None
 
 
 @dataclass(frozen=True)
@@ -148,14 +160,16 @@ class Search:
         Of nothing, all sets of known mechanisms, and none of these, the most probable leads, and of sets the most
         probable one: what many sets share is no reason to say that no known mechanism describes it.
         """
-        laws = [weight for _, weight in self.weighed_laws]
-        weights = np.array([*(weight for _, weight in self.weighed), np.logaddexp.reduce(laws) if laws else -np.inf])
+        named = [pair for pair in self.weighed if pair[0].names or remainder(pair[0]) is None]
+        unlisted = [*self.weighed_laws, *(pair for pair in self.weighed if pair not in named)]
+        log_unlisted = np.logaddexp.reduce([weight for _, weight in unlisted]) if unlisted else -np.inf
+        weights = np.array([*(weight for _, weight in named), log_unlisted])
         probabilities = (1 - P_NOT_IN_MODEL_SPACE) * np.exp(weights - np.logaddexp.reduce(weights))
         probabilities[-1] += P_NOT_IN_MODEL_SPACE
         if self.other_tip:
             probabilities[-1] = max(probabilities[-1], self.other_tip * probabilities[:-1].max())
             probabilities /= probabilities.sum()
-        answers = list(map(Answer, [*(fitted for fitted, _ in self.weighed), None], probabilities.tolist()))
+        answers = list(map(Answer, [*(fitted for fitted, _ in named), None], probabilities.tolist()))
         answers = [part for answer in answers for part in self._by_curves_alone(answer)]
         return leading_first(sorted(answers, key=lambda answer: -answer.probability))
 

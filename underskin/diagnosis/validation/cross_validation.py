@@ -19,7 +19,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import cell_response
 from underskin.diagnosis.noise import NoiseLevels
-from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.answers import Search, remainder
 from underskin.diagnosis.selection.unlisted_search import law_of, nearest_law
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -329,7 +329,6 @@ def nearest_law_findings(problem: FittingProblem, result: Search, null: Explanat
     return [Finding(Reason.NO_SIMPLE_LAW, "", "", arguments)]
 
 
-_ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
 NOISY = 2.0  # times the noise by the lines' roughness
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 
@@ -339,9 +338,9 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
     if problem.lines.smooth is None:
         return []
     findings = []
-    smooth, noise = _smooth_part(problem, explanation)
-    if _is_above_noise(smooth, noise):
-        findings.append(Finding(Reason.REMAINDER, "", "force_n", {"percent": 100 * smooth, "times": smooth / noise}))
+    found = remainder(explanation)
+    if found is not None:
+        findings.append(Finding(Reason.REMAINDER, "", "force_n", {"percent": 100 * found[0], "times": found[1]}))
     before, after = total(groups)
     if explanation.names and after.recordings and after.rmse_percent >= before.rmse_percent:
         arguments = {
@@ -357,17 +356,3 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
     """The largest noise floor of the recordings and of the groups held out [%]."""
     return max(score.floor_percent for score in (in_sample(problem, null), *(score.before for score in groups)))
-
-
-def _smooth_part(problem: FittingProblem, explanation: Explanation) -> tuple[float, float]:
-    """Of curves: the smooth residual and a sample's noise, both relative to the largest force.
-
-    The noise is at least that by differences of neighbouring samples.
-    """
-    lines, levels = problem.lines, explanation.best.levels
-    assert lines.smooth is not None
-    return levels.smooth, max(levels.level, 1.0) * float(np.median(lines.deviation / lines.smooth.scale))
-
-
-def _is_above_noise(smooth: float, noise: float) -> bool:
-    return smooth > max(_ABOVE_NOISE * noise, _LEAST_REMAINDER)
