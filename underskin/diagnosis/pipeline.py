@@ -22,7 +22,7 @@ from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
-from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search, telling_modulus
+from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search
 from underskin.diagnosis.selection.unlisted_search import with_laws
 from underskin.diagnosis.validation.cross_validation import (
     above_noise,
@@ -218,6 +218,7 @@ def _complete(
     partial = partial.with_findings(*_scatter_findings(problem, stated))
     shape = describe(problem, stated) if undescribed else None
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
+    determining = frozenset() if partial.joined is None else partial.joined.determining_modulus(stated.names)
     return replace(
         partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,
@@ -228,9 +229,7 @@ def _complete(
         groups=groups,
         confounded=remaining_confounding(confounded, result.answers),
         power=power(signatures, stated, result.supported),
-        shifts=hidden_shifts(
-            problem, signatures, stated, result.supported, telling_modulus(partial.joined, stated.names)
-        ),
+        shifts=hidden_shifts(problem, signatures, stated, result.supported, determining),
         shape=shape,
         plan=plan(problem, result, limits),
     )

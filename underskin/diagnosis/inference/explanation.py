@@ -285,16 +285,20 @@ class Request:
     alone: Explanation | None = None
     begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
     initial: Explanation | None = None  # from whose parameters the fit begins
-    kept: bool = False  # fitted to its end however far behind it begins, and explained though it gains nothing
+    never_pruned: bool = False  # fitted to its end however far behind, and explained though it gains nothing
 
     @property
     def without_scatter(self) -> bool:
         """Whether it is fitted without positioning scatter."""
         return self.parent is None or self.parent.has_position_scatter < _DECIDED
 
-    def target(self, has_position_scatter: bool) -> float:
+    def cost_to_beat(self, has_position_scatter: bool) -> float:
         """The cost below which a fit is better than the parent's of like scatter; ∞ where that cannot be compared."""
-        if self.parent is None or self.kept or (self.parent.has_position_scatter > 0.5) is not has_position_scatter:
+        if (
+            self.parent is None
+            or self.never_pruned
+            or (self.parent.has_position_scatter > 0.5) is not has_position_scatter
+        ):
             return np.inf
         return self.parent.best.cost - _LEAST_GAIN
 
@@ -306,12 +310,16 @@ class FittingProblem:
     """Recordings of one kind and their noise, to which hypotheses are fitted: all rows, and a mean a recording."""
 
     def __init__(
-        self, lines: Lines, table: SigmaTable, beside: OtherKindsLikelihood | None = None, gain: Plateau = GAIN_PRIOR
+        self,
+        lines: Lines,
+        table: SigmaTable,
+        other_kinds: OtherKindsLikelihood | None = None,
+        gain: Plateau = GAIN_PRIOR,
     ) -> None:
-        """Collapse, and work out how σ bends; curves are not collapsed and have no place. `beside` says what recordings
-        of other kinds know of a model's parameters; `gain` is the prior of the gain scatter's logarithm."""
+        """Collapse, and work out how σ bends; curves are not collapsed and have no place. `other_kinds` is what recordings
+        of other kinds say of a model's parameters; `gain` is the prior of the gain scatter's logarithm."""
         self.lines = lines
-        self.beside = beside
+        self.other_kinds = other_kinds
         self.gain = gain
         self.kind = kind = lines.kind
         self.table = table
@@ -329,7 +337,7 @@ class FittingProblem:
             if other is None:
                 lines = self.lines if whole else self.collapsed
                 model = compose(names, lines.campaign, self.table, self.kind, lines.mechanisms)
-                known = None if self.beside is None else self.beside(model, lines)
+                known = None if self.other_kinds is None else self.other_kinds(model, lines)
                 other = Hypothesis(model, lines, self.curvature, has_position_scatter, gain=self.gain, knowledge=known)
             self._hypotheses[key] = replace(other, has_position_scatter=has_position_scatter)
         return self._hypotheses[key]
@@ -370,7 +378,7 @@ class FittingProblem:
         scattering = _fitted(has_position_scatter, placed_starts, requests, best)
         _add(fits, scattering, log_priors[1])
         for number, _, evidence in scattering:
-            if evidence is None and np.isfinite(requests[number].target(True)):
+            if evidence is None and np.isfinite(requests[number].cost_to_beat(True)):
                 fits[number].clear()
         also_plain = {
             number: without_scatter(improved)
@@ -450,10 +458,12 @@ def _fitted(
     for members in groups(starts, hypotheses):
         fitter = Fitter([hypotheses[number] for number in members])
         points = stacked([starts[number] for number in members])
-        gains = np.array([requests[number].target(fitter.has_position_scatter) for number in members])[points.owner]
+        gains = np.array([requests[number].cost_to_beat(fitter.has_position_scatter) for number in members])[
+            points.owner
+        ]
         least = 1 if fitter.lines.curves else 0  # of curves every pair is tried, which begins from a single one
-        kept = [requests[number].kept or len(requests[number].names) <= least for number in members]
-        hopeless = np.where(kept, np.inf, _HOPELESS)[points.owner]
+        never_pruned = [requests[number].never_pruned or len(requests[number].names) <= least for number in members]
+        hopeless = np.where(never_pruned, np.inf, _HOPELESS)[points.owner]
 
         def target(at: Evaluated, gains: Floats = gains, hopeless: Floats = hopeless, best: float = best) -> Floats:
             return np.minimum(gains, min(best, float(at.cost.min())) + hopeless)

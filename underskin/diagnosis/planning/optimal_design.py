@@ -111,7 +111,7 @@ def _by_block(problem: FittingProblem, surviving: Sequence[Answer]) -> float | N
     """
     rivals = [answer for answer in surviving if answer.explanation is not None]
     wrong = np.array([WRONG_MODULUS in answer.names for answer in rivals])
-    if problem.lines.curves or problem.beside is not None or not wrong.any() or wrong.all():
+    if problem.lines.curves or problem.other_kinds is not None or not wrong.any() or wrong.all():
         return None
     moduli = [_log_modulus(answer.explanation) for answer in rivals if answer.explanation is not None]
     responses = np.array([[mean] for mean, _ in moduli])

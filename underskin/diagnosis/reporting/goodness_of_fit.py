@@ -260,12 +260,14 @@ def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any
     The parameters are those under the leading set, or under the curves' own best set where the kinds contradict each
     other.
     """
-    if joined.beside is None or joined.apart is None:
+    if joined.other_kinds is None or joined.apart is None:
         return []
     rows = []
-    for kind in joined.beside.kinds:
+    for kind in joined.other_kinds.kinds:
         curves = (
-            joined.beside.posterior_alone(kind) if joined.apart_is_likelier else joined.beside.posterior(kind, leading)
+            joined.other_kinds.posterior_alone(kind)
+            if joined.apart_is_likelier
+            else joined.other_kinds.posterior(kind, leading)
         )
         explanation = curves.best
         parameters = [
@@ -319,9 +321,9 @@ def moduli_clause(joined: KindsTogether, rows: Sequence[Mapping[str, Any]]) -> s
 
 def contradictions(joined: KindsTogether) -> list[dict[str, Any]]:
     """The statement that the kinds are not of one material, where this is more probable than the opposite."""
-    if joined.beside is None or not joined.apart_is_likelier:
+    if joined.other_kinds is None or not joined.apart_is_likelier:
         return []
-    kinds = [joined.problem.kind, *(kind.kind for kind in joined.beside.kinds)]
+    kinds = [joined.problem.kind, *(kind.kind for kind in joined.other_kinds.kinds)]
     named = " and ".join(_KIND_WORDS[kind] for kind in kinds)
     statement = (
         f"{named[0].upper()}{named[1:]} contradict each other (probability {in_percent(joined.contradictory)}): they "
@@ -333,9 +335,9 @@ def contradictions(joined: KindsTogether) -> list[dict[str, Any]]:
 def mechanisms_of_curves(joined: KindsTogether, names: Sequence[str], leading: Sequence[str]) -> list[dict[str, Any]]:
     """Name, parameters and share of the misfit of mechanisms that act on the additional curves only."""
     rows = []
-    for kind in () if joined.beside is None else joined.beside.kinds:
-        assert joined.beside is not None
-        curves = joined.beside.posterior(kind, leading)
+    for kind in () if joined.other_kinds is None else joined.other_kinds.kinds:
+        assert joined.other_kinds is not None
+        curves = joined.other_kinds.posterior(kind, leading)
         rows += [
             _of_mechanism(name, explanation, curves.fits[0][0])
             for explanation, _ in curves.fits

@@ -15,10 +15,8 @@ LARGEST = 4  # mechanisms in a set; four only where several kinds of recordings 
 UNSEEN_ODDS = 1.5  # odds of one more mechanism than shows, for its effect on d33; on the virtual rig about 1.4
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _LEAST_ON_CURVES = 5.0  # the same on curves, whose neighbouring samples may share errors outside the noise model
-_DECLARED_PRIOR, _LEAST_OF_DECLARED = (
-    0.5,
-    3.0,
-)  # of a law that follows from declared facts: prior, and nats it must bring
+_DECLARED_PRIOR = 0.5  # of a law that follows from declared facts
+_LEAST_OF_DECLARED = 3.0  # nats that such a law must bring to be named
 
 
 def least_evidence(explanation: Explanation) -> float:

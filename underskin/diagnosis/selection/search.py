@@ -42,7 +42,7 @@ def search(problem: FittingProblem, required_sets: Sequence[frozenset[str]] = ()
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
         singles = [replace(request, begin=sets.explanations[frozenset()].point) for request in singles]
     sets.explain(singles)
-    sets.explain([Request(sets.ordered(names), kept=True) for names in required_sets if len(names) > 1])
+    sets.explain([Request(sets.ordered(names), never_pruned=True) for names in required_sets if len(names) > 1])
     for size in range(2, (LARGEST if required_sets else _LARGEST) + 1):
         sets.integrate(1)
         sets.grow(size)
@@ -168,17 +168,17 @@ def frf_problem(
     return FittingProblem(measured, table)
 
 
-_ALSO = 2  # answers of recordings alone whose sets are tried together with those of the curves
-_TOLD = 0.05  # standard deviation of the logarithm of a modulus that is told
-_APART = 3e-3  # prior of kinds that are not of one material
+_OF_THE_OTHERS = 2  # answers of the recordings alone whose sets are tried together with those of the curves
+_DETERMINED = 0.05  # standard deviation of the logarithm of a modulus that is determined well enough for d33
+_DIFFERENT_MATERIAL = 3e-3  # prior of kinds that are not of one material
 
-# Recordings explained beside the curves of other kinds, with sets that are to be among those tried; or alone
-Fitted = Callable[[CurveLikelihood | None, Sequence[frozenset[str]]], tuple[FittingProblem, Search]]
+# Explain recordings, with the curves of other kinds or alone; some sets are required among those tried.
+Explain = Callable[[CurveLikelihood | None, Sequence[frozenset[str]]], tuple[FittingProblem, Search]]
 
 
 @dataclass(frozen=True)
 class KindsTogether:
-    """The recordings of the kind that gives the verdict, with what the others tell.
+    """The recordings of the kind that gives the verdict, with what the other kinds say.
 
     `search` on the `problem` that stands; `apart` is the search on these recordings alone, None where there is no
     other kind; `contradictory` is the probability that the kinds are not of one material.
@@ -186,7 +186,7 @@ class KindsTogether:
 
     problem: FittingProblem
     search: Search
-    beside: CurveLikelihood | None = None
+    other_kinds: CurveLikelihood | None = None
     apart: Search | None = None
     contradictory: float = 0.0
 
@@ -197,62 +197,68 @@ class KindsTogether:
 
     def shows_on_curves(self, name: str, names: Sequence[str]) -> bool:
         """Whether a mechanism of a set shows on the recordings of another kind."""
-        beside = self.search.other_kinds
-        if beside is None:
+        curves = self.search.other_kinds
+        if curves is None:
             return False
         others = [other for other in names if other != name]
-        both = [(beside.posterior(kind, names), beside.posterior(kind, others)) for kind in beside.kinds]
-        return any(whole.log_weight > smaller.log_weight + least_evidence(whole.best) for whole, smaller in both)
+        both = [(curves.posterior(kind, names), curves.posterior(kind, others)) for kind in curves.kinds]
+        return any(fit.log_weight > smaller.log_weight + least_evidence(fit.best) for fit, smaller in both)
+
+    def determining_modulus(self, names: Sequence[str]) -> frozenset[Kind]:
+        """The other kinds that determine the modulus, under a set of mechanisms, as well as d33 needs it."""
+        curves = self.other_kinds
+        kinds = () if curves is None else curves.kinds
+        return frozenset(
+            kind.kind
+            for kind in kinds
+            if curves is not None and curves.posterior(kind, names).modulus_deviation < _DETERMINED
+        )
 
 
 class OtherKinds:
     """The curves of other kinds than the one that gives the verdict."""
 
     def __init__(self, campaigns: Mapping[Kind, Campaign], table: SigmaTable, without: Sequence[str]) -> None:
-        """By kind; mechanisms `without` which all is to be explained."""
+        """By kind; `without` are the mechanisms that are left out."""
         self._campaigns, self._table, self._without = campaigns, table, without
 
     @cached_property
     def _kinds(self) -> list[OtherKind]:
         """Each searched as if it were alone."""
-        found = []
+        kinds = []
         for kind, campaign in self._campaigns.items():
             problem = free_modulus_problem(campaign, kind, self._table, self._without)
-            found.append(OtherKind(kind, problem, search(problem).explanations))
-        return found
+            kinds.append(OtherKind(kind, problem, search(problem).explanations))
+        return kinds
 
-    def joined(self, fitted: Fitted) -> KindsTogether:
-        """With the recordings that `fitted` explains, beside these or alone."""
+    def joined(self, explain: Explain) -> KindsTogether:
+        """The recordings that `explain` takes, together with these curves or alone, whichever is more probable."""
         if not self._campaigns:
-            return KindsTogether(*fitted(None, ()))
-        alone, apart = fitted(None, ())
-        beside = CurveLikelihood(self._kinds, apart.explanations)
-        best = [frozenset(one.explanation.names) for one in apart.answers[:_ALSO] if one.explanation is not None]
-        problem, together = fitted(beside, beside.required_sets(alone.lines, best))
-        log_apart = _log_apart(apart, beside) + np.log(_APART)
-        log_together = together.log_total + np.log1p(-_APART)
+            return KindsTogether(*explain(None, ()))
+        problem_alone, apart = explain(None, ())
+        curves = CurveLikelihood(self._kinds, apart.explanations)
+        best = [
+            frozenset(answer.explanation.names)
+            for answer in apart.answers[:_OF_THE_OTHERS]
+            if answer.explanation is not None
+        ]
+        problem, together = explain(curves, curves.required_sets(problem_alone.lines, best))
+        log_apart = _log_apart(apart, curves) + np.log(_DIFFERENT_MATERIAL)
+        log_together = together.log_total + np.log1p(-_DIFFERENT_MATERIAL)
         contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
-        explained_alone = KindsTogether(alone, apart, beside, apart, contradictory)
-        if explained_alone.apart_is_likelier:
-            return explained_alone
-        return KindsTogether(problem, replace(together, other_kinds=beside), beside, apart, contradictory)
+        alone = KindsTogether(problem_alone, apart, curves, apart, contradictory)
+        if alone.apart_is_likelier:
+            return alone
+        return KindsTogether(problem, replace(together, other_kinds=curves), curves, apart, contradictory)
 
 
-def telling_modulus(joined: KindsTogether | None, names: Sequence[str]) -> frozenset[Kind]:
-    """The other kinds that tell the modulus, under a set of mechanisms, as well as it must be known for d33."""
-    if joined is None or joined.beside is None:
-        return frozenset()
-    beside = joined.beside
-    return frozenset(kind.kind for kind in beside.kinds if beside.posterior(kind, names).modulus_deviation < _TOLD)
-
-
-def _log_apart(apart: Search, beside: CurveLikelihood) -> float:
+def _log_apart(apart: Search, curves: CurveLikelihood) -> float:
     """The logarithm of the sum over what recordings alone say, times what curves say with parameters of their own."""
     return float(
         np.logaddexp.reduce(
             [
-                weight + sum(beside.log_evidence_apart(kind, entry.names, apart.supported) for kind in beside.kinds)
-                for entry, weight in apart.weighed
+                weight + sum(curves.log_evidence_apart(kind, fitted.names, apart.supported) for kind in curves.kinds)
+                for fitted, weight in apart.weighed
             ]
         )
     )

@@ -372,7 +372,7 @@ class FleetSkin:
 
     def _about_batch(self, model: Model, lines: Lines, held: Sequence[str]) -> Gaussian:
         """The likelihood that `held` E and thickness are near the batch's, times that by recordings of other kinds."""
-        other_kinds = self.candidate.problem.beside
+        other_kinds = self.candidate.problem.other_kinds
         slices = parameter_slices(model.names, lines)
         rows = [ERRORS.index(name) for name in held]
         matrix = np.eye(len(model.parameters))[[slices[name].start for name in held]]

@@ -188,7 +188,7 @@ def _hold_out_group(
     log_prior: Callable[[Explanation], float],
 ) -> HeldOut | None:
     """Predict one group from the rest; None where the rest does not support the null hypothesis."""
-    training = FittingProblem(problem.lines.part(~rows), problem.table, problem.beside)
+    training = FittingProblem(problem.lines.part(~rows), problem.table, problem.other_kinds)
     candidates = {explanation.names: explanation for explanation in (null, *rivals)}
     fits = {
         explanation.names: explanation
