@@ -247,15 +247,9 @@ def subtract_pickup_slopes(
                         vv[point, recording_index, p, q] -= loss * (of_p.real * of_q.real + of_p.imag * of_q.imag)
 
 
-_PIVOTS_TOGETHER = 8  # factors of a determinant that share one logarithm: below 1e38 each, they do not overflow
-_LOWEST, _HIGHEST = -1.0, 5.0  # of log κ
-_TOLERANCE = 1e-3
-_SECTION = 0.6180339887498949  # golden
-
-
-@compiled("void(float64[:, :, ::1], float64[:, ::1], float64[::1], float64[:, ::1])")
-def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) -> None:
-    """ln p(y) with a law less that without, ½ (a² mᵀ (I + a² G)⁻¹ m − ln |I + a² G|), by Cholesky's factors.
+@compiled("void(float64[:, :, ::1], float64[:, ::1], float64[::1])")
+def law_gains(grams: Floats, moments: Floats, gains: Floats) -> None:
+    """ln p(y) with a law less that without, ½ (mᵀ (I + G)⁻¹ m − ln |I + G|), by Cholesky's factors.
 
     Parameters
     ----------
@@ -263,32 +257,28 @@ def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) ->
         G (sets, features, features), AᵀC⁻¹A of the features A.
     moments
         m (sets, features), AᵀC⁻¹r of the residual r.
-    amplitudes
-        a.
     gains
-        (sets, amplitudes), to be filled.
+        (sets,), to be filled.
     """
     size = moments.shape[1]
     lower, solved = np.empty((size, size)), np.empty(size)
     for number in range(len(moments)):
-        for which in range(len(amplitudes)):
-            a2 = amplitudes[which] ** 2
-            determinant = square = 0.0
-            for i in range(size):
-                for j in range(i):
-                    total = a2 * grams[number, i, j]
-                    for k in range(j):
-                        total -= lower[i, k] * lower[j, k]
-                    lower[i, j] = total / lower[j, j]
-                total, right = 1 + a2 * grams[number, i, i], moments[number, i]
-                for k in range(i):
-                    total -= lower[i, k] ** 2
-                    right -= lower[i, k] * solved[k]
-                lower[i, i] = np.sqrt(total)
-                solved[i] = right / lower[i, i]
-                determinant += np.log(total)
-                square += solved[i] ** 2
-            gains[number, which] = 0.5 * (a2 * square - determinant)
+        determinant = square = 0.0
+        for i in range(size):
+            for j in range(i):
+                total = grams[number, i, j]
+                for k in range(j):
+                    total -= lower[i, k] * lower[j, k]
+                lower[i, j] = total / lower[j, j]
+            total, right = 1 + grams[number, i, i], moments[number, i]
+            for k in range(i):
+                total -= lower[i, k] ** 2
+                right -= lower[i, k] * solved[k]
+            lower[i, i] = np.sqrt(total)
+            solved[i] = right / lower[i, i]
+            determinant += np.log(total)
+            square += solved[i] ** 2
+        gains[number] = 0.5 * (square - determinant)
 
 
 @compiled("void(float64[:, ::1], int64[::1], int64[::1], float64[:, ::1], float64[:, :, :, ::1])")

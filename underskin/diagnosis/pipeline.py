@@ -193,6 +193,7 @@ def _complete(
 ) -> DiagnosisResult:
     """All steps after the search."""
     progress(0.65)
+    result = replace(result, other_tip=_other_tip_share(partial, problem))
     signatures = Signatures(problem)
     confounded = confounding(signatures)
     progress(0.7)
@@ -205,9 +206,6 @@ def _complete(
     supported = [explanation for explanation in ranked if result.is_supported(explanation)]
     groups = held_out(problem, result, supported, null)
     progress(0.95)
-    result = replace(result, other_tip=_other_tip_share(partial, problem))
-    leader = result.answers[0]
-    stated = result.fit_behind(leader)
     floor = largest_floor_percent(problem, null, groups)
     if leader.explanation is null and floor > _LARGEST_FLOOR:
         return replace(partial, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
@@ -256,7 +254,9 @@ def _scatter_findings(problem: FittingProblem, stated: Explanation) -> list[Find
 
 
 def _other_tip_share(partial: DiagnosisResult, problem: FittingProblem) -> float:
-    """The share of curves whose tip looks like a cone, for which there is no mechanism."""
+    """The share of curves whose tip looks like a cone, for which there is no mechanism; 0 of FRFs."""
+    if not problem.lines.curves:
+        return 0.0
     tips = {finding.recording for finding in partial.findings if finding.reason is Reason.TIP_SHAPE}
     return min(len(tips) / problem.lines.recordings, 1.0)
 

@@ -316,8 +316,8 @@ class FittingProblem:
         other_kinds: OtherKindsLikelihood | None = None,
         gain: Plateau = GAIN_PRIOR,
     ) -> None:
-        """Collapse, and work out how σ bends; curves are not collapsed and have no place. `other_kinds` is what recordings
-        of other kinds say of a model's parameters; `gain` is the prior of the gain scatter's logarithm."""
+        """`other_kinds` is what recordings of other kinds say of a model's parameters, `gain` the prior of the gain
+        scatter's logarithm; lines of FRFs are collapsed to a mean for each recording."""
         self.lines = lines
         self.other_kinds = other_kinds
         self.gain = gain
@@ -338,7 +338,9 @@ class FittingProblem:
                 lines = self.lines if whole else self.collapsed
                 model = compose(names, lines.campaign, self.table, self.kind, lines.mechanisms)
                 known = None if self.other_kinds is None else self.other_kinds(model, lines)
-                other = Hypothesis(model, lines, self.curvature, has_position_scatter, gain=self.gain, knowledge=known)
+                other = Hypothesis(
+                    model, lines, self.curvature, has_position_scatter, gain=self.gain, other_kinds=known
+                )
             self._hypotheses[key] = replace(other, has_position_scatter=has_position_scatter)
         return self._hypotheses[key]
 

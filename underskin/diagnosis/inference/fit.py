@@ -90,7 +90,7 @@ class Fitter:
             self._precision[number, indices], self._centre[number, indices] = priors[:2]
             self._log_prior_height[number], self._freedom[number, indices] = priors[2].sum(), priors[3]
         self._range = self.high - self.low
-        gaussians = [hypothesis.knowledge for hypothesis in hypotheses]
+        gaussians = [hypothesis.other_kinds for hypothesis in hypotheses]
         self._gaussians = (
             GaussianBatch(gaussians, shape[1]) if any(gaussian is not None for gaussian in gaussians) else None
         )

@@ -393,9 +393,8 @@ class Hypothesis:
     curvature: Curvature
     has_position_scatter: bool
     gain: Plateau = GAIN_PRIOR
-    position: Plateau = POSITION_PRIOR
     smooth: Plateau = USUAL  # η of curves
-    knowledge: Gaussian | None = None  # from recordings of other kinds
+    other_kinds: Gaussian | None = None  # from recordings of other kinds
 
     @cached_property
     def mean_indices(self) -> list[int]:
@@ -413,8 +412,8 @@ class Hypothesis:
             CovarianceParameter("level", np.log(low), np.log(high), level),
         ]
         if self.has_position_scatter:
-            highest = self.position.high + np.log(2.0)
-            common.append(CovarianceParameter("position", np.log(2e-5), highest, self.position))
+            highest = POSITION_PRIOR.high + np.log(2.0)
+            common.append(CovarianceParameter("position", np.log(2e-5), highest, POSITION_PRIOR))
         if self.lines.curves:
             common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth))
         of_model = [
@@ -449,7 +448,7 @@ class Hypothesis:
         """A key that is equal for hypotheses that can be evaluated together; `number` makes it unique for those that
         cannot."""
         names = tuple(parameter.name for parameter in self.covariance)
-        return number if self.lines.curves else (self.gain, self.position, names)
+        return number if self.lines.curves else (self.gain, POSITION_PRIOR, names)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:

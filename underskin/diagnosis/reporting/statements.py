@@ -26,7 +26,7 @@ from underskin.diagnosis.localisation import (
 from underskin.diagnosis.planning.optimal_design import WRONG_MODULUS, NextRecordings
 from underskin.diagnosis.reporting import numbers
 from underskin.diagnosis.reporting.unlisted_law import LeadingLaw
-from underskin.diagnosis.selection.answers import Answer, Search
+from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Answer, Search
 from underskin.diagnosis.validation.cross_validation import REACHES_NOISE
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
 from underskin.findings.codes import Reason
@@ -34,7 +34,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.prediction import plausibility
 
-_MOST_UNLISTED = 0.016  # largest probability of none_of_these where no process is supported
+_MOST_UNLISTED = P_NOT_IN_MODEL_SPACE + 1e-3  # largest probability of none_of_these where no unlisted law shows
 _IN_PERCENT = 90.0  # beyond it an effect is given as a factor
 
 

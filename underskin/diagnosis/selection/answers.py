@@ -9,7 +9,7 @@ tables under answers of some probability are kept; the others are left out and t
 """
 
 import math
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +19,7 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
-from underskin.diagnosis.selection.priors import log_prior_beneath_of, log_prior_of, must_gain
+from underskin.diagnosis.selection.priors import log_prior_of, log_prior_of_discrepancy, must_gain
 from underskin.mechanisms.unlisted.laws import UnlistedLaw
 
 P_NOT_IN_MODEL_SPACE = 0.015  # probability that none of what was compared is right
@@ -52,9 +52,9 @@ class Answer:
 
 def leading_first(ranked: Sequence[Answer]) -> list[Answer]:
     """Answers, the most probable first, with the first one of the most probable kind before all others."""
-    by_kind: Counter[str] = Counter()
+    by_kind = defaultdict[str, float](float)
     for answer in ranked:
-        by_kind[answer.kind] += answer.probability  # type: ignore[assignment]  # counts may be fractions
+        by_kind[answer.kind] += answer.probability
     most = max(by_kind, key=lambda kind: by_kind[kind])
     leader = next(answer for answer in ranked if answer.kind == most)
     return [leader, *(answer for answer in ranked if answer is not leader)]
@@ -94,12 +94,12 @@ class Search:
         laws = [mechanisms[name] for name in explanation.names if name not in mechanisms.named]
         if not laws:
             return log_prior_of(explanation, self.supported)
-        prior = log_prior_beneath_of(explanation, self.supported, laws=1)
+        prior = log_prior_of_discrepancy(explanation, self.supported, laws=1)
         return prior + sum(law.log_share for law in laws if isinstance(law, UnlistedLaw))
 
     def log_prior_beneath(self, explanation: Explanation) -> float:
         """The logarithm of the prior of an unlisted law on top of a set."""
-        return log_prior_beneath_of(explanation, self.supported)
+        return log_prior_of_discrepancy(explanation, self.supported)
 
     def log_weight(self, explanation: Explanation) -> float:
         """The logarithm of prior times evidence."""
@@ -160,14 +160,16 @@ class Search:
         Of nothing, all sets of known mechanisms, and none of these, the most probable leads, and of sets the most
         probable one: what many sets share is no reason to say that no known mechanism describes it.
         """
-        named = [pair for pair in self.weighed if pair[0].names or remainder(pair[0]) is None]
-        unlisted = [*self.weighed_laws, *(pair for pair in self.weighed if pair not in named)]
+        named: list[tuple[Explanation, float]] = []
+        unlisted = list(self.weighed_laws)
+        for fitted, weight in self.weighed:
+            (named if fitted.names or remainder(fitted) is None else unlisted).append((fitted, weight))
         log_unlisted = np.logaddexp.reduce([weight for _, weight in unlisted]) if unlisted else -np.inf
         weights = np.array([*(weight for _, weight in named), log_unlisted])
         probabilities = (1 - P_NOT_IN_MODEL_SPACE) * np.exp(weights - np.logaddexp.reduce(weights))
         probabilities[-1] += P_NOT_IN_MODEL_SPACE
         if self.other_tip:
-            probabilities[-1] = max(probabilities[-1], self.other_tip * probabilities[:-1].max())
+            probabilities[-1] = max(probabilities[-1], self.other_tip * probabilities[:-1].max(initial=0.0))
             probabilities /= probabilities.sum()
         answers = list(map(Answer, [*(fitted for fitted, _ in named), None], probabilities.tolist()))
         answers = [part for answer in answers for part in self._by_curves_alone(answer)]

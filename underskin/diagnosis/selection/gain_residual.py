@@ -176,9 +176,9 @@ class GainResidual:
             size, ur, uu = best.marginal.projections(position)
             size = self._above_faint(size)
             second_order = best.hypothesis.curvature.square
-            has_position_scatter = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order
+            position_variance = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order
             log_weights = GAIN_PRIOR.log_density(np.log(_GAINS)) + np.log(share) - np.log(np.abs(size)).sum()
-            variances = _GAINS[:, None] ** 2 + has_position_scatter + uu / size**2
+            variances = _GAINS[:, None] ** 2 + position_variance + uu / size**2
             scatters.append(ScatterNodes(log_weights, ur / size - self._offset, variances))
         return scatters
 
@@ -208,12 +208,10 @@ class GainResidual:
         """Without scatter of position, at one usual scatter of gain."""
         return self._density_without_law(self.usual[0]).at(np.arange(len(_GAINS)) == _USUAL_GAIN_NODE)
 
-    def gains(self, sets: Floats, amplitudes: Floats) -> Floats:
-        """Gain in log evidence of each set of features (sets, recordings, features) over none (sets,).
-
-        Marginalised over the priors of the scatters and over the amplitudes, which are equally probable.
-        """
-        log_densities = [_log_densities_with(block, amplitudes, self._at_usual_scatters) for block in _blocks(sets)]
+    def gains(self, sets: Floats) -> Floats:
+        """Gain in log evidence of each set of features (sets, recordings, features), of amplitudes of prior sd 1, over
+        none (sets,), marginalised over the priors of the scatters."""
+        log_densities = [_log_densities_with(block, self._at_usual_scatters) for block in _blocks(sets)]
         return np.asarray(logsumexp(np.concatenate(log_densities, axis=1), axis=0) - self._log_density_without)
 
     def amplitudes(self, sets: Floats) -> Floats:
@@ -234,20 +232,17 @@ def _modes(sets: Floats, without: _WithoutLaw) -> Floats:
     return np.asarray(np.linalg.solve(gram, (sets.transpose(0, 2, 1) @ without.weighted[0])[..., None])[..., 0])
 
 
-def _log_densities_with(sets: Floats, amplitudes: Floats, without: _WithoutLaw) -> Floats:
+def _log_densities_with(sets: Floats, without: _WithoutLaw) -> Floats:
     """log p(residual, features) at each scatter (scatters, sets)."""
-    from underskin.diagnosis.kernels import gained
+    from underskin.diagnosis.kernels import law_gains
 
     count, rows, size = sets.shape
     columns = np.ascontiguousarray(sets.transpose(1, 0, 2)).reshape(rows, -1)
     gram = without.products(columns, count)
     moment = (without.weighted @ columns).reshape(-1, count, size).swapaxes(0, 1)
-    log_gains = np.empty((count * len(without.root), len(amplitudes)))
-    gained(gram.reshape(-1, size, size), np.ascontiguousarray(moment).reshape(-1, size), amplitudes, log_gains)
-    log_mean_gains = np.logaddexp.reduce(log_gains.reshape(count, -1, len(amplitudes)), axis=-1) - np.log(
-        len(amplitudes)
-    )
-    return np.asarray(without.log_density[:, None] + log_mean_gains.T)
+    gains = np.empty(count * len(without.root))
+    law_gains(gram.reshape(-1, size, size), np.ascontiguousarray(moment).reshape(-1, size), gains)
+    return np.asarray(without.log_density[:, None] + gains.reshape(count, -1).T)
 
 
 def _grams(columns: Floats, count: int) -> Floats:

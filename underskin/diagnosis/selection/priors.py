@@ -44,7 +44,7 @@ def log_prior_of(explanation: Explanation, supported: int) -> float:
     return log_prior(guess_count(explanation), supported - len(declared)) + len(declared) * math.log(_DECLARED_PRIOR)
 
 
-def log_prior_beneath_of(explanation: Explanation, supported: int, laws: int = 0) -> float:
+def log_prior_of_discrepancy(explanation: Explanation, supported: int, laws: int = 0) -> float:
     """Log prior of an undescribed discrepancy on top of a set, which holds `laws` unlisted laws."""
     declared = declared_laws(explanation.best.hypothesis.lines)
     size = guess_count(explanation) - laws

@@ -27,11 +27,11 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_PARENTS, _LARGEST = 3, 3
+_PARENTS, _LARGEST_OF_ONE_KIND = 3, 3
 _INTEGRATED_ANYHOW = 3  # sets whose evidence is integrated in any case
-_WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
+_INTEGRATED_WITHIN = 6.0  # nats behind the best within which integrating, which moves it by less than 2, may matter
 _PAIRED = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.LOAD_INCREMENT)  # of which two may cancel
-_BEHIND = 12.0  # nats behind the best beyond which a single is no parent
+_PARENT_WITHIN = 12.0  # nats behind the best within which a single is a parent
 
 
 def search(problem: FittingProblem, required_sets: Sequence[frozenset[str]] = ()) -> Search:
@@ -43,7 +43,7 @@ def search(problem: FittingProblem, required_sets: Sequence[frozenset[str]] = ()
         singles = [replace(request, begin=sets.explanations[frozenset()].point) for request in singles]
     sets.explain(singles)
     sets.explain([Request(sets.ordered(names), never_pruned=True) for names in required_sets if len(names) > 1])
-    for size in range(2, (LARGEST if required_sets else _LARGEST) + 1):
+    for size in range(2, (LARGEST if required_sets else _LARGEST_OF_ONE_KIND) + 1):
         sets.integrate(1)
         sets.grow(size)
     sets.integrate(_INTEGRATED_ANYHOW)
@@ -112,7 +112,7 @@ class _Sets:
         """Integrate the evidence that may count, and that of the `best` in any case."""
         weight = self.search.log_weight
         ranked = sorted(self.explanations, key=lambda names: weight(self.explanations[names]), reverse=True)
-        least = weight(self.explanations[ranked[0]]) - _WITHIN
+        least = weight(self.explanations[ranked[0]]) - _INTEGRATED_WITHIN
         chosen = [
             names
             for rank, names in enumerate(ranked)
@@ -153,7 +153,7 @@ class _Sets:
         ranked = sorted(self.explanations.values(), key=weight, reverse=True)
         smaller = [fitted for fitted in ranked if len(fitted.names) == size - 1]
         if size == 2:
-            return [fitted for fitted in smaller[:_PARENTS] if weight(fitted) > weight(ranked[0]) - _BEHIND]
+            return [fitted for fitted in smaller[:_PARENTS] if weight(fitted) > weight(ranked[0]) - _PARENT_WITHIN]
         best = next(fitted for fitted in ranked if len(fitted.names) < size)
         required = [fitted for fitted in smaller if frozenset(fitted.names) in self.required][:1]
         return [fitted for fitted in smaller if fitted is best or fitted in required]

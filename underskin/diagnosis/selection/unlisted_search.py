@@ -43,7 +43,6 @@ from underskin.recordings.campaign import curves_of
 from underskin.units import Array, Floats, Indices
 
 Law = TypeVar("Law", bound=UnlistedLaw)
-_USUAL_CHANGE = np.array([1.0])  # times the sd of each amplitude's prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +139,7 @@ class Screening:
             columns = self._sensitivity[group.laws[0].description.acts_on].T
             changes = np.concatenate([features * column[:, None] for column in columns], axis=2)
             changes *= group.scale[:, None]
-            yield from group.scores(residual.gains(changes, _USUAL_CHANGE), residual.amplitudes(changes))
+            yield from group.scores(residual.gains(changes), residual.amplitudes(changes))
 
     def _along_lines(self, explanation: Explanation) -> Iterator[Score]:
         weights, moments, noise = self._moments(explanation)

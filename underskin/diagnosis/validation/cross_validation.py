@@ -47,7 +47,6 @@ class PredictionScore:
     log_score: float = 0.0  # Σ log predictive density of the recordings' levels, relative
     recordings: int = 0
     pickup: float = 0.0  # the part of `noise` from mains pick-up
-    parameter_variance: float = 0.0  # of curves: Σ of the variance from the parameters, fitted to the rest of the curve
 
     def __add__(self, other: "PredictionScore") -> "PredictionScore":
         return PredictionScore(
@@ -212,13 +211,7 @@ def _predict(
     model = problem.hypothesis(explanation.names, has_position_scatter=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
     if not isinstance(model, FrfModel):
-        prediction = model.predict(point.fit)
-        slopes = prediction.slopes[explanation.best.hypothesis.mean_indices][:, rows]
-        parameter_variance = float(np.einsum("ir,ij,jr->", slopes, explanation.best.covariance, slopes))
-        return replace(
-            _predict_curves(problem.lines, levels, prediction.value.real, rows, training),
-            parameter_variance=parameter_variance,
-        )
+        return _predict_curves(problem.lines, levels, model.predict(point.fit).value.real, rows, training)
     prediction = model.predict(point.fit, slopes=False, place=False)
     trained = np.isin(held_out_lines.sensor, training.lines.sensor)
     gains = np.zeros(max(int(held_out_lines.sensor.max()), int(training.lines.sensor.max())) + 1)

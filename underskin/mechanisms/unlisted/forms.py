@@ -8,7 +8,6 @@ own, since a fit does not move from one to the next.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import get_args
 
 import numpy as np
 
@@ -23,13 +22,11 @@ Feature = Differentiated | Floats
 EVERYWHERE = "everywhere"  # the variant of a linear law that does not change along its axis
 Features = Callable[[Floats, Values], Sequence[Feature]]
 
-FORMS: tuple[Form, ...] = get_args(Form)
 _LEAST_LEVELS = {"power": 3, "exponential": 5, "saturating": 4, "threshold": 4, "periodic": 6, "peak": 6, "free": 4}
 _MOST_WORDS = 64  # of an axis that has a law of each
 _MOST_EDGES, _MOST_PERIODS = 24, 48
 _SHORTEST_PERIOD = 3.0  # levels
 _LANDMARKS, _LENGTH = 6, 0.3  # of a free process, over the range
-_FROM_PLACES = ("x_mm", "y_mm")
 _LATE, _SHARP = "how soon it sets in, over the measured range", "anywhere within the measured range"
 
 
@@ -46,7 +43,6 @@ class Shape:
     shape_parameters: tuple[Parameter, ...] = ()  # not amplitudes
     grid: tuple[tuple[float, ...], ...] = ((),)  # their values that a screening tries
     logarithmic: bool = False  # the feature is that of the logarithm: a power
-    needs_peak: bool = False
 
     @cached_property
     def points(self) -> Floats:
@@ -214,7 +210,7 @@ def _peak(axis: Axis) -> list[Shape]:
         away = (x - values["law_centre"]) / values["law_width"]
         return [1.0 / (1.0 + away * away)]
 
-    return [Shape("peak", peaking, shape_parameters=(centre, width), grid=grid, needs_peak=True)]
+    return [Shape("peak", peaking, shape_parameters=(centre, width), grid=grid)]
 
 
 def _free(axis: Axis) -> list[Shape]:
