@@ -84,8 +84,8 @@ def searched(document: Result) -> tuple[FittingProblem, Search] | None:
     inspected = inspect(campaign, table)
     if inspected.lacking:
         return None
-    problem = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
-    return problem, search(problem)
+    problem, fitted = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
+    return problem, search(problem, fitted)
 
 
 def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, Any]) -> Explanation:

@@ -1,5 +1,6 @@
 """Misses of the search: told where the hidden set was left out, and none where scatter of position misled it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -10,7 +11,7 @@ from proof.text_wide import is_miss
 from proof.true_starts import true_values
 from rig.wide_tails import WIDE
 from tests.support.cases import first
-from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import search
 
@@ -75,8 +76,8 @@ def test_fit_stopped_hopeless_taken_up_scatter() -> None:
 def test_search_leaves_hidden_set_out_misses(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search that leaves the hidden set out misses it."""
 
-    def shorter(problem: FittingProblem) -> Search:
-        found = search(problem)
+    def shorter(problem: FittingProblem, fitted: Sequence[Explanation]) -> Search:
+        found = search(problem, fitted)
         return replace(found, explanations=tuple(entry for entry in found.explanations if len(entry.names) < 2))
 
     monkeypatch.setattr("proof.search_misses.search", shorter)

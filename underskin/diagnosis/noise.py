@@ -26,7 +26,8 @@ Noise of single lines, from their roughness along frequency. Real and imaginary 
 d² = rel(f)² A² + floor², A the recording's amplitude around the line. The part common to all recordings at a frequency
 is subtracted, then each line is compared with its two neighbours,
     e_j = z_j − λ z_(j−1) − (1−λ) z_(j+1)   (linear in log f),   E|e_j|²/2 = d_j² + λ² d_(j−1)² + (1−λ)² d_(j+1)²,
-which smooth misfit hardly affects; steep changes, such as the flank of a resonance that moves with the preload, do.
+which smooth misfit hardly affects. Steep changes, such as the flank of a resonance that moves with the preload, do:
+where a law describes them, its prediction is subtracted too (`frf_problem`).
 log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that outliers (mains, a
 resonance between two lines) do not count, and the level is set by the median of |e|².
 Where `coherence` γ² is given, (1 − γ²)/γ² is proportional to (d/A)² (with an unknown number of averages) and
@@ -274,14 +275,17 @@ def line_noise(
     recording: Indices,
     coherence: Floats,
     uneven: Floats,
+    predicted: Complexes | None = None,
 ) -> LineNoise:
-    """The noise of the rows, which are sorted by recording and by frequency within each."""
+    """The noise of the rows, which are sorted by recording and by frequency within each; the changes with frequency
+    that a law has `predicted` (rows,) are no noise."""
     from underskin.diagnosis.kernels import roughness_cost
 
     if len(value) == 0:
         return LineNoise(np.zeros(0), 1.0, 0.0)
     amplitude = local_amplitude(value, recording)
-    middle, share, rough = _roughness(_without_shared(value, frequency, recording), frequency, recording)
+    residual = value if predicted is None else value - predicted
+    middle, share, rough = _roughness(_without_shared(value, frequency, recording, residual), frequency, recording)
     distinct, line = np.unique(frequency, return_inverse=True)
     knots = _knots(np.log(distinct))
     hats = _hats(np.log(distinct), knots)
@@ -376,22 +380,22 @@ def _roughness(z: Complexes, frequency: Floats, recording: Indices) -> tuple[Ind
     return middle, share, np.abs(z[middle] - share * z[middle - 1] - (1 - share) * z[middle + 1]) ** 2 / 2
 
 
-def _without_shared(value: Complexes, frequency: Floats, recording: Indices) -> Complexes:
-    """The lines (rows,) minus each recording's level times the part common to all recordings at that frequency, where
-    there are at least `_SHARED`."""
+def _without_shared(value: Complexes, frequency: Floats, recording: Indices, residual: Complexes) -> Complexes:
+    """The `residual` of the lines (rows,) minus each recording's level times the part common to all recordings at that
+    frequency, where there are at least `_SHARED`."""
     edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
     level = np.array([np.median(value.real[low:high]) for low, high in itertools.pairwise(edges.tolist())])
-    ratio = value / np.where(level == 0, 1.0, level)[recording]
+    ratio = residual / np.where(level == 0, 1.0, level)[recording]
     _, line, count = np.unique(np.round(frequency, 9), return_inverse=True, return_counts=True)
     if count[line].min() < _SHARED:
-        return value
+        return residual
     shared = np.empty(len(count), dtype=complex)
     strong = np.abs(level)[recording] > 0.3 * np.median(np.abs(level))
     for number, rows in enumerate(np.split(np.argsort(line, kind="stable"), np.cumsum(count)[:-1])):
         chosen = ratio[rows[strong[rows]]]
         chosen = chosen if len(chosen) else ratio[rows]
         shared[number] = np.median(chosen.real) + 1j * np.median(chosen.imag)
-    return value - level[recording] * shared[line]
+    return residual - level[recording] * shared[line]
 
 
 def _knots(log_f: Floats) -> Floats:

@@ -145,14 +145,14 @@ def _search_frf(
     inspection: Inspected, table: SigmaTable, mechanisms: ActiveCatalogue, other_kinds: OtherKinds
 ) -> KindsTogether:
     """The search on FRFs, together with other kinds."""
-    problem_alone = frf_problem(inspection.campaign, inspection.uneven, table, mechanisms)
+    problem_alone, fitted = frf_problem(inspection.campaign, inspection.uneven, table, mechanisms)
 
     def fit(
         curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
     ) -> tuple[FittingProblem, Search]:
         """With other kinds under the same noise, so that evidences can be compared."""
         if curve_likelihood is None:
-            return problem_alone, search(problem_alone)
+            return problem_alone, search(problem_alone, fitted)
         problem = FittingProblem(problem_alone.lines, table, curve_likelihood)
         return problem, search(problem, required_sets=required_sets)
 

@@ -447,15 +447,29 @@ class Lines:
         )
 
 
-def lines(campaign: Campaign, uneven: Mapping[str, Floats] | None = None) -> Lines:
+def lines(
+    campaign: Campaign,
+    uneven: Mapping[str, Floats] | None = None,
+    predicted: tuple[Lines, Complexes] | None = None,
+) -> Lines:
     """The finite FRF lines of a campaign, sorted by frequency.
 
     `uneven`: of recordings by their id, the noise of each line relative to its trend along frequency (default 1).
-    The `campaign` of the result holds only the FRF recordings with finite lines.
+    `predicted`: the same lines and a prediction of the rows (rows,), whose change with frequency is no noise. The
+    `campaign` of the result holds only the FRF recordings with finite lines.
     """
     measured = _measured(campaign, uneven or {})
     recording_index = np.repeat(np.arange(len(measured.recordings)), measured.counts).astype(np.intp)
-    noise = line_noise(measured.value, measured.frequency, recording_index, measured.coherence, measured.unevenness)
+    noise = line_noise(
+        measured.value,
+        measured.frequency,
+        recording_index,
+        measured.coherence,
+        measured.unevenness,
+        None if predicted is None else predicted[1],
+    )
+    if predicted is not None:
+        return replace(predicted[0], deviation=noise.deviation, noise=noise)
     segments = zip(measured.recordings, np.cumsum(measured.counts).tolist(), measured.counts, strict=True)
     recordings = tuple(
         FrfRecording.of_lines(recording, measured.frequency[end - count : end], measured.value[end - count : end])

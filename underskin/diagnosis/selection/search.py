@@ -27,6 +27,7 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+_DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted
 _PARENTS, _LARGEST_OF_ONE_KIND = 3, 3
 _INTEGRATED_ANYHOW = 3  # sets whose evidence is integrated in any case
 _INTEGRATED_WITHIN = 6.0  # nats behind the best within which integrating, which moves it by less than 2, may matter
@@ -34,9 +35,12 @@ _PAIRED = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.LOAD_INCREMENT) 
 _PARENT_WITHIN = 12.0  # nats behind the best within which a single is a parent
 
 
-def search(problem: FittingProblem, required_sets: Sequence[frozenset[str]] = ()) -> Search:
-    """Fit nothing, every single, the `required_sets` of other kinds of recordings, then what grows from the best."""
-    sets = _Sets(problem, _unsupported(problem), required_sets)
+def search(
+    problem: FittingProblem, fitted: Sequence[Explanation] = (), required_sets: Sequence[frozenset[str]] = ()
+) -> Search:
+    """Fit nothing, every single, the `required_sets` of other kinds of recordings, then what grows from the best; sets
+    that are `fitted` already are taken over."""
+    sets = _Sets(problem, _unsupported(problem), required_sets, {frozenset(one.names): one for one in fitted})
     nothing, singles = Request(()), [Request((name,)) for name in sets.names]
     sets.explain([nothing])
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
@@ -161,11 +165,35 @@ class _Sets:
 
 def frf_problem(
     campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable, mechanisms: ActiveCatalogue
-) -> FittingProblem:
-    """The lines of a campaign's FRFs with their noise, ready to be explained."""
+) -> tuple[FittingProblem, list[Explanation]]:
+    """The lines of a campaign's FRFs with their noise, ready to be explained, and what was fitted to them.
+
+    On the flank of a resonance an FRF bends between two lines, and noise that is estimated from the roughness of the
+    lines comes out several times too large there. So the single mechanisms that act along frequency are fitted first;
+    where one of them describes the lines far better than the base model, the roughness is that of its residual. All
+    hypotheses are then compared under this noise.
+    """
     measured = replace(lines(campaign, uneven), mechanisms=mechanisms)
     mechanisms.bind(measured.campaign, table, "frf")
-    return FittingProblem(measured, table)
+    problem = FittingProblem(measured, table)
+    unsupported = _unsupported(problem)
+    names = [
+        name
+        for name, mechanism in mechanisms.named.items()
+        if name not in unsupported and "frf" in mechanism.kinds and mechanism.needs_lines
+    ]
+    fits = problem.explain([Request(()), *(Request((name,)) for name in names)])
+    null, *singles = fitted = [fit for fit in fits if fit is not None]
+    moving_mean = [
+        single
+        for single in singles
+        if not any(parameter.acts_on == "line_variance" for parameter in single.model.parameters)
+    ]
+    best = max(moving_mean, key=lambda single: single.log_evidence, default=null)
+    if best.log_evidence <= null.log_evidence + _DESCRIBES_LINES:
+        return problem, fitted
+    refined = lines(campaign, uneven, (problem.lines, best.best.prediction.value))
+    return FittingProblem(replace(refined, mechanisms=mechanisms), table), []
 
 
 _OF_THE_OTHERS = 2  # answers of the recordings alone whose sets are tried together with those of the curves
