@@ -70,7 +70,7 @@ def test_likelihood_whole_covariance_matrix(made: Made, has_position_scatter: bo
     Woodbury's identity against one dense covariance matrix over all rows.
     """
     problem = FittingProblem(lines(campaign(made, table)), table)
-    hypothesis = problem.hypothesis(made.mechanisms, has_position_scatter, whole=True)
+    hypothesis = problem.hypothesis(made.mechanisms, has_position_scatter, all_lines=True)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, made.parameters, strict=False)]
     fitter, used = Fitter([hypothesis]), hypothesis.lines
     at = fitter.initial([np.array([own])], slopes=True)
@@ -133,7 +133,7 @@ def test_evidence_with_positioning_scatter(
     (explained,) = FittingProblem(lines(campaign(made, table)), table).explain([Request(names)])
     assert explained is not None
     (whole,) = integrated([explained])
-    _, found = whole.each[1]
+    _, found = whole.fits[1]
     assert found.hypothesis.has_position_scatter
     assert found.log_evidence == pytest.approx(importance(found), abs=0.3)
 

@@ -35,22 +35,19 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Uniform
 from underskin.units import Floats, Indices
 
-_NEAR = 4.0  # standard deviations from a bound within which it counts
-_POLISHING, _POLISHING_CURVES, _POLISHED = (
-    4,
-    12,
-    0.05,
-)  # steps at most, of curves as well, and the gain in log posterior below which it stops
-_LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
-_POLISHED_GAIN = 1.0  # gain in log posterior that polishing may leave
-_ASTRAY = -50.0  # nats: bounds take less from an integral around a point within them, and add nothing
+_NEAR = 4.0  # standard deviations: bounds farther than this from the mean are left out
+# Largest numbers of polishing steps, of FRFs and of curves, and the gain in log posterior below which a point stops
+_POLISHING_STEPS, _POLISHING_STEPS_OF_CURVES, _POLISHING_GAIN = 4, 12, 0.05
+_LEAST_COVARIANCE_CURVATURE = 0.3  # in the logarithms of noise levels: their priors are not wider
+_REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
+_LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
 _LEAST_EIGENVALUE = 1e-11  # of the correlations' information
-_FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
+_FLAT = 1e-3  # standard deviations of the quadratic, at least, within a parameter's bounds: keeps H invertible
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """log Z up to what all hypotheses share, the most probable point, and the parameters' covariance there."""
+    """log Z up to a constant common to all hypotheses, the most probable point and the parameters' covariance there."""
 
     log_evidence: float
     hypothesis: Hypothesis
@@ -61,7 +58,7 @@ class Evidence:
 
     @cached_property
     def fitter(self) -> Fitter:
-        """What evaluates points of this hypothesis."""
+        """Evaluates points of this hypothesis."""
         return Fitter([self.hypothesis])
 
     @cached_property
@@ -76,8 +73,8 @@ class Evidence:
 
     @cached_property
     def prediction(self) -> Prediction:
-        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives, of curves with what
-        the cell adds."""
+        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives, of curves with the
+        zero and drift of the load cells."""
         model = self.hypothesis.model
         if isinstance(model, FrfModel):
             return model.predict(self.point.fit, slopes=False, place=False)
@@ -95,7 +92,7 @@ class Evidence:
 
     @cached_property
     def levels(self) -> NoiseLevels:
-        """The noise levels there, as numbers."""
+        """The noise levels there."""
         return self.fitter.levels(self.point.covariance).first
 
     @property
@@ -105,24 +102,24 @@ class Evidence:
 
     @property
     def pickup_variance(self) -> Floats:
-        """Of real and of imaginary part of each row [(C/N)²]."""
-        pickup, found = self.hypothesis.model.pickup, self.levels.pickup
-        on_rows = None if pickup is None or found is None else pickup.on_rows(found)
+        """Variance of the pickup in the real and the imaginary part of each row [(C/N)²]."""
+        pickup, deviation = self.hypothesis.model.pickup, self.levels.pickup
+        on_rows = None if pickup is None or deviation is None else pickup.on_rows(deviation)
         return replace(self.prediction, pickup=on_rows).pickup_variance
 
 
-def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
-    """By the quadratics around most probable points, which are first brought to where their whole gradients vanish."""
-    unknown = np.flatnonzero(~fitter.has_log_slope_gradient(at))
-    if len(unknown):
-        at = fitter.replaced(at, unknown, fitter.with_log_slope_gradient(at[unknown]))
-    moving = np.arange(len(at))
-    for _ in range(_POLISHING_CURVES if fitter.lines.curves else _POLISHING):
-        moving, at = _polish(fitter, at, moving)
-        if not len(moving):
+def laplace_at(fitter: Fitter, at: Evaluated) -> list[Evidence]:
+    """Laplace's approximation at most probable points, which are first polished until their whole gradients vanish."""
+    missing = np.flatnonzero(~fitter.has_log_slope_gradient(at))
+    if len(missing):
+        at = fitter.replaced(at, missing, fitter.with_log_slope_gradient(at[missing]))
+    active = np.arange(len(at))
+    for _ in range(_POLISHING_STEPS_OF_CURVES if fitter.lines.curves else _POLISHING_STEPS):
+        active, at = _polish(fitter, at, active)
+        if not len(active):
             break
-    values, covariances = around_mean(fitter, at)
-    volumes = around_levels(fitter, at)
+    values, covariances = mean_integrals(fitter, at)
+    volumes = level_integrals(fitter, at)
     evidence = []
     for number, (value, covariance) in enumerate(zip(values + volumes, covariances, strict=True)):
         hypothesis = fitter.hypotheses[at.points.owner[number]]
@@ -137,35 +134,38 @@ def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
     return evidence
 
 
-def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
-    """The logs of the integrals over the mean parameters, the covariance's held, and the quadratics' covariances."""
+def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
+    """Logarithms of the integrals over the mean parameters, with the covariance's held (points,), and the covariance of
+    each quadratic (mean parameters, mean parameters)."""
     values, covariances = [], []
     for number, (information, gradient) in enumerate(zip(*_equations(fitter, at), strict=True)):
         owner = at.points.owner[number]
-        places = np.flatnonzero(fitter.free[owner])
-        fit, low, high = at.points.fit[number, places], fitter.low[owner, places], fitter.high[owner, places]
-        information, gradient = _definite(information[np.ix_(places, places)]), gradient[places]
-        # Towards a bound the gradient stays; elsewhere, where polishing left much of it, the fit hangs at a kink, and
-        # what a smooth cost would still gain there is not to be had.
-        free = ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
-        if 0.5 * gradient[free] @ np.linalg.solve(information[np.ix_(free, free)], gradient[free]) > _POLISHED_GAIN:
+        indices = np.flatnonzero(fitter.free[owner])
+        coordinates, low, high = at.points.fit[number, indices], fitter.low[owner, indices], fitter.high[owner, indices]
+        information, gradient = _definite(information[np.ix_(indices, indices)]), gradient[indices]
+        # A gradient towards a bound is kept. Elsewhere, a large one after polishing means a kink in the cost, where the
+        # gain that the quadratic predicts does not exist.
+        free = ~(((coordinates <= low) & (gradient > 0)) | ((coordinates >= high) & (gradient < 0)))
+        if 0.5 * gradient[free] @ np.linalg.solve(information[np.ix_(free, free)], gradient[free]) > _REMAINING_GAIN:
             gradient = np.where(free, 0.0, gradient)
         covariance: Floats = np.linalg.inv(information).astype(np.float64)
         gain = 0.5 * gradient @ covariance @ gradient
-        volume = 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
-        mean = (fit - covariance @ gradient).astype(np.float64)
-        beyond = gain + log_box(mean, covariance, low, high)
-        if not _ASTRAY < beyond < 2 * _POLISHED_GAIN:
+        volume = 0.5 * len(coordinates) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
+        mean = (coordinates - covariance @ gradient).astype(np.float64)
+        bounds_term = gain + log_box(mean, covariance, low, high)
+        if not _LEAST_BOUNDS_TERM < bounds_term < 2 * _REMAINING_GAIN:
             # Truncating one bound after another fails where a quadratic leads far out of several.
             deviation = np.where(free, 0.0, np.diag(information) ** -0.5)
-            beyond = log_box(fit, covariance, low, high) - float(np.log1p(np.abs(gradient) * deviation).sum())
-        values.append(float(-at.cost[number] + volume + beyond))
+            bounds_term = log_box(coordinates, covariance, low, high) - float(
+                np.log1p(np.abs(gradient) * deviation).sum()
+            )
+        values.append(float(-at.cost[number] + volume + bounds_term))
         covariances.append(covariance)
     return np.array(values), covariances
 
 
 def _definite(information: Floats) -> Floats:
-    """With eigenvalues above 0, which rounding may have taken from nearly singular ones."""
+    """The information with positive eigenvalues, which rounding may have made negative where it is nearly singular."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     if values[0] > _LEAST_EIGENVALUE:
@@ -173,8 +173,8 @@ def _definite(information: Floats) -> Floats:
     return np.asarray((vectors * np.maximum(values, _LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
 
 
-def around_levels(fitter: Fitter, at: Evaluated) -> Floats:
-    """What the integrals over the covariance's parameters add to the logs at their modes (points,)."""
+def level_integrals(fitter: Fitter, at: Evaluated) -> Floats:
+    """Logarithms of the integrals over the covariance's parameters, relative to the density at the modes (points,)."""
     return log_volume(fitter.covariance_equations(at)[1])
 
 
@@ -197,67 +197,70 @@ def _equations(fitter: Fitter, at: Evaluated) -> tuple[Floats, Floats]:
     """Information on the mean parameters and the gradient of the cost."""
     information, ascent = fitter.posterior_equations(at)
     owner = at.points.owner
-    span, every = (fitter.high - fitter.low)[owner], np.arange(fitter.low.shape[1])
-    information[:, every, every] += np.where(span > 0, _FLAT / np.where(span > 0, span, 1.0), 0.0) ** 2
+    span, diagonal = (fitter.high - fitter.low)[owner], np.arange(fitter.low.shape[1])
+    information[:, diagonal, diagonal] += np.where(span > 0, _FLAT / np.where(span > 0, span, 1.0), 0.0) ** 2
     return information, -ascent
 
 
-def _polish(fitter: Fitter, at: Evaluated, moving: Indices) -> tuple[Indices, Evaluated]:
-    """Newton steps of some points with the whole gradient, within the bounds; and which of them gained."""
-    part = at[moving]
-    information, gradient = _equations(fitter, part)
-    owner, fit = part.points.owner, part.points.fit
+def _polish(fitter: Fitter, at: Evaluated, active: Indices) -> tuple[Indices, Evaluated]:
+    """A Newton step of the active points with the whole gradient, within the bounds; and which of them gained."""
+    batch = at[active]
+    information, gradient = _equations(fitter, batch)
+    owner, coordinates = batch.points.owner, batch.points.fit
     low, high = fitter.low[owner], fitter.high[owner]
-    free = fitter.free[owner] & ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
-    both = free[:, :, None] & free[:, None, :]
-    matrix = np.where(both, information, 0.0)
-    every = np.arange(fit.shape[1])
-    matrix[:, every, every] = np.where(free, matrix[:, every, every], 1.0)
+    free = fitter.free[owner] & ~(((coordinates <= low) & (gradient > 0)) | ((coordinates >= high) & (gradient < 0)))
+    free_pairs = free[:, :, None] & free[:, None, :]
+    matrix = np.where(free_pairs, information, 0.0)
+    diagonal = np.arange(coordinates.shape[1])
+    matrix[:, diagonal, diagonal] = np.where(free, matrix[:, diagonal, diagonal], 1.0)
     step = -np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
-    trying = np.flatnonzero(-0.5 * (gradient * step).sum(axis=1) >= _POLISHED)
-    gained: list[Indices] = []
+    candidates = np.flatnonzero(-0.5 * (gradient * step).sum(axis=1) >= _POLISHING_GAIN)
+    improved: list[Indices] = []
     for _ in range(5):
-        if not len(trying):
+        if not len(candidates):
             break
-        moved = np.clip(fit[trying] + step[trying], low[trying], high[trying])
-        tried = fitter.update_noise_levels(fitter.evaluate(replace(part.points[trying], fit=moved)), 1)
-        better = tried.cost < part.cost[trying] - 0.2 * _POLISHED
-        log_slope_gradient = None if part.log_slope_gradient is None else part.log_slope_gradient[trying]
-        at = fitter.replaced(at, moving[trying[better]], replace(tried, log_slope_gradient=log_slope_gradient)[better])
-        gained.append(moving[trying[better]])
-        trying = trying[~better]
+        shifted = np.clip(coordinates[candidates] + step[candidates], low[candidates], high[candidates])
+        trials = fitter.update_noise_levels(fitter.evaluate(replace(batch.points[candidates], fit=shifted)), 1)
+        better = trials.cost < batch.cost[candidates] - 0.2 * _POLISHING_GAIN
+        log_slope_gradient = None if batch.log_slope_gradient is None else batch.log_slope_gradient[candidates]
+        at = fitter.replaced(
+            at, active[candidates[better]], replace(trials, log_slope_gradient=log_slope_gradient)[better]
+        )
+        improved.append(active[candidates[better]])
+        candidates = candidates[~better]
         step = step / 3
-    return np.sort(np.concatenate([*gained, np.zeros(0, dtype=np.intp)])), at
+    return np.sort(np.concatenate([*improved, np.zeros(0, dtype=np.intp)])), at
 
 
 def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:
     """The logarithm of the probability of low < x < high for x ~ N(mean, covariance).
 
-    The bound that the mean is farthest beyond comes first: what goes with it beyond others comes back within them.
+    The bound that the mean is farthest beyond comes first: truncation there also brings correlated parameters back
+    within theirs.
     """
     mean, covariance = mean.copy(), covariance.copy()
-    total, left = 0.0, np.ones(len(mean), dtype=bool)
-    while left.any():
+    total, remaining = 0.0, np.ones(len(mean), dtype=bool)
+    while remaining.any():
         deviation = np.sqrt(np.diag(covariance))
-        beyond = np.where(left, np.maximum(low - mean, mean - high) / deviation, -np.inf)
-        place = int(np.argmax(beyond))
-        if beyond[place] < -_NEAR:
+        beyond = np.where(remaining, np.maximum(low - mean, mean - high) / deviation, -np.inf)
+        index = int(np.argmax(beyond))
+        if beyond[index] < -_NEAR:
             break
-        left[place] = False
-        sd = float(deviation[place])
-        a, b = (low[place] - mean[place]) / sd, (high[place] - mean[place]) / sd
-        if a > 0:  # the far tail is computed on the side where it is small
+        remaining[index] = False
+        sd = float(deviation[index])
+        a, b = (low[index] - mean[index]) / sd, (high[index] - mean[index]) / sd
+        if a > 0:  # the upper tail is mirrored: log Φ is accurate in the lower one
             a, b, sign = -b, -a, -1.0
         else:
             sign = 1.0
         log_mass = _log_between(a, b)
         total += log_mass
-        # Mean and variance of the truncated normal, and what they do to the others
+        # Mean and variance of the truncated normal, and those of the others given them
         density_a, density_b = (np.exp(-0.5 * x * x - 0.5 * np.log(2 * np.pi) - log_mass) for x in (a, b))
         first = density_a - density_b
         tail = (a * density_a if np.isfinite(a) else 0.0) - (b * density_b if np.isfinite(b) else 0.0)
         variance = float(np.clip(1 + tail - first**2, 1e-6, 1.0))
-        gain = covariance[:, place] / sd
+        gain = covariance[:, index] / sd
         mean = mean + gain * sign * first
         covariance = covariance - np.outer(gain, gain) * (1 - variance)
     return total
@@ -269,62 +272,62 @@ def _log_between(a: float, b: float) -> float:
     return float(upper + np.log1p(-np.exp(min(lower - upper, -1e-15))))
 
 
-_GONE = 4.0  # nats below the greatest at which an integral ends
-_LONGEST_STRIDE = 0.3  # of scatter's logarithm: twice the deviation with which its prior falls off
-_GAIN_STRIDES = 8  # either way: 2.4 of the logarithm at most, and the prior's flat part is 1.6 wide
-_SETTLING = 5  # steps of the other noise levels at each positioning scatter
-_AT_ONCE = 2  # strides either way, before it is known whether more are needed
+_TAIL_NATS = 4.0  # below the greatest value, where an integral ends
+_LONGEST_STRIDE = 0.3  # of log scatter: twice the standard deviation with which its prior falls off
+_GAIN_STRIDES = 8  # either way: at most 2.4 in log scatter; the flat part of its prior is 1.6 wide
+_NOISE_LEVEL_STEPS = 5  # Newton steps of the other noise levels at each value of the position scatter
+_STRIDES_AT_ONCE = 2  # either way, evaluated together before the tails are checked
 
 
 def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
-    """The evidence around the most probable point, over all values of what the lines leave loose."""
-    return integrated(around(fitter, at))[0]
+    """The evidence at the most probable point, with the position scatter integrated over."""
+    return integrate_position_scatter(laplace_at(fitter, at))[0]
 
 
-def integrated(evidence: Sequence[Evidence]) -> list[Evidence]:
-    """Over all values of the position scatter, where there is one."""
-    whole = list(evidence)
-    for group in _alike(whole, [entry.hypothesis.has_position_scatter for entry in whole]):
-        for number, entry in zip(group, _over_position([whole[number] for number in group]), strict=True):
-            whole[number] = entry
-    return whole
+def integrate_position_scatter(fits: Sequence[Evidence]) -> list[Evidence]:
+    """The evidence integrated over the position scatter, of the hypotheses that have it; the others as they are."""
+    results = list(fits)
+    for members in _groups(results, [fit.hypothesis.has_position_scatter for fit in results]):
+        for number, result in zip(members, _integrate_group([results[number] for number in members]), strict=True):
+            results[number] = result
+    return results
 
 
-def _alike(evidence: Sequence[Evidence], chosen: Sequence[bool]) -> list[list[int]]:
-    """Of those chosen, which can be evaluated together."""
+def _groups(fits: Sequence[Evidence], selected: Sequence[bool]) -> list[list[int]]:
+    """Indices of the selected fits, in groups that can be evaluated together."""
     groups: dict[object, list[int]] = {}
-    for number, entry in enumerate(evidence):
-        if chosen[number]:
-            groups.setdefault(entry.hypothesis.group(number), []).append(number)
+    for number, fit in enumerate(fits):
+        if selected[number]:
+            groups.setdefault(fit.hypothesis.group(number), []).append(number)
     return list(groups.values())
 
 
 @dataclass
 class _Integral:
-    """∫ Z(x) dx within bounds, from values at equal strides either way of `begin` until Z is gone.
+    """∫ Z(x) dx within bounds, from values at equal strides either way of `start` until Z is negligible.
 
-    Each value counts for half the way to the next; the last before a bound for the way to the bound.
+    Midpoint rule: each value stands for half a stride on either side, the last before a bound for all up to the bound.
     """
 
-    begin: float
+    start: float
     stride: float
     low: float
     high: float
     log_values: dict[float, float] = field(default_factory=dict)
 
     def missing(self) -> list[float]:
-        """The values of x that are wanted next; none where Z is gone both ways."""
+        """The values of x to evaluate next; none once Z is negligible both ways."""
         if not self.log_values:
-            steps = list(range(-_AT_ONCE, _AT_ONCE + 1))
-            values = [self.begin + step * self.stride for step in steps]
+            steps = list(range(-_STRIDES_AT_ONCE, _STRIDES_AT_ONCE + 1))
+            values = [self.start + step * self.stride for step in steps]
         else:
-            least = max(self.log_values.values()) - _GONE
+            least = max(self.log_values.values()) - _TAIL_NATS
             first, last = min(self.log_values), max(self.log_values)
-            steps = list(range(1, _AT_ONCE + 1))
+            steps = list(range(1, _STRIDES_AT_ONCE + 1))
             below = [first - step * self.stride for step in steps] if self.log_values[first] > least else []
             above = [last + step * self.stride for step in steps] if self.log_values[last] > least else []
             values = below + above
-        return [value for value in values if value == self.begin or self.low <= value <= self.high]
+        return [value for value in values if value == self.start or self.low <= value <= self.high]
 
     @property
     def log_total(self) -> float:
@@ -338,209 +341,221 @@ class _Integral:
         return float(np.logaddexp.reduce(logs + np.log(np.maximum(np.diff(edges), 1e-300))))
 
 
-def _work_out(integrals: Sequence[_Integral], log_values: Callable[[list[int], Floats], Floats]) -> None:
-    """Fill the integrals: `log_values` of the integrals with these numbers at these values."""
+def _evaluate_integrals(integrals: Sequence[_Integral], log_values: Callable[[list[int], Floats], Floats]) -> None:
+    """Evaluate the integrals until none misses a value; `log_values` gives log Z of integrals (by number) at values."""
     while True:
-        wanted = [(number, value) for number, entry in enumerate(integrals) for value in entry.missing()]
-        if not wanted:
+        missing = [(number, value) for number, integral in enumerate(integrals) for value in integral.missing()]
+        if not missing:
             return
-        numbers, values = [number for number, _ in wanted], np.array([value for _, value in wanted])
-        for (number, value), log_value in zip(wanted, log_values(numbers, values).tolist(), strict=True):
+        numbers, values = [number for number, _ in missing], np.array([value for _, value in missing])
+        for (number, value), log_value in zip(missing, log_values(numbers, values).tolist(), strict=True):
             integrals[number].log_values[value] = log_value
 
 
 def held_points(
-    held: Fitter, evidence: Sequence[Evidence], places: Sequence[int], numbers: Sequence[int], values: Floats
+    held: Fitter, fits: Sequence[Evidence], indices: Sequence[int], numbers: Sequence[int], values: Floats
 ) -> Points:
-    """Where the held parameters have these values and the others follow as the quadratics say."""
-    fits = np.zeros((len(numbers), held.low.shape[1]))
+    """Points at which the held parameters have these values, and the others their conditional means by the quadratics.
+
+    `indices`: of the held parameter of each fit; `numbers`: the fit that each value belongs to.
+    """
+    coordinates = np.zeros((len(numbers), held.low.shape[1]))
     for row, (number, value) in enumerate(zip(numbers, values.tolist(), strict=True)):
-        entry, place = evidence[number], places[number]
-        mean = entry.hypothesis.mean_indices
-        index = mean.index(place)
-        along = entry.covariance[:, index] / entry.covariance[index, index]
-        fits[row, : len(entry.point.fit)] = entry.point.fit
-        fits[row, mean] += along * (value - entry.point.fit[place])
-        fits[row] = np.clip(fits[row], held.low[number], held.high[number])
-        fits[row, place] = value
+        fit, index = fits[number], indices[number]
+        mean = fit.hypothesis.mean_indices
+        mean_index = mean.index(index)
+        slopes = fit.covariance[:, mean_index] / fit.covariance[mean_index, mean_index]
+        coordinates[row, : len(fit.point.fit)] = fit.point.fit
+        coordinates[row, mean] += slopes * (value - fit.point.fit[index])
+        coordinates[row] = np.clip(coordinates[row], held.low[number], held.high[number])
+        coordinates[row, index] = value
     covariance, sensor_log_gain = (
-        np.array([getattr(evidence[number].point, name) for number in numbers])
+        np.array([getattr(fits[number].point, name) for number in numbers])
         for name in ("covariance", "sensor_log_gain")
     )
-    return Points(np.array(numbers, dtype=np.intp), fits, covariance, sensor_log_gain)
+    return Points(np.array(numbers, dtype=np.intp), coordinates, covariance, sensor_log_gain)
 
 
-def _over_position(evidence: list[Evidence]) -> list[Evidence]:
-    """With the integrals over log p in place of their normal approximation, p the positioning scatter."""
-    fitter = Fitter([entry.hypothesis for entry in evidence])
-    fits = np.zeros((len(evidence), fitter.low.shape[1]))
-    for row, entry in zip(fits, evidence, strict=True):
-        row[: len(entry.point.fit)] = entry.point.fit
+def _integrate_group(fits: list[Evidence]) -> list[Evidence]:
+    """Fits that are evaluated together, with the integral over log p in place of its normal approximation; p is the
+    position scatter."""
+    fitter = Fitter([fit.hypothesis for fit in fits])
+    coordinates = np.zeros((len(fits), fitter.low.shape[1]))
+    for row, fit in zip(coordinates, fits, strict=True):
+        row[: len(fit.point.fit)] = fit.point.fit
     covariance, sensor_log_gain = (
-        np.array([getattr(entry.point, name) for entry in evidence]) for name in ("covariance", "sensor_log_gain")
+        np.array([getattr(fit.point, name) for fit in fits]) for name in ("covariance", "sensor_log_gain")
     )
-    best = fitter.evaluate(Points(np.arange(len(evidence)), fits, covariance, sensor_log_gain))
-    log_slope_gradient = np.full((len(evidence), fitter.lines.recordings, fits.shape[1]), np.nan)
-    for row, entry in zip(log_slope_gradient, evidence, strict=True):
-        if entry.log_slope_gradient is not None:
-            row[:, : entry.log_slope_gradient.shape[-1]] = entry.log_slope_gradient[0]
-            row[:, entry.log_slope_gradient.shape[-1] :] = 0.0
+    best = fitter.evaluate(Points(np.arange(len(fits)), coordinates, covariance, sensor_log_gain))
+    log_slope_gradient = np.full((len(fits), fitter.lines.recordings, coordinates.shape[1]), np.nan)
+    for row, fit in zip(log_slope_gradient, fits, strict=True):
+        if fit.log_slope_gradient is not None:
+            row[:, : fit.log_slope_gradient.shape[-1]] = fit.log_slope_gradient[0]
+            row[:, fit.log_slope_gradient.shape[-1] :] = 0.0
     best = replace(best, log_slope_gradient=log_slope_gradient)
     hessian = fitter.covariance_equations(best)[1]
     low, high = fitter.covariance[POSITION].low, fitter.covariance[POSITION].high
     integrals = [
-        _Integral(float(entry.point.covariance[POSITION]), float(stride), low, high)
-        for entry, stride in zip(evidence, _stride(hessian[:, POSITION, POSITION]), strict=True)
+        _Integral(float(fit.point.covariance[POSITION]), float(stride), low, high)
+        for fit, stride in zip(fits, _stride(hessian[:, POSITION, POSITION]), strict=True)
     ]
 
     def log_values(numbers: list[int], values: Floats) -> Floats:
-        begin = best[np.array(numbers)]
-        covariance = begin.points.covariance.copy()
+        starting_points = best[np.array(numbers)]
+        covariance = starting_points.points.covariance.copy()
         covariance[:, POSITION] = values
-        moved = fitter.weighed(fitter.with_covariance(begin.points, covariance), begin.products)
+        shifted = fitter.weighed(fitter.with_covariance(starting_points.points, covariance), starting_points.products)
         at = replace(
-            fitter.update_noise_levels(moved, _SETTLING, held=POSITION), log_slope_gradient=begin.log_slope_gradient
+            fitter.update_noise_levels(shifted, _NOISE_LEVEL_STEPS, held=POSITION),
+            log_slope_gradient=starting_points.log_slope_gradient,
         )
-        return around_mean(fitter, at)[0] + _over_gain(fitter, at)
+        return mean_integrals(fitter, at)[0] + _gain_integrals(fitter, at)
 
-    _work_out(integrals, log_values)
-    quadratic = around_mean(fitter, best)[0] + around_levels(fitter, best)
+    _evaluate_integrals(integrals, log_values)
+    quadratic = mean_integrals(fitter, best)[0] + level_integrals(fitter, best)
     return [
-        replace(entry, log_evidence=entry.log_evidence + integral.log_total - whole)
-        for entry, integral, whole in zip(evidence, integrals, quadratic.tolist(), strict=True)
+        replace(fit, log_evidence=fit.log_evidence + integral.log_total - log_integral)
+        for fit, integral, log_integral in zip(fits, integrals, quadratic.tolist(), strict=True)
     ]
 
 
-def _over_gain(fitter: Fitter, at: Evaluated) -> Floats:
-    """What the integrals over the noise levels but the position's add: sums over the gain's, the others following."""
+def _gain_integrals(fitter: Fitter, at: Evaluated) -> Floats:
+    """Logarithms of the integrals over the noise levels other than the position scatter, relative to the density at the
+    points (points,): sums over the gain scatter, at which the others take their conditional means."""
     hessian = fitter.covariance_equations(at)[1]
-    others = [place for place in range(hessian.shape[1]) if place not in (GAIN, POSITION)]
+    others = [index for index in range(hessian.shape[1]) if index not in (GAIN, POSITION)]
     curvature = hessian[:, others][:, :, others]
     stride = _stride(hessian[:, GAIN, GAIN])
     steps = stride[:, None] * np.arange(-_GAIN_STRIDES, _GAIN_STRIDES + 1)
     covariances = np.repeat(at.points.covariance[:, None], steps.shape[1], axis=1)
     covariances[..., GAIN] += steps
-    follow = np.linalg.solve(curvature, hessian[:, others, GAIN][..., None])[..., 0]
-    covariances[..., others] -= steps[..., None] * follow[:, None]
-    entry = fitter.covariance[GAIN]
-    within = (covariances[..., GAIN] >= entry.low) & (covariances[..., GAIN] <= entry.high)
+    slopes = np.linalg.solve(curvature, hessian[:, others, GAIN][..., None])[..., 0]
+    covariances[..., others] -= steps[..., None] * slopes[:, None]
+    gain_parameter = fitter.covariance[GAIN]
+    within = (covariances[..., GAIN] >= gain_parameter.low) & (covariances[..., GAIN] <= gain_parameter.high)
     gains = np.where(within, at.cost[:, None] - fitter.costs(at, covariances), -np.inf)
     return np.asarray(np.logaddexp.reduce(gains, axis=1) + np.log(stride) + log_volume(curvature))
 
 
 def _stride(curvature: Floats) -> Floats:
-    """One standard deviation, or what resolves how the priors of scatter fall off."""
+    """One standard deviation, but no longer than resolves the edges of the priors of scatter."""
     return np.asarray(np.maximum(curvature, _LONGEST_STRIDE**-2) ** -0.5)
 
 
-_OPEN = 0.3  # of the range between bounds: a uniform distribution has 0.29
-_TRADED = 0.9  # correlation of two parameters that trade against each other
-_CELLS = 5  # of the range, at whose middles the parameter is held
+_UNDETERMINED = 0.3  # standard deviation over the range, at least; a uniform distribution has 0.29
+_TRADING_CORRELATION = 0.9  # above which two parameters trade against each other
+_CELLS = 5  # of the range, each with the parameter held at its middle
 
 
 @dataclass(frozen=True)
 class Part:
-    """Of a posterior: its probability, and the normal distribution of the fit coordinates there."""
+    """A component of a posterior: its probability, and a normal distribution of the fit coordinates."""
 
     share: float
     fit: Floats  # (parameters,)
     covariance: Floats  # (mean parameters, mean parameters)
 
 
-def parts(evidence: Evidence, place: int) -> list[Part]:
-    """The posterior of a parameter, by its place, and of all others.
+def parts(evidence: Evidence, index: int) -> list[Part]:
+    """The posterior of the parameter at an index among the model's, and of all others.
 
-    In one part, as the quadratic has it; or in as many as the range of the parameter that it trades against is divided
-    into, where the recordings leave that parameter open between its bounds.
+    One part, the quadratic's; or, where the parameter trades against one that the recordings do not determine between
+    its bounds, one part for each cell of that one's range.
     """
-    open_place = _traded(evidence, place)
-    if open_place is None:
+    trading_index = _trading_index(evidence, index)
+    if trading_index is None:
         return [Part(1.0, evidence.point.fit, evidence.covariance)]
-    low, high = evidence.hypothesis.model.parameters[open_place].bounds
+    low, high = evidence.hypothesis.model.parameters[trading_index].bounds
     values = low + (high - low) * (np.arange(_CELLS) + 0.5) / _CELLS
-    found = _along(evidence, open_place, values)
-    logs = np.array([entry.log_evidence for entry in found])
+    fits = _refit_at(evidence, trading_index, values)
+    logs = np.array([fit.log_evidence for fit in fits])
     shares = np.exp(logs - np.logaddexp.reduce(logs))
     mean_indices = np.array(evidence.hypothesis.mean_indices)
-    free, cell = np.flatnonzero(mean_indices != open_place), int(np.flatnonzero(mean_indices == open_place)[0])
-    each = []
-    for share, entry in zip(shares.tolist(), found, strict=True):
+    others, mean_index = (
+        np.flatnonzero(mean_indices != trading_index),
+        int(np.flatnonzero(mean_indices == trading_index)[0]),
+    )
+    components = []
+    for share, fit in zip(shares.tolist(), fits, strict=True):
         covariance = np.zeros_like(evidence.covariance)
-        covariance[np.ix_(free, free)] = entry.covariance
-        covariance[cell, cell] = ((high - low) / _CELLS) ** 2 / 12  # anywhere in its cell
-        each.append(Part(share, entry.point.fit, covariance))
-    return each
+        covariance[np.ix_(others, others)] = fit.covariance
+        covariance[mean_index, mean_index] = ((high - low) / _CELLS) ** 2 / 12  # uniform in its cell
+        components.append(Part(share, fit.point.fit, covariance))
+    return components
 
 
-def _along(evidence: Evidence, place: int, values: Floats) -> list[Evidence]:
+def _refit_at(evidence: Evidence, index: int, values: Floats) -> list[Evidence]:
     """The evidence with a parameter held at each of these values, all others fitted again.
 
-    From one value to the next, away from the most probable one: along a straight line, samples lose their contact.
+    Values are visited away from the most probable one, and each fit begins at the extrapolation of the two nearest:
+    on a straight line from the most probable point, samples lose their contact.
     """
-    held = Fitter([evidence.hypothesis], held=[(place,)])
-    middle = float(evidence.point.fit[place])
-    reached: dict[float, FitPoint] = {middle: evidence.point}
-    found: dict[float, Evidence] = {}
-    for value in sorted(values.tolist(), key=lambda value: abs(value - middle)):
-        begin = held_points(held, [evidence], [place], [0], np.array([value]))
-        if len(reached) > 1:
-            near, far = sorted(reached, key=lambda other: abs(other - value))[:2]
-            step = (reached[near].fit - reached[far].fit) * (value - near) / (near - far)
-            begin = held.at(replace(reached[near], fit=np.clip(reached[near].fit + step, held.low[0], held.high[0])))
-        (found[value],) = around(held, held.descend(held.update_noise_levels(held.evaluate(begin), 1), 1))
-        reached[value] = found[value].point
-    return [found[value] for value in values.tolist()]
+    held = Fitter([evidence.hypothesis], held=[(index,)])
+    mode = float(evidence.point.fit[index])
+    fitted_points: dict[float, FitPoint] = {mode: evidence.point}
+    fits: dict[float, Evidence] = {}
+    for value in sorted(values.tolist(), key=lambda value: abs(value - mode)):
+        starting_points = held_points(held, [evidence], [index], [0], np.array([value]))
+        if len(fitted_points) > 1:
+            near, far = sorted(fitted_points, key=lambda other: abs(other - value))[:2]
+            step = (fitted_points[near].fit - fitted_points[far].fit) * (value - near) / (near - far)
+            starting_points = held.at(
+                replace(fitted_points[near], fit=np.clip(fitted_points[near].fit + step, held.low[0], held.high[0]))
+            )
+        (fits[value],) = laplace_at(held, held.descend(held.update_noise_levels(held.evaluate(starting_points), 1), 1))
+        fitted_points[value] = fits[value].point
+    return [fits[value] for value in values.tolist()]
 
 
-def _traded(evidence: Evidence, place: int) -> int | None:
-    """The place of the mechanisms' parameter between bounds alone that a parameter trades against; None for none."""
+def _trading_index(evidence: Evidence, index: int) -> int | None:
+    """The index of the mechanisms' parameter, of uniform prior, that a parameter trades against; None for none."""
     hypothesis = evidence.hypothesis
     deviations = np.sqrt(np.diag(evidence.covariance))
-    row = hypothesis.mean_indices.index(place)
-    correlations = np.abs(evidence.covariance[row]) / (deviations[row] * deviations)
-    for index, other in enumerate(hypothesis.mean_indices):
-        entry = hypothesis.model.parameters[other]
-        low, high = entry.bounds
+    mean_index = hypothesis.mean_indices.index(index)
+    correlations = np.abs(evidence.covariance[mean_index]) / (deviations[mean_index] * deviations)
+    for row, other in enumerate(hypothesis.mean_indices):
+        parameter = hypothesis.model.parameters[other]
+        low, high = parameter.bounds
         between = (
             other < hypothesis.mechanism_parameter_count
-            and isinstance(entry.prior, Uniform)
-            and entry.scale == "linear"
+            and isinstance(parameter.prior, Uniform)
+            and parameter.scale == "linear"
         )
-        if between and correlations[index] > _TRADED and deviations[index] > _OPEN * (high - low):
+        if between and correlations[row] > _TRADING_CORRELATION and deviations[row] > _UNDETERMINED * (high - low):
             return other
     return None
 
 
-_PLACES = 24
+_SPREAD_VALUES = 24  # of the sensors' spread, at equal distances between its bounds
 
 
-def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, place: int) -> list[NormalMixture] | None:
-    """The parameter at a place among the model's, around each of several points of one hypothesis; None where that has
-    no free spread.
+def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list[NormalMixture] | None:
+    """The posterior of the parameter at an index among the model's over all values of the sensors' spread, at each of
+    several points of one hypothesis; None where the spread is not a parameter.
 
-    The shares of each sum to 1.
+    The shares of each mixture sum to 1.
     """
     hypothesis = fitter.hypotheses[0]
-    spreads = [entry for entry in hypothesis.model.parameters if entry.acts_on == "gain_spread"]
+    spreads = [parameter for parameter in hypothesis.model.parameters if parameter.acts_on == "gain_spread"]
     if not spreads:
         return None
-    column = [entry.name for entry in hypothesis.covariance].index(spreads[0].name)
+    column = [parameter.name for parameter in hypothesis.covariance].index(spreads[0].name)
     low, high = spreads[0].bounds
-    several = at[np.repeat(np.arange(len(at)), _PLACES)]
-    covariance = several.points.covariance.copy()
-    covariance[:, column] = np.tile(low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES, len(at))
-    moved = fitter.weighed(fitter.with_covariance(several.points, covariance), several.products)
-    moved = replace(moved, log_slope_gradient=several.log_slope_gradient)
-    values, covariances = around_mean(fitter, moved)
+    grid = at[np.repeat(np.arange(len(at)), _SPREAD_VALUES)]
+    covariance = grid.points.covariance.copy()
+    covariance[:, column] = np.tile(low + (high - low) * (np.arange(_SPREAD_VALUES) + 0.5) / _SPREAD_VALUES, len(at))
+    shifted = fitter.weighed(fitter.with_covariance(grid.points, covariance), grid.products)
+    shifted = replace(shifted, log_slope_gradient=grid.log_slope_gradient)
+    values, covariances = mean_integrals(fitter, shifted)
     free = np.flatnonzero(fitter.free[0])
-    index = int(np.searchsorted(free, place))
-    information, gradient = fitter.posterior_equations(moved)
-    step = np.linalg.solve(information[:, free[:, None], free], gradient[:, free, None])[:, index, 0]
-    mean = moved.points.fit[:, place] + step
-    deviation = np.sqrt([covariance[index, index] for covariance in covariances])
+    mean_index = int(np.searchsorted(free, index))
+    information, gradient = fitter.posterior_equations(shifted)
+    step = np.linalg.solve(information[:, free[:, None], free], gradient[:, free, None])[:, mean_index, 0]
+    mean = shifted.points.fit[:, index] + step
+    deviation = np.sqrt([covariance[mean_index, mean_index] for covariance in covariances])
     return [
-        NormalMixture(_shares(values[own]), mean[own], deviation[own])
-        for own in (slice(first, first + _PLACES) for first in range(0, len(values), _PLACES))
+        NormalMixture(_shares(values[rows]), mean[rows], deviation[rows])
+        for rows in (slice(first, first + _SPREAD_VALUES) for first in range(0, len(values), _SPREAD_VALUES))
     ]
 
 
@@ -549,39 +564,39 @@ def _shares(values: Floats) -> Floats:
     return np.asarray(share / share.sum())
 
 
-_FALL = 1.92  # of the log posterior density at the ends: half of the 95 % quantile of χ² with one degree of freedom
+_FALL = 1.92  # of the log posterior density at the ends: half the 95 % quantile of χ² with one degree of freedom
 _STRIDES = 8
 
 
-def profile_end(evidence: Evidence, place: int, limit: float) -> float | None:
-    """Where between a limit and the most probable value the log posterior density has fallen by 1.92.
+def profile_end(evidence: Evidence, index: int, limit: float) -> float | None:
+    """The value between a limit and the most probable one at which the log posterior density has fallen by 1.92.
 
     Parameters
     ----------
     evidence
         The fit.
-    place
-        Of the parameter among the model's; the others are fitted anew at each of its values.
+    index
+        Of the parameter among the model's; the others are fitted again at each of its values.
     limit
         Fit coordinate.
 
     Returns
     -------
     float or None
-        Fit coordinate; None where the density has not fallen that far at the limit: the interval goes beyond it.
+        Fit coordinate; None where the density has not fallen that far at the limit: the interval extends beyond it.
     """
-    entry = evidence.hypothesis.model.parameters[place]
-    middle = float(evidence.point.fit[place])
-    values = np.linspace(np.clip(limit, *entry.bounds), middle, _STRIDES, endpoint=False)
-    held = Fitter([evidence.hypothesis], held=[(place,)])
-    begun = held.evaluate(held_points(held, [evidence], [place], [0] * _STRIDES, values))
-    fitted = held.descend(held.update_noise_levels(begun, 1), 1)
-    priors = np.array([entry.log_prior(value) for value in values.tolist()])
-    fallen = np.append(fitted.cost - priors - evidence.cost, 0.0)
-    beyond = np.flatnonzero(fallen > _FALL)
+    parameter = evidence.hypothesis.model.parameters[index]
+    mode = float(evidence.point.fit[index])
+    values = np.linspace(np.clip(limit, *parameter.bounds), mode, _STRIDES, endpoint=False)
+    held = Fitter([evidence.hypothesis], held=[(index,)])
+    initial = held.evaluate(held_points(held, [evidence], [index], [0] * _STRIDES, values))
+    fitted = held.descend(held.update_noise_levels(initial, 1), 1)
+    priors = np.array([parameter.log_prior(value) for value in values.tolist()])
+    falls = np.append(fitted.cost - priors - evidence.cost, 0.0)
+    beyond = np.flatnonzero(falls > _FALL)
     if not len(beyond):
         return None
-    values = np.append(values, middle)
+    values = np.append(values, mode)
     last = int(beyond[-1])
-    share = (fallen[last] - _FALL) / (fallen[last] - fallen[last + 1])
+    share = (falls[last] - _FALL) / (falls[last] - falls[last + 1])
     return float(values[last] + share * (values[last + 1] - values[last]))

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from underskin.diagnosis.inference.evidence import (
-    around_levels,
-    around_mean,
+    level_integrals,
     marginalise_sensor_spread,
+    mean_integrals,
 )
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
@@ -147,7 +147,7 @@ def with_hidden_mechanism(
     slices = parameter_slices(names, hypothesis.lines)
     new = range(slices[name].start, slices[name].stop)
     if any(
-        len(explanation.own(mechanism)) != slices[mechanism].stop - slices[mechanism].start
+        len(explanation.coordinates(mechanism)) != slices[mechanism].stop - slices[mechanism].start
         for mechanism in explanation.names
     ):
         return None  # with it another mechanism has other parameters
@@ -156,16 +156,16 @@ def with_hidden_mechanism(
     fit = np.zeros((len(levels), len(hypothesis.model.parameters)))
     fit[:, hypothesis.mechanism_parameter_count :] = best.point.fit[best.hypothesis.mechanism_parameter_count :]
     for mechanism in explanation.names:
-        fit[:, slices[mechanism]] = explanation.own(mechanism)
+        fit[:, slices[mechanism]] = explanation.coordinates(mechanism)
     for column, parameter in zip(new, parameters, strict=True):
         fit[:, column] = [parameter.quantile(level) for level in levels[:, column - new.start].tolist()]
     held = Fitter([hypothesis], held=[new])
     at = _fitted(held, fit, explanation)
     if not len(at):
         return None
-    values, covariances = around_mean(held, at)
-    log_evidence = values + around_levels(held, at)
-    reference = around_mean(best.fitter, best.at)[0] + around_levels(best.fitter, best.at)
+    values, covariances = mean_integrals(held, at)
+    log_evidence = values + level_integrals(held, at)
+    reference = mean_integrals(best.fitter, best.at)[0] + level_integrals(best.fitter, best.at)
     gained = log_evidence - reference
     shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
     index = [parameter.name for parameter in hypothesis.model.parameters].index(parameter_name)

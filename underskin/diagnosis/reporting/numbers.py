@@ -225,12 +225,12 @@ def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
         return np.zeros(1)
     other_names = tuple(name for name in names if all(name != law.name for law in laws))
     with_law, without = (
-        problem.hypothesis(mechanism_names, has_position_scatter=False, whole=True)
+        problem.hypothesis(mechanism_names, has_position_scatter=False, all_lines=True)
         for mechanism_names in (names, other_names)
     )
     fit = np.zeros(len(without.model.parameters))
     for name, span in parameter_slices(other_names, without.lines).items():
-        fit[span] = explanation.own(name)
+        fit[span] = explanation.coordinates(name)
     fit[without.mechanism_parameter_count :] = explanation.point.fit[with_law.mechanism_parameter_count :]
     here, there = (
         np.abs(hypothesis.frf_model.predict(at, slopes=False, place=False).value)

@@ -57,7 +57,7 @@ class LeadingLaw:
             return None
         values = {
             parameter.name: parameter.from_fit(at)
-            for parameter, at in zip(law.parameters_bound, explanation.own(law.name), strict=True)
+            for parameter, at in zip(law.parameters_bound, explanation.coordinates(law.name), strict=True)
         }
         return cls(law, values, explanation)
 

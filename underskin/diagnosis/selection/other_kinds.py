@@ -183,7 +183,10 @@ class OtherKind:
                 default=None,
             )
             start = self._explanations[frozenset()].point
-            requests = [Request(ordered, begin=start, never_pruned=True), Request(ordered, parent, never_pruned=True)]
+            requests = [
+                Request(ordered, nuisances=start, never_pruned=True),
+                Request(ordered, parent, never_pruned=True),
+            ]
             fits = self.problem.explain(requests if parent else requests[:1])
             best = max(
                 (explanation for explanation in fits if explanation), key=lambda explanation: explanation.log_evidence

@@ -44,7 +44,7 @@ def search(
     nothing, singles = Request(()), [Request((name,)) for name in sets.names]
     sets.explain([nothing])
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
-        singles = [replace(request, begin=sets.explanations[frozenset()].point) for request in singles]
+        singles = [replace(request, nuisances=sets.explanations[frozenset()].point) for request in singles]
     sets.explain(singles)
     sets.explain([Request(sets.ordered(names), never_pruned=True) for names in required_sets if len(names) > 1])
     for size in range(2, (LARGEST if required_sets else _LARGEST_OF_ONE_KIND) + 1):

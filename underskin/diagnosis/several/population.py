@@ -346,7 +346,7 @@ class FleetSkin:
                 if fit is not None:
                     components = [
                         (_log_share(fit, evidence, bench), self._likelihood(fit, evidence, held))
-                        for _, evidence in fit.each
+                        for _, evidence in fit.fits
                     ]
                     likelihoods[names, departure] = Gaussian.mixture(components, *self._prior(departure))
         for names in sets:
@@ -410,7 +410,7 @@ class FleetSkin:
 
 def _log_share(fit: Explanation, evidence: Evidence, bench: Bench) -> float:
     """Log prior of a fit with or without positioning scatter, where there are both."""
-    if len(fit.each) == 1:
+    if len(fit.fits) == 1:
         return 0.0
     return float(
         np.log(

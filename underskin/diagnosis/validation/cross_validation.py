@@ -208,7 +208,7 @@ def _predict(
     training: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask, held_out_lines: Lines
 ) -> PredictionScore:
     """Of some of the rows, `held_out_lines`, from a fit to others; sensors in the training data keep their gain."""
-    model = problem.hypothesis(explanation.names, has_position_scatter=False, whole=True).model
+    model = problem.hypothesis(explanation.names, has_position_scatter=False, all_lines=True).model
     point, levels = explanation.point, explanation.best.levels
     if not isinstance(model, FrfModel):
         return _predict_curves(problem.lines, levels, model.predict(point.fit).value.real, rows, training)
