@@ -112,13 +112,13 @@ def _explained(problem: FittingProblem) -> list[Explanation]:
 
 def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:
     """Without positioning scatter and, where the diagnosis looked for it, with it."""
-    plain, has_position_scatter = (
+    plain, scattering = (
         Fitter([problem.hypothesis(explained.names, has_position_scatter)]) for has_position_scatter in (False, True)
     )
     without = nested(Posterior(plain, explained.point))
-    if explained.has_position_scatter == 0:
+    if explained.p_position_scatter == 0:
         return without
-    sampled = nested(Posterior(has_position_scatter, explained.point))
+    sampled = nested(Posterior(scattering, explained.point))
     parts = np.add(np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER]), [without.log_evidence, sampled.log_evidence])
     total = float(np.logaddexp.reduce(parts))
     error = float(np.hypot(*(np.exp(parts - total) * [without.error, sampled.error])))

@@ -264,7 +264,7 @@ class Explanation:
     names: tuple[str, ...]
     log_evidence: float
     best: Evidence
-    has_position_scatter: float  # probability that there is position scatter, given this set
+    p_position_scatter: float  # probability that there is position scatter, given this set
     fits: tuple[tuple[float, Evidence], ...]  # log prior and fit, without and with it, as far as fitted
 
     @classmethod
@@ -274,8 +274,8 @@ class Explanation:
         total = float(np.logaddexp.reduce(weights))
         best = fits[int(np.argmax(weights))][1]
         scattered = [fit.hypothesis.has_position_scatter for _, fit in fits]
-        has_position_scatter = float(np.exp(weights[scattered] - total).sum())
-        return cls(fits[0][1].hypothesis.model.names, total, best, has_position_scatter, tuple(fits))
+        p_position_scatter = float(np.exp(weights[scattered] - total).sum())
+        return cls(fits[0][1].hypothesis.model.names, total, best, p_position_scatter, tuple(fits))
 
     @property
     def model(self) -> Model:
@@ -314,7 +314,7 @@ class Request:
     @property
     def without_scatter(self) -> bool:
         """Whether it is fitted without position scatter."""
-        return self.parent is None or self.parent.has_position_scatter < _SCATTER_CERTAINTY
+        return self.parent is None or self.parent.p_position_scatter < _SCATTER_CERTAINTY
 
     def cost_to_beat(self, has_position_scatter: bool) -> float:
         """The cost below which a fit gains enough on the parent's; ∞ where there is none to compare.
@@ -324,7 +324,7 @@ class Request:
         if (
             self.parent is None
             or self.never_pruned
-            or (self.parent.has_position_scatter > 0.5) is not has_position_scatter
+            or (self.parent.p_position_scatter > 0.5) is not has_position_scatter
         ):
             return np.inf
         return self.parent.best.cost - _LEAST_GAIN
@@ -401,9 +401,9 @@ class FittingProblem:
         position_matters = self._position_matters(plain_hypotheses, parentless)
         for number, improved, evidence in fitted:
             parent = requests[number].parent
-            if evidence is None and parent is not None and parent.has_position_scatter <= 0.5:
+            if evidence is None and parent is not None and parent.p_position_scatter <= 0.5:
                 continue
-            tries_scatter = parent.has_position_scatter > 1 - _SCATTER_CERTAINTY if parent else position_matters[number]
+            tries_scatter = parent.p_position_scatter > 1 - _SCATTER_CERTAINTY if parent else position_matters[number]
             if evidence is not None:
                 fits[number].append((float(log_priors[0]) if tries_scatter or parent else 0.0, evidence))
             if tries_scatter:

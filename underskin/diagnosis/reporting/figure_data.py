@@ -264,8 +264,8 @@ def _frf_deviation(problem: FittingProblem, explanation: Explanation) -> Floats:
     of_line = (levels.level * lines.deviation) ** 2 + (
         pickup if len(pickup) == len(lines.value) else pickup[lines.recording]
     )
-    has_position_scatter = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
-    relative = levels.gain**2 + has_position_scatter + 0.5 * levels.position**4 * problem.curvature.square
+    position_variance = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
+    relative = levels.gain**2 + position_variance + 0.5 * levels.position**4 * problem.curvature.square
     parts = np.array([predicted.real, predicted.imag])
     return np.sqrt(of_line + relative[lines.recording] * parts**2)
 
@@ -431,10 +431,10 @@ class Thinned:
         variance = np.zeros(len(prediction.value))
         if self.lines.smooth is not None:
             variance += (levels.smooth * self.lines.smooth.scale) ** 2
-        has_position_scatter = (explanation.best.relative_place_slopes**2).sum(axis=0)[
+        squared_slopes = (explanation.best.relative_place_slopes**2).sum(axis=0)[
             explanation.best.hypothesis.lines.recording
         ]
-        variance += levels.position**2 * has_position_scatter * np.abs(prediction.value) ** 2
+        variance += levels.position**2 * squared_slopes * np.abs(prediction.value) ** 2
         variance += explanation.best.pickup_variance
         return variance if len(variance) == len(self.lines.value) else variance[self.lines.recording]
 

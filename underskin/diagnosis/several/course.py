@@ -279,7 +279,7 @@ class Bench:
     """The prior of the gain scatter's logarithm, and the probability of positioning scatter."""
 
     gain: Plateau
-    has_position_scatter: float
+    p_position_scatter: float
 
 
 def benches(candidates: Sequence[Candidate]) -> list[Bench]:
@@ -290,7 +290,7 @@ def benches(candidates: Sequence[Candidate]) -> list[Bench]:
     precision = 1 / (_FROM_SKIN_TO_SKIN**2 + 0.5 / np.maximum(recordings - 1, 1))
     usual = logit(1 - NO_POSITION_SCATTER)
     log_odds = (
-        logit(np.clip([leader.has_position_scatter for leader in leaders], _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY))
+        logit(np.clip([leader.p_position_scatter for leader in leaders], _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY))
         - usual
     )
     priors = []
@@ -298,10 +298,8 @@ def benches(candidates: Sequence[Candidate]) -> list[Bench]:
         other_specimens = np.arange(len(candidates)) != number
         weights = np.where(other_specimens, precision, 0.0)
         deviation = float(np.hypot(_FROM_SKIN_TO_SKIN, weights.sum() ** -0.5))
-        has_position_scatter = float(
+        p_position_scatter = float(
             np.clip(expit(usual + log_odds[other_specimens].sum()), _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
         )
-        priors.append(
-            Bench(Plateau.normal(float(weights @ log_gains / weights.sum()), deviation), has_position_scatter)
-        )
+        priors.append(Bench(Plateau.normal(float(weights @ log_gains / weights.sum()), deviation), p_position_scatter))
     return priors

@@ -413,9 +413,7 @@ def _log_share(fit: Explanation, evidence: Evidence, bench: Bench) -> float:
     if len(fit.fits) == 1:
         return 0.0
     return float(
-        np.log(
-            bench.has_position_scatter if evidence.hypothesis.has_position_scatter else 1 - bench.has_position_scatter
-        )
+        np.log(bench.p_position_scatter if evidence.hypothesis.has_position_scatter else 1 - bench.p_position_scatter)
     )
 
 
