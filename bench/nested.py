@@ -16,7 +16,7 @@ from bench.diagnosed import Effects, recorded
 from bench.figures import Figure
 from tests.support.nested_sampling import Posterior, Sampled, nested
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
@@ -107,7 +107,7 @@ def _compared(effects: Effects) -> Compared:
 def _explained(problem: FittingProblem) -> list[Explanation]:
     # One by one, so that none is pruned because of the others.
     results = [explanation for names in HYPOTHESES for explanation in problem.explain([Request(names)])]
-    return integrated([fit for fit in results if fit is not None])
+    return [fit for fit in results if fit is not None]
 
 
 def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:

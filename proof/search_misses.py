@@ -18,7 +18,7 @@ from proof.stored import Work, diagnosing, digest_of, of_each, sources, stored
 from proof.text_wide import is_miss
 from proof.true_starts import with_true_values
 from rig.wide_tails import WIDE
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import frf_problem, search
@@ -101,8 +101,8 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
         single_fits = problem.explain([Request((name,)) for name in ordered])
         requests += [Request(ordered, parent) for parent in single_fits if parent is not None]
     again = [problem.explain([request])[0] for request in requests]
-    integrated_fits = integrated([first, *(explanation for explanation in again if explanation is not None)])
-    return max(integrated_fits, key=lambda explanation: explanation.log_evidence)
+    fits = [first, *(explanation for explanation in again if explanation is not None)]
+    return max(fits, key=lambda explanation: explanation.log_evidence)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -7,11 +7,6 @@ outside the bounds), H the information on the mean parameters and the Hessian in
 probability that a normal with this mean and H⁻¹ gives to the bounds: one bound after another, each with the moments
 left by the ones before (exact for one bound; Mendell and Elston 1974).
 
-The position scatter is integrated over: its prior is flat between two values, and often the recordings do not
-determine it; the posterior of the gain scatter is then not Gaussian either. There Z is the integral over the logarithms
-of both, at the most probable prediction, from which the quadratic of the mean parameters leads on: sums at equal
-strides, as good as exact for what falls to nothing both ways.
-
 Indentations determine E/(1 − ν²), so that E and ν trade along a ridge, which ν between its bounds cuts short: a
 parameter that trades against one between bounds is integrated over that (`parts`). The posterior of a parameter over
 all values of the sensors' spread, which two sensors leave open by a factor, is a mixture over a grid of that spread
@@ -19,14 +14,13 @@ all values of the sensors' spread, which two sensors leave open by a factor, is 
 need not be Gaussian, ends it (`profile_end`).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.special import log_ndtr
 
-from underskin.diagnosis.inference.fit import GAIN, POSITION, Fitter
+from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
 from underskin.diagnosis.noise import NoiseLevels
@@ -272,174 +266,20 @@ def _log_between(a: float, b: float) -> float:
     return float(upper + np.log1p(-np.exp(min(lower - upper, -1e-15))))
 
 
-_TAIL_NATS = 4.0  # below the greatest value, where an integral ends
-_LONGEST_STRIDE = 0.3  # of log scatter: twice the standard deviation with which its prior falls off
-_GAIN_STRIDES = 8  # either way: at most 2.4 in log scatter; the flat part of its prior is 1.6 wide
-_NOISE_LEVEL_STEPS = 5  # Newton steps of the other noise levels at each value of the position scatter
-_STRIDES_AT_ONCE = 2  # either way, evaluated together before the tails are checked
-
-
-def laplace(fitter: Fitter, at: Evaluated) -> Evidence:
-    """The evidence at the most probable point, with the position scatter integrated over."""
-    return integrate_position_scatter(laplace_at(fitter, at))[0]
-
-
-def integrate_position_scatter(fits: Sequence[Evidence]) -> list[Evidence]:
-    """The evidence integrated over the position scatter, of the hypotheses that have it; the others as they are."""
-    results = list(fits)
-    for members in _groups(results, [fit.hypothesis.has_position_scatter for fit in results]):
-        for number, result in zip(members, _integrate_group([results[number] for number in members]), strict=True):
-            results[number] = result
-    return results
-
-
-def _groups(fits: Sequence[Evidence], selected: Sequence[bool]) -> list[list[int]]:
-    """Indices of the selected fits, in groups that can be evaluated together."""
-    groups: dict[object, list[int]] = {}
-    for number, fit in enumerate(fits):
-        if selected[number]:
-            groups.setdefault(fit.hypothesis.group(number), []).append(number)
-    return list(groups.values())
-
-
-@dataclass
-class _Integral:
-    """∫ Z(x) dx within bounds, from values at equal strides either way of `start` until Z is negligible.
-
-    Midpoint rule: each value stands for half a stride on either side, the last before a bound for all up to the bound.
-    """
-
-    start: float
-    stride: float
-    low: float
-    high: float
-    log_values: dict[float, float] = field(default_factory=dict)
-
-    def missing(self) -> list[float]:
-        """The values of x to evaluate next; none once Z is negligible both ways."""
-        if not self.log_values:
-            steps = list(range(-_STRIDES_AT_ONCE, _STRIDES_AT_ONCE + 1))
-            values = [self.start + step * self.stride for step in steps]
-        else:
-            least = max(self.log_values.values()) - _TAIL_NATS
-            first, last = min(self.log_values), max(self.log_values)
-            steps = list(range(1, _STRIDES_AT_ONCE + 1))
-            below = [first - step * self.stride for step in steps] if self.log_values[first] > least else []
-            above = [last + step * self.stride for step in steps] if self.log_values[last] > least else []
-            values = below + above
-        return [value for value in values if value == self.start or self.low <= value <= self.high]
-
-    @property
-    def log_total(self) -> float:
-        """The logarithm of the integral."""
-        values = np.array(sorted(self.log_values))
-        below, above = values[0] - self.low, self.high - values[-1]
-        half = self.stride / 2
-        edges = [values[0] - (below if below < self.stride else half), *((values[1:] + values[:-1]) / 2)]
-        edges.append(values[-1] + (above if above < self.stride else half))
-        logs = [self.log_values[value] for value in values.tolist()]
-        return float(np.logaddexp.reduce(logs + np.log(np.maximum(np.diff(edges), 1e-300))))
-
-
-def _evaluate_integrals(integrals: Sequence[_Integral], log_values: Callable[[list[int], Floats], Floats]) -> None:
-    """Evaluate the integrals until none misses a value; `log_values` gives log Z of integrals (by number) at values."""
-    while True:
-        missing = [(number, value) for number, integral in enumerate(integrals) for value in integral.missing()]
-        if not missing:
-            return
-        numbers, values = [number for number, _ in missing], np.array([value for _, value in missing])
-        for (number, value), log_value in zip(missing, log_values(numbers, values).tolist(), strict=True):
-            integrals[number].log_values[value] = log_value
-
-
-def held_points(
-    held: Fitter, fits: Sequence[Evidence], indices: Sequence[int], numbers: Sequence[int], values: Floats
-) -> Points:
-    """Points at which the held parameters have these values, and the others their conditional means by the quadratics.
-
-    `indices`: of the held parameter of each fit; `numbers`: the fit that each value belongs to.
-    """
-    coordinates = np.zeros((len(numbers), held.low.shape[1]))
-    for row, (number, value) in enumerate(zip(numbers, values.tolist(), strict=True)):
-        fit, index = fits[number], indices[number]
-        mean = fit.hypothesis.mean_indices
-        mean_index = mean.index(index)
-        slopes = fit.covariance[:, mean_index] / fit.covariance[mean_index, mean_index]
-        coordinates[row, : len(fit.point.fit)] = fit.point.fit
-        coordinates[row, mean] += slopes * (value - fit.point.fit[index])
-        coordinates[row] = np.clip(coordinates[row], held.low[number], held.high[number])
-        coordinates[row, index] = value
+def _held_points(held: Fitter, fit: Evidence, index: int, values: Floats) -> Points:
+    """Points at which the held parameter, at an index, has these values, and the others their conditional means by the
+    quadratic."""
+    mean = fit.hypothesis.mean_indices
+    mean_index = mean.index(index)
+    slopes = fit.covariance[:, mean_index] / fit.covariance[mean_index, mean_index]
+    coordinates = np.tile(fit.point.fit, (len(values), 1))
+    coordinates[:, mean] += slopes * (values[:, None] - fit.point.fit[index])
+    coordinates = np.clip(coordinates, held.low[0], held.high[0])
+    coordinates[:, index] = values
     covariance, sensor_log_gain = (
-        np.array([getattr(fits[number].point, name) for number in numbers])
-        for name in ("covariance", "sensor_log_gain")
+        np.tile(level, (len(values), 1)) for level in (fit.point.covariance, fit.point.sensor_log_gain)
     )
-    return Points(np.array(numbers, dtype=np.intp), coordinates, covariance, sensor_log_gain)
-
-
-def _integrate_group(fits: list[Evidence]) -> list[Evidence]:
-    """Fits that are evaluated together, with the integral over log p in place of its normal approximation; p is the
-    position scatter."""
-    fitter = Fitter([fit.hypothesis for fit in fits])
-    coordinates = np.zeros((len(fits), fitter.low.shape[1]))
-    for row, fit in zip(coordinates, fits, strict=True):
-        row[: len(fit.point.fit)] = fit.point.fit
-    covariance, sensor_log_gain = (
-        np.array([getattr(fit.point, name) for fit in fits]) for name in ("covariance", "sensor_log_gain")
-    )
-    best = fitter.evaluate(Points(np.arange(len(fits)), coordinates, covariance, sensor_log_gain))
-    log_slope_gradient = np.full((len(fits), fitter.lines.recordings, coordinates.shape[1]), np.nan)
-    for row, fit in zip(log_slope_gradient, fits, strict=True):
-        if fit.log_slope_gradient is not None:
-            row[:, : fit.log_slope_gradient.shape[-1]] = fit.log_slope_gradient[0]
-            row[:, fit.log_slope_gradient.shape[-1] :] = 0.0
-    best = replace(best, log_slope_gradient=log_slope_gradient)
-    hessian = fitter.covariance_equations(best)[1]
-    low, high = fitter.covariance[POSITION].low, fitter.covariance[POSITION].high
-    integrals = [
-        _Integral(float(fit.point.covariance[POSITION]), float(stride), low, high)
-        for fit, stride in zip(fits, _stride(hessian[:, POSITION, POSITION]), strict=True)
-    ]
-
-    def log_values(numbers: list[int], values: Floats) -> Floats:
-        starting_points = best[np.array(numbers)]
-        covariance = starting_points.points.covariance.copy()
-        covariance[:, POSITION] = values
-        shifted = fitter.weighed(fitter.with_covariance(starting_points.points, covariance), starting_points.products)
-        at = replace(
-            fitter.update_noise_levels(shifted, _NOISE_LEVEL_STEPS, held=POSITION),
-            log_slope_gradient=starting_points.log_slope_gradient,
-        )
-        return mean_integrals(fitter, at)[0] + _gain_integrals(fitter, at)
-
-    _evaluate_integrals(integrals, log_values)
-    quadratic = mean_integrals(fitter, best)[0] + level_integrals(fitter, best)
-    return [
-        replace(fit, log_evidence=fit.log_evidence + integral.log_total - log_integral)
-        for fit, integral, log_integral in zip(fits, integrals, quadratic.tolist(), strict=True)
-    ]
-
-
-def _gain_integrals(fitter: Fitter, at: Evaluated) -> Floats:
-    """Logarithms of the integrals over the noise levels other than the position scatter, relative to the density at the
-    points (points,): sums over the gain scatter, at which the others take their conditional means."""
-    hessian = fitter.covariance_equations(at)[1]
-    others = [index for index in range(hessian.shape[1]) if index not in (GAIN, POSITION)]
-    curvature = hessian[:, others][:, :, others]
-    stride = _stride(hessian[:, GAIN, GAIN])
-    steps = stride[:, None] * np.arange(-_GAIN_STRIDES, _GAIN_STRIDES + 1)
-    covariances = np.repeat(at.points.covariance[:, None], steps.shape[1], axis=1)
-    covariances[..., GAIN] += steps
-    slopes = np.linalg.solve(curvature, hessian[:, others, GAIN][..., None])[..., 0]
-    covariances[..., others] -= steps[..., None] * slopes[:, None]
-    gain_parameter = fitter.covariance[GAIN]
-    within = (covariances[..., GAIN] >= gain_parameter.low) & (covariances[..., GAIN] <= gain_parameter.high)
-    gains = np.where(within, at.cost[:, None] - fitter.costs(at, covariances), -np.inf)
-    return np.asarray(np.logaddexp.reduce(gains, axis=1) + np.log(stride) + log_volume(curvature))
-
-
-def _stride(curvature: Floats) -> Floats:
-    """One standard deviation, but no longer than resolves the edges of the priors of scatter."""
-    return np.asarray(np.maximum(curvature, _LONGEST_STRIDE**-2) ** -0.5)
+    return Points(np.zeros(len(values), dtype=np.intp), coordinates, covariance, sensor_log_gain)
 
 
 _UNDETERMINED = 0.3  # standard deviation over the range, at least; a uniform distribution has 0.29
@@ -490,12 +330,12 @@ def _refit_at(evidence: Evidence, index: int, values: Floats) -> list[Evidence]:
     Values are visited away from the most probable one, and each fit begins at the extrapolation of the two nearest:
     on a straight line from the most probable point, samples lose their contact.
     """
-    held = Fitter([evidence.hypothesis], held=[(index,)])
+    held = Fitter([evidence.hypothesis], held=[index])
     mode = float(evidence.point.fit[index])
     fitted_points: dict[float, FitPoint] = {mode: evidence.point}
     fits: dict[float, Evidence] = {}
     for value in sorted(values.tolist(), key=lambda value: abs(value - mode)):
-        starting_points = held_points(held, [evidence], [index], [0], np.array([value]))
+        starting_points = _held_points(held, evidence, index, np.array([value]))
         if len(fitted_points) > 1:
             near, far = sorted(fitted_points, key=lambda other: abs(other - value))[:2]
             step = (fitted_points[near].fit - fitted_points[far].fit) * (value - near) / (near - far)
@@ -588,8 +428,8 @@ def profile_end(evidence: Evidence, index: int, limit: float) -> float | None:
     parameter = evidence.hypothesis.model.parameters[index]
     mode = float(evidence.point.fit[index])
     values = np.linspace(np.clip(limit, *parameter.bounds), mode, _STRIDES, endpoint=False)
-    held = Fitter([evidence.hypothesis], held=[(index,)])
-    initial = held.evaluate(held_points(held, [evidence], [index], [0] * _STRIDES, values))
+    held = Fitter([evidence.hypothesis], held=[index])
+    initial = held.evaluate(_held_points(held, evidence, index, values))
     fitted = held.descend(held.update_noise_levels(initial, 1), 1)
     priors = np.array([parameter.log_prior(value) for value in values.tolist()])
     falls = np.append(fitted.cost - priors - evidence.cost, 0.0)

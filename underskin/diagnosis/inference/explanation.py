@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.evidence import Evidence, integrate_position_scatter, laplace_at
+from underskin.diagnosis.inference.evidence import Evidence, laplace_at
 from underskin.diagnosis.inference.fit import POSITION, Fitter, with_contact_points, with_softer_moduli
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import (
@@ -379,7 +379,7 @@ class FittingProblem:
 
         None where the log posterior density gains less than `_LEAST_GAIN` over the parent's: the added mechanism is not
         supported; and where a set is pruned, `_PRUNE_NATS` behind the others or the `best` cost so far. Evidences are
-        Laplace approximations, until they are `integrated`. Raises Unsupported.
+        Laplace approximations. Raises Unsupported.
         """
         plain_hypotheses, scattered_hypotheses = (
             [self.hypothesis(request.names, with_position_scatter) for request in requests]
@@ -470,21 +470,6 @@ class FittingProblem:
                 for owner, number in enumerate(members):
                     matters[number] = bool(shows[together.owner == owner].any())
         return matters
-
-
-def integrated(explanations: Sequence[Explanation]) -> list[Explanation]:
-    """The explanations with their fits integrated over the position scatter, except negligible ones."""
-    counted = []
-    for number, explanation in enumerate(explanations):
-        least = max(prior + fit.log_evidence for prior, fit in explanation.fits) - _NEGLIGIBLE_NATS
-        counted += [
-            (number, index) for index, (prior, fit) in enumerate(explanation.fits) if prior + fit.log_evidence > least
-        ]
-    fits = [list(explanation.fits) for explanation in explanations]
-    integrated_fits = integrate_position_scatter([fits[number][index][1] for number, index in counted])
-    for (number, index), fit in zip(counted, integrated_fits, strict=True):
-        fits[number][index] = fits[number][index][0], fit
-    return [Explanation.of(of_explanation) for of_explanation in fits]
 
 
 def _fitted(

@@ -66,9 +66,8 @@ class Fitter:
     """Evaluates, starts and improves points of hypotheses of the same recordings with the same covariance
     parameters."""
 
-    def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[Collection[int]] | None = None) -> None:
-        """Prepare names and bounds; the parameters of each hypothesis with indices `held` are fixed and have no
-        prior."""
+    def __init__(self, hypotheses: Sequence[Hypothesis], held: Collection[int] = ()) -> None:
+        """Prepare names and bounds; parameters with indices `held` are fixed and have no prior."""
         self.hypotheses = tuple(hypotheses)
         first = hypotheses[0]
         self.lines, self.curvature, self.has_position_scatter = first.lines, first.curvature, first.has_position_scatter
@@ -83,7 +82,7 @@ class Fitter:
         self._freedom = np.full(shape, np.inf)
         self._log_prior_height = np.zeros(len(hypotheses))
         for number, hypothesis in enumerate(hypotheses):
-            indices = [index for index in hypothesis.mean_indices if held is None or index not in held[number]]
+            indices = [index for index in hypothesis.mean_indices if index not in held]
             self.free[number, indices] = True
             self.low[number, : self.counts[number]], self.high[number, : self.counts[number]] = hypothesis.bounds
             priors = hypothesis.priors[:, indices]
@@ -272,8 +271,8 @@ class Fitter:
         np.put_along_axis(fit, self.covariance_indices[points.owner], covariance[:, self._shared_count :], axis=1)
         return replace(points, covariance=covariance, fit=fit)
 
-    def update_noise_levels(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
-        """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.
+    def update_noise_levels(self, at: Evaluated, steps: int) -> Evaluated:
+        """Newton steps of the covariance parameters, at fixed predictions.
 
         Where mechanisms have covariance parameters these are correlated, so the steps are joint.
         """
@@ -282,7 +281,7 @@ class Fitter:
             and not self.covariance_indices.size
             and self.hypotheses[0].model.pickup is None
         ):
-            return self._update_independently(at, at.products, steps, held)
+            return self._update_independently(at, at.products, steps)
         from underskin.diagnosis.inference.kernels import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
 
         low, high = self._lowest, self._highest
@@ -291,8 +290,6 @@ class Fitter:
         for _ in range(steps):
             part = Evaluated(points, products, cost.copy()).subset(moving)
             gradient, hessian = self.covariance_equations(part, first_mixed=self._shared_count)
-            if held is not None:
-                hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0
             eigenvalues, vectors = np.linalg.eigh(hessian)
             along = np.einsum("nij,ni->nj", vectors, gradient) / np.maximum(np.abs(eigenvalues), 1.0)
             step = -np.einsum("nij,nj->ni", vectors, along)
@@ -322,7 +319,7 @@ class Fitter:
                 break
         return Evaluated(points, at.products, cost, at.log_slope_gradient)
 
-    def _update_independently(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
+    def _update_independently(self, at: Evaluated, products: FrfProducts, steps: int) -> Evaluated:
         """The same where no mechanism acts on the covariance: each parameter takes its own steps."""
         from underskin.diagnosis.inference.kernels import update_noise_levels
 
@@ -348,7 +345,6 @@ class Fitter:
             self._lowest,
             self._highest,
             steps,
-            -1 if held is None else held,
             covariance,
             cost,
         )

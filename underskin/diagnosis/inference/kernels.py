@@ -219,7 +219,6 @@ def _newton_step(
     here: Floats,
     lowest: Floats,
     highest: Floats,
-    held: int,
     noise: Floats,
     of_point: tuple[Array, ...],
     sums: tuple[Floats, Floats],
@@ -244,7 +243,7 @@ def _newton_step(
         slope = (up - down) / (2 * STEP) + curvature * (here[parameter] - value)
         step[parameter] = -slope / max(abs(curvature), 1.0)
         low, high = here[parameter] <= lowest[parameter], here[parameter] >= highest[parameter]
-        if parameter == held or (low and step[parameter] < 0) or (high and step[parameter] > 0):
+        if (low and step[parameter] < 0) or (high and step[parameter] > 0):
             step[parameter] = 0.0
         largest = max(largest, abs(step[parameter]))
     step *= min(1.0, LARGEST_STEP / largest)
@@ -253,7 +252,7 @@ def _newton_step(
 @compiled(
     "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], int64[::1], "
     "float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, boolean, float64[:, ::1], float64[::1], "
-    "float64[::1], int64, int64, float64[:, ::1], float64[::1])"
+    "float64[::1], int64, float64[:, ::1], float64[::1])"
 )
 def update_noise_levels(
     level: Floats,
@@ -273,7 +272,6 @@ def update_noise_levels(
     lowest: Floats,
     highest: Floats,
     steps: int,
-    held: int,
     covariance: Floats,
     cost: Floats,
 ) -> None:
@@ -294,8 +292,8 @@ def update_noise_levels(
         Of the sensors' gains.
     plateaus, lowest, highest
         Prior (parameters, 5) and bounds (parameters,).
-    steps, held
-        Most steps, and the index of the parameter that is fixed; -1 for none.
+    steps
+        Most steps.
     """
     count = covariance.shape[1]
     noise, step, tried = np.zeros(4), np.empty(count), np.empty(count)
@@ -319,7 +317,7 @@ def update_noise_levels(
         constants = about_means, numbers, has_position_scatter, plateaus
         best = initial_cost = _cost(here, noise, of_point, sums, constants)
         for _ in range(steps):
-            _newton_step(here, lowest, highest, held, noise, of_point, sums, constants, step)
+            _newton_step(here, lowest, highest, noise, of_point, sums, constants, step)
             gained = 0.0
             for _ in range(TRIES):
                 _move_within_bounds(here, step, lowest, highest, tried)

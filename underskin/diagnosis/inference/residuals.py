@@ -159,7 +159,7 @@ def with_hidden_mechanism(
         fit[:, slices[mechanism]] = explanation.coordinates(mechanism)
     for column, parameter in zip(new, parameters, strict=True):
         fit[:, column] = [parameter.quantile(level) for level in levels[:, column - new.start].tolist()]
-    held = Fitter([hypothesis], held=[new])
+    held = Fitter([hypothesis], held=new)
     at = _fitted(held, fit, explanation)
     if not len(at):
         return None

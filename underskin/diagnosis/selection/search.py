@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence
@@ -29,8 +29,6 @@ from underskin.units import Floats
 
 _DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted
 _PARENTS, _LARGEST_OF_ONE_KIND = 3, 3
-_INTEGRATED_ANYHOW = 3  # sets whose evidence is integrated in any case
-_INTEGRATED_WITHIN = 6.0  # nats behind the best within which integrating, which moves it by less than 2, may matter
 _PAIRED = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.LOAD_INCREMENT)  # of which two may cancel
 _PARENT_WITHIN = 12.0  # nats behind the best within which a single is a parent
 
@@ -48,9 +46,7 @@ def search(
     sets.explain(singles)
     sets.explain([Request(sets.ordered(names), never_pruned=True) for names in required_sets if len(names) > 1])
     for size in range(2, (LARGEST if required_sets else _LARGEST_OF_ONE_KIND) + 1):
-        sets.integrate(1)
         sets.grow(size)
-    sets.integrate(_INTEGRATED_ANYHOW)
     return sets.search
 
 
@@ -67,15 +63,13 @@ def _unsupported(problem: FittingProblem) -> dict[str, str]:
 
 @dataclass
 class _Sets:
-    """The sets that were fitted so far, those that were `tried`, and those whose evidence is `integrated` over the
-    position scatter."""
+    """The sets that were fitted so far, and those that were `tried`."""
 
     problem: FittingProblem
     unsupported: dict[str, str]
     required: Sequence[frozenset[str]]
     explanations: dict[frozenset[str], Explanation] = field(default_factory=dict)
     tried: set[frozenset[str]] = field(default_factory=set)
-    integrated: set[frozenset[str]] = field(default_factory=set)
 
     @property
     def names(self) -> list[str]:
@@ -111,20 +105,6 @@ class _Sets:
                 if explanation is not None:
                     self.explanations[names] = explanation
             requests = later
-
-    def integrate(self, best: int) -> None:
-        """Integrate the evidence that may count, and that of the `best` in any case."""
-        weight = self.search.log_weight
-        ranked = sorted(self.explanations, key=lambda names: weight(self.explanations[names]), reverse=True)
-        least = weight(self.explanations[ranked[0]]) - _INTEGRATED_WITHIN
-        chosen = [
-            names
-            for rank, names in enumerate(ranked)
-            if names not in self.integrated and (rank < best or weight(self.explanations[names]) > least)
-        ]
-        evidences = integrated([self.explanations[names] for names in chosen])
-        self.explanations |= dict(zip(chosen, evidences, strict=True))
-        self.integrated |= set(chosen)
 
     def grow(self, size: int) -> None:
         """Add sets of so many mechanisms: the best with one less, each with one more, and pairs that may cancel."""

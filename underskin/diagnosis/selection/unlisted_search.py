@@ -20,7 +20,6 @@ import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.inference.residuals import (
     force_and_slopes,
     information,
@@ -339,7 +338,6 @@ _SINGLE_LAWS = 5  # laws on FRFs that are fitted without mechanisms where no set
 _DECISIVE = 50.0  # gain over the best set [nats], from which on that set holds wrong mechanisms in place of the law
 _LEAST_SINGLE = 5.0  # gain of a law that is fitted without mechanisms [nats]
 _LEAST_OVER_SLOW_NOISE = 25.0  # gain on curves with slow noise in the air [nats]
-_MOST_INTEGRATED, _INTEGRATION_MARGIN = 4, 6.0  # laws whose evidence is integrated, and nats behind the best one
 
 
 def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
@@ -372,19 +370,7 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
         fitted += _with_named_mechanisms(problem, search, fitted)
     fitted += _without_companions(problem, fitted)
     fitted.sort(key=search.log_weight, reverse=True)
-    if problem.lines.curves:  # whose integrals take the longest and change little
-        return _beyond_slow_noise(problem, search, fitted)
-    close = [
-        explanation
-        for explanation in fitted
-        if search.log_weight(explanation) > search.log_weight(fitted[0]) - _INTEGRATION_MARGIN
-    ]
-    integrated = close[:_MOST_INTEGRATED]
-    return (
-        [*integrate(integrated), *(explanation for explanation in fitted if explanation not in integrated)]
-        if integrated
-        else []
-    )
+    return _beyond_slow_noise(problem, search, fitted) if problem.lines.curves else fitted
 
 
 def _beyond_slow_noise(problem: FittingProblem, search: Search, fitted: Sequence[Explanation]) -> list[Explanation]:
