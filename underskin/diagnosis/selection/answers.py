@@ -3,6 +3,12 @@
 The probability of a set is its prior times its evidence over the sum of all; a set that holds a mechanism which does
 not show says no more than the smaller one, which stands for both. Sets with an unlisted law make up `none_of_these`.
 
+Evidence is likelihood at the best fit, times the prior density there, times Occam's factor: the share of the prior's
+range that fits. That factor penalises extra parameters, but between sets of equally many mechanisms that fit equally
+well it would decide by the widths that were chosen for this catalogue. So among sets of as many mechanisms as the
+leading one none is less probable than that by Occam's factor alone, and a set with an unlisted law has at most the
+factor of the best set of mechanisms of its size.
+
 Until E is known, a contact that is computed beyond the tables, by a modulus that was declared too small, counts in
 every hypothesis: each predicts it, the null hypothesis by continuation of the tables. Contacts that lie within the
 tables under answers of some probability are kept; the others are left out and the rest is diagnosed again.
@@ -18,14 +24,17 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
-from underskin.diagnosis.selection.priors import log_prior_of, log_prior_of_discrepancy, must_gain
+from underskin.diagnosis.selection.priors import guess_count, log_prior_of, log_prior_of_discrepancy, must_gain
 from underskin.mechanisms.unlisted.laws import UnlistedLaw
 
 P_NOT_IN_MODEL_SPACE = 0.015  # probability that none of what was compared is right
 _EQUAL = 0.01  # nats, within which laws are equally probable: those of one course over two axes
 _NEGLIGIBLE = 1e-6  # probability of a set of mechanisms of the curves alone
 _ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
+_ACCURACY = 0.1  # of Laplace's method [nats]: sets of equal size whose evidences differ by less are ranked by their fit
+_LEAST_GAP = 1e-6  # by which a leading set stays in front of its equals [nats]
 _STANDS = 0.2  # probability of all answers together by which a contact lies within the tables
 
 
@@ -58,6 +67,35 @@ def leading_first(ranked: Sequence[Answer]) -> list[Answer]:
     most = max(by_kind, key=lambda kind: by_kind[kind])
     leader = next(answer for answer in ranked if answer.kind == most)
     return [leader, *(answer for answer in ranked if answer is not leader)]
+
+
+def fit_and_plausibility(explanation: Explanation) -> float:
+    """Log likelihood plus log prior density at the best fit, the latter relative to the priors' peaks."""
+    slices = parameter_slices(explanation.names, explanation.best.hypothesis.lines)
+    parameters = [parameter for indices in slices.values() for parameter in explanation.model.parameters[indices]]
+    return -explanation.best.cost - sum(parameter.log_prior(parameter.start) for parameter in parameters)
+
+
+def _log_occam(explanation: Explanation) -> float:
+    """The logarithm of Occam's factor."""
+    return explanation.log_evidence - fit_and_plausibility(explanation)
+
+
+def without_occam(fits: Sequence[tuple[Explanation, float]]) -> list[float]:
+    """The log weights of sets, those of as many guesses as the leading one raised to what fit and plausibility give
+    beside it, if that is more; the leading one stays in front."""
+    weights = np.array([weight for _, weight in fits])
+    sizes = np.array([guess_count(fitted) for fitted, _ in fits])
+    highest = weights.max()
+    equal = (sizes == sizes[np.argmax(weights)]) & (sizes > 0)
+    if not equal.any():
+        return weights.tolist()
+    merit = np.array([fit_and_plausibility(fitted) for fitted, _ in fits])
+    leader = int(np.argmax(np.where(equal & (weights > highest - _ACCURACY), merit, -np.inf)))
+    raised = np.minimum(np.maximum(weights, highest + merit - merit[leader]), highest - _LEAST_GAP)
+    weights = np.where(equal, raised, weights)
+    weights[leader] = highest
+    return weights.tolist()
 
 
 def remainder(explanation: Explanation) -> tuple[float, float] | None:
@@ -102,8 +140,22 @@ class Search:
         return log_prior_of_discrepancy(explanation, self.supported)
 
     def log_weight(self, explanation: Explanation) -> float:
-        """The logarithm of prior times evidence."""
-        return explanation.log_evidence + self.log_prior(explanation)
+        """The logarithm of prior times evidence; a set with an unlisted law has at most the Occam factor of the best
+        set of mechanisms of its size."""
+        weight = explanation.log_evidence + self.log_prior(explanation)
+        mechanisms = explanation.best.hypothesis.lines.mechanisms
+        largest = self._log_occam_by_size.get(len(explanation.names))
+        if largest is None or all(name in mechanisms.named for name in explanation.names):
+            return weight
+        return weight - max(0.0, _log_occam(explanation) - largest)
+
+    @cached_property
+    def _log_occam_by_size(self) -> dict[int, float]:
+        """The logarithm of Occam's factor of the best set of mechanisms of each size."""
+        best: dict[int, Explanation] = {}
+        for fitted in sorted(self.explanations, key=lambda fitted: fitted.log_evidence):
+            best[len(fitted.names)] = fitted
+        return {size: _log_occam(fitted) for size, fitted in best.items()}
 
     @cached_property
     def _log_evidence(self) -> dict[frozenset[str], float]:
@@ -165,7 +217,7 @@ class Search:
         for fitted, weight in self.weighed:
             (named if fitted.names or remainder(fitted) is None else unlisted).append((fitted, weight))
         log_unlisted = np.logaddexp.reduce([weight for _, weight in unlisted]) if unlisted else -np.inf
-        weights = np.array([*(weight for _, weight in named), log_unlisted])
+        weights = np.array([*(without_occam(named) if named else ()), log_unlisted])
         probabilities = (1 - P_NOT_IN_MODEL_SPACE) * np.exp(weights - np.logaddexp.reduce(weights))
         probabilities[-1] += P_NOT_IN_MODEL_SPACE
         if self.other_tip:
