@@ -1,7 +1,10 @@
 """Which sets of mechanisms are fitted; `answers` makes their probabilities.
 
 Nothing and every single are fitted. Sets of two and three grow from the best, one mechanism at a time; in any case all
-pairs are fitted of curves, and of laws of declared values, material, contact and increment: two may cancel.
+pairs are fitted of curves, and of laws of declared values, material, contact and increment: two may cancel. A fit that
+begins at one mechanism's best parameters may end where the other one does not show, since two laws that bend a curve
+alike can share that in many ways. So where the best set of curves leaves more than noise, their pairs are fitted again
+from starts over the parameters of both.
 
 Several kinds of recordings in one campaign are explained together, unless they contradict each other. That curves and
 FRFs are of one material is a hypothesis: its rival, that each kind has a modulus and strengths of its own, has the
@@ -18,6 +21,7 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.fit import LEVEL, SMOOTH, Fitter
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence
@@ -27,6 +31,9 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+_STUCK = 1.0  # nats that a fit from other starts must gain
+_SMOOTH_ERROR = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
+_ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
 _DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted
 _PARENTS, _LARGEST_OF_ONE_KIND = 3, 3
 _PAIRED = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.LOAD_INCREMENT)  # of which two may cancel
@@ -110,7 +117,9 @@ class _Sets:
         """Add sets of so many mechanisms: the best with one less, each with one more, and pairs that may cancel."""
         mechanisms, curves = self.problem.lines.mechanisms, self.problem.lines.curves
         if curves and size == 2:
-            self.explain(self._pairs(self.names))
+            pairs = self._pairs(self.names)
+            self.explain(pairs)
+            self._refit_from_prior(pairs)
             return
         requests = [
             Request(self.ordered(frozenset({*parent.names, name})), parent, self.explanations.get(frozenset([name])))
@@ -141,6 +150,38 @@ class _Sets:
         best = next(fitted for fitted in ranked if len(fitted.names) < size)
         required = [fitted for fitted in smaller if frozenset(fitted.names) in self.required][:1]
         return [fitted for fitted in smaller if fitted is best or fitted in required]
+
+    def _refit_from_prior(self, pairs: Sequence[Request]) -> None:
+        """Fit pairs of curves from starts over the parameters of both, where the best set leaves something for that to
+        matter; a fit that is better takes the place of the one from a single."""
+        best = min(self.explanations.values(), key=lambda fitted: fitted.best.cost)
+        if smooth_error_gain(best) < _SMOOTH_ERROR:
+            return
+        mechanisms = self.problem.lines.mechanisms
+        requests = [
+            Request(
+                pair.names,
+                nuisances=None if any(mechanisms[name].moves_contact_points for name in pair.names) else best.point,
+            )
+            for pair in pairs
+        ]
+        for request, fitted in zip(requests, self.problem.explain(requests, best.best.cost), strict=True):
+            names = frozenset(request.names)
+            before = self.explanations.get(names)
+            if fitted is not None and (before is None or fitted.best.cost < before.best.cost - _STUCK):
+                self.explanations[names] = fitted
+
+
+def smooth_error_gain(explanation: Explanation) -> float:
+    """Nats that a smooth error brings an explanation of curves over the least one and rougher noise."""
+    fitter = Fitter([explanation.best.hypothesis])
+    at = fitter.evaluate(fitter.at(explanation.point), slopes=False)
+    points = at.points[np.zeros(len(_ROUGHER), dtype=np.intp)]
+    covariance = points.covariance.copy()
+    covariance[:, LEVEL] += np.log(_ROUGHER)
+    covariance[:, SMOOTH] = explanation.best.hypothesis.covariance[SMOOTH].low
+    without = fitter.evaluate(replace(points, covariance=covariance), slopes=False)
+    return float(without.cost.min() - at.cost[0])
 
 
 def frf_problem(
