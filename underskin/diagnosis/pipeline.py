@@ -30,6 +30,7 @@ from underskin.diagnosis.validation.cross_validation import (
     largest_floor_percent,
     nearest_law_findings,
 )
+from underskin.diagnosis.validation.imitation import odds_of_imitated_laws
 from underskin.diagnosis.validation.signatures import (
     Signatures,
     confounding,
@@ -193,12 +194,12 @@ def _complete(
 ) -> DiagnosisResult:
     """All steps after the search."""
     progress(0.65)
-    result = replace(result, other_tip=_other_tip_share(partial, problem))
     signatures = Signatures(problem)
     confounded = confounding(signatures)
     progress(0.7)
-    leader = result.answers[0]
     null = next(explanation for explanation in result.explanations if not explanation.names)
+    result = replace(result, unlisted_odds=_unlisted_odds(partial, problem, result, null))
+    leader = result.answers[0]
     stated = result.fit_behind(leader)
     axes, ranges, size = _locate(problem, null, stated.best.levels)
     progress(0.8)
@@ -253,12 +254,15 @@ def _scatter_findings(problem: FittingProblem, stated: Explanation) -> list[Find
     return [Finding(Reason.UNUSUAL_SCATTER, "", "frf", {"percent": 100 * gain, "usual": 100 * usual})]
 
 
-def _other_tip_share(partial: DiagnosisResult, problem: FittingProblem) -> float:
-    """The share of curves whose tip looks like a cone, for which there is no mechanism; 0 of FRFs."""
-    if not problem.lines.curves:
+def _unlisted_odds(partial: DiagnosisResult, problem: FittingProblem, result: Search, null: Explanation) -> float:
+    """Of indentations: the least odds of something unlisted beside the leading set, by the laws that this imitates, and
+    by the share of curves whose tip looks like a cone, for which there is no mechanism."""
+    leader = result.answers[0].explanation
+    if problem.kind != "indentation" or leader is None:
         return 0.0
     tips = {finding.recording for finding in partial.findings if finding.reason is Reason.TIP_SHAPE}
-    return min(len(tips) / problem.lines.recordings, 1.0)
+    share = min(len(tips) / problem.lines.recordings, 1.0)
+    return max(share, odds_of_imitated_laws(leader, null, result.supported))
 
 
 def refused(problems: Sequence[RecordingProblem]) -> list[Finding]:

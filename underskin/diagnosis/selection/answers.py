@@ -26,7 +26,13 @@ from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
-from underskin.diagnosis.selection.priors import guess_count, log_prior_of, log_prior_of_discrepancy, must_gain
+from underskin.diagnosis.selection.priors import (
+    declared_laws,
+    guess_count,
+    log_prior_of,
+    log_prior_of_discrepancy,
+    must_gain,
+)
 from underskin.mechanisms.unlisted.laws import UnlistedLaw
 
 P_NOT_IN_MODEL_SPACE = 0.015  # probability that none of what was compared is right
@@ -118,7 +124,7 @@ class Search:
     laws: tuple[Explanation, ...] = ()  # sets with one unlisted law
     tried: int = 0  # sets, of which the explanations are those that were not pruned
     other_kinds: CurveLikelihood | None = None
-    other_tip: float = 0.0  # odds, beside the leading set, that tips have another shape than declared
+    unlisted_odds: float = 0.0  # least odds of what is unlisted beside the leading set
 
     @property
     def supported(self) -> int:
@@ -217,15 +223,41 @@ class Search:
         for fitted, weight in self.weighed:
             (named if fitted.names or remainder(fitted) is None else unlisted).append((fitted, weight))
         log_unlisted = np.logaddexp.reduce([weight for _, weight in unlisted]) if unlisted else -np.inf
-        weights = np.array([*(without_occam(named) if named else ()), log_unlisted])
+        if named:
+            named = [(fitted, weight) for (fitted, _), weight in zip(named, without_occam(named), strict=True)]
+            named += self._with_companions(named)
+        weights = np.array([*(weight for _, weight in named), log_unlisted])
         probabilities = (1 - P_NOT_IN_MODEL_SPACE) * np.exp(weights - np.logaddexp.reduce(weights))
         probabilities[-1] += P_NOT_IN_MODEL_SPACE
-        if self.other_tip:
-            probabilities[-1] = max(probabilities[-1], self.other_tip * probabilities[:-1].max(initial=0.0))
-            probabilities /= probabilities.sum()
+        probabilities[-1] = max(probabilities[-1], self.unlisted_odds * probabilities[:-1].max(initial=0.0))
+        probabilities /= probabilities.sum()
         answers = list(map(Answer, [*(fitted for fitted, _ in named), None], probabilities.tolist()))
         answers = [part for answer in answers for part in self._by_curves_alone(answer)]
         return leading_first(sorted(answers, key=lambda answer: -answer.probability))
+
+    def _with_companions(self, named: Sequence[tuple[Explanation, float]]) -> list[tuple[Explanation, float]]:
+        """Of indentations: the sets with one mechanism more than one of these that gain evidence, but less than shows.
+
+        So little is no evidence, as laws of contact idealise, but no reason against the mechanism either: beside the
+        smaller set each has the weight of its prior.
+        """
+        lines = self.explanations[0].best.hypothesis.lines
+        if lines.kind != "indentation":
+            return []
+        shown = {frozenset(fitted.names): (fitted, weight) for fitted, weight in named}
+        declared = declared_laws(lines)
+        companions = []
+        for fitted in self.explanations:
+            names = frozenset(fitted.names)
+            smaller = [names - {name} for name in names - declared if names - {name} in shown]
+            gains = [fitted.log_evidence > self._log_evidence[less] for less in smaller]
+            if names not in shown and smaller and all(gains):
+                weights = [
+                    weight + self.log_prior(fitted) - self.log_prior(less)
+                    for less, weight in (shown[less] for less in smaller)
+                ]
+                companions.append((fitted, max(weights)))
+        return companions
 
     def _by_curves_alone(self, answer: Answer) -> list[Answer]:
         """An answer with each set of mechanisms that act on the curves of another kind alone."""
