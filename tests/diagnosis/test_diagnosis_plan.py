@@ -21,7 +21,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 pytestmark = pytest.mark.slow
 
 DRAWS = 40
-NARROW = Made(("modulus_error",), (1.25,), preloads_n=(1.0, 2.0), spheres_mm=(4.0,), sensors=3, repeats=2, gain=0.01)
+NARROW = Made(("modulus_error",), (1.25,), preloads_n=(1.0, 2.0), spheres_mm=(4.0,), sensors=3, repeats=3, gain=0.01)
 RIVALS = beside("modulus_error", "thickness_error", "preload_dependent_d33")
 
 
