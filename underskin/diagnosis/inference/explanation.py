@@ -17,7 +17,7 @@ from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence, laplace_at
-from underskin.diagnosis.inference.fit import POSITION, Fitter, with_contact_points, with_softer_moduli
+from underskin.diagnosis.inference.fit import POSITION, Fitter
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import (
     Curvature,
@@ -32,11 +32,13 @@ from underskin.diagnosis.inference.hypothesis import (
     stacked,
 )
 from underskin.diagnosis.inference.least_squares import plain_least_squares
-from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, Plateau
+from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, Plateau
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model, compose
+from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.parameter import Parameter
+from underskin.recordings.campaign import curves_of
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask
@@ -47,6 +49,8 @@ _STARTS = 3  # fitted, of each hypothesis
 _NOISE_LEVEL_STEPS, _NOISE_LEVEL_STEPS_WITHOUT_PARENT = 1, 10
 _STARTS_FROM_PARENT = 1  # of curves, where an explanation with one mechanism less is known
 _CONTACT_POINT_STARTS = 4  # points of the grid, of curves, from which contact points are searched
+_SOFTER = (1.0, 0.25, 0.06)
+_DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
 
 
 @dataclass(frozen=True)
@@ -129,6 +133,46 @@ class _Grid:
         self.coordinates[:, columns] = points
 
 
+def _with_softer_moduli(fitter: Fitter, at: Evaluated) -> Evaluated:
+    """Of curves with an undeclared modulus: also with smaller moduli, since adhesion makes a sample look stiffer."""
+    indices = [index for index, parameter in enumerate(fitter.hypotheses[0].model.parameters) if parameter.proportional]
+    if not indices:
+        return at
+    points = at.points[np.repeat(np.arange(len(at)), len(_SOFTER))]
+    fit = points.fit.copy()
+    fit[:, indices] += np.tile(np.log(_SOFTER), len(at))[:, None]
+    return fitter.evaluate(replace(points, fit=fit), slopes=False)
+
+
+def _with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
+    """Of indentations: the best contact point of each curve, by a search with ever finer steps of the depth.
+
+    Given the shared parameters curves are independent, so one set of depths serves all of them.
+    """
+    (hypothesis,) = fitter.hypotheses
+    assert isinstance(hypothesis.model, CurveModel)
+    indices = hypothesis.model.contact_points
+    travels = [curve.displacement_mm for curve in curves_of(fitter.lines.campaign)]
+    deepest, span = np.array([travel.max() for travel in travels]), np.array([np.ptp(travel) for travel in travels])
+    covariance = np.tile([GAIN_PRIOR.middle, 0.0, hypothesis.smooth.middle, *at.points.covariance[0, 3:]], (len(at), 1))
+    levels = fitter.levels(covariance[:1, None])
+    depth = np.repeat(span[None], len(at), axis=0)
+    for ratios in _DEPTHS:
+        depths = depth[:, None] * ratios[:, None]  # (starts, ratios, curves)
+        tried = np.clip(deepest - depths, fitter.low[0, indices], fitter.high[0, indices]).reshape(-1, len(indices))
+        points = at.points[np.repeat(np.arange(len(at)), len(ratios))]
+        fit = points.fit.copy()
+        fit[:, indices] = tried
+        sums = fitter.products(replace(points, fit=fit), slopes=False, place=False).summed(levels)
+        uu, uy, yy = (part[:, 0] for part in (sums.uu, sums.uy, np.broadcast_to(sums.yy, sums.uu.shape)))
+        residual = yy - 2 * uy + uu - (uu - uy) ** 2 / (START_GAIN**-2 + uu)
+        best = residual.reshape(depths.shape).argmin(axis=1)[:, None]
+        depth = np.take_along_axis(depths, best, axis=1)[:, 0]
+    chosen = at.points.fit.copy()
+    chosen[:, indices] = np.clip(deepest - depth, fitter.low[0, indices], fitter.high[0, indices])
+    return fitter.evaluate(replace(at.points, fit=chosen, covariance=covariance), slopes=False)
+
+
 def _starts_of_curves(
     fitter: Fitter, lowest: Evaluated, guess_count: int, new_names: Sequence[str], starting_point: StartingPoint
 ) -> Points:
@@ -140,8 +184,8 @@ def _starts_of_curves(
     is_single = len(fitter.hypotheses[0].model.names) == 1
     moves_contact = is_single and any(fitter.lines.mechanisms[name].moves_contact_points for name in new_names)
     if fitter.lines.kind == "indentation" and (moves_contact or starting_point.nuisances is None):
-        candidates = with_contact_points(
-            fitter, with_softer_moduli(fitter, candidates) if moves_contact else candidates
+        candidates = _with_contact_points(
+            fitter, _with_softer_moduli(fitter, candidates) if moves_contact else candidates
         )
     begins_at_guesses = any(fitter.lines.mechanisms[name].begins_at_guesses for name in new_names)
     count = _STARTS_FROM_PARENT if starting_point.parent is not None and not begins_at_guesses else _STARTS

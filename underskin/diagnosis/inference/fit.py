@@ -25,13 +25,11 @@ from underskin.diagnosis.inference.hypothesis import (
     normal_equations,
     parameter_slices,
 )
-from underskin.diagnosis.inference.least_squares import LeastSquares
+from underskin.diagnosis.inference.least_squares import LeastSquares, between_samples
 from underskin.diagnosis.inference.products import FrfProducts, Products, joined
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
-from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModels
-from underskin.recordings.campaign import curves_of
 from underskin.units import Floats, Indices, Mask
 
 GAIN, LEVEL, POSITION = 0, 1, 2  # indices of the covariance parameters, the last if there is positioning scatter
@@ -39,17 +37,11 @@ SMOOTH = 2  # index of the smooth error of curves, which have no positioning sca
 _FREE_SPREAD = 0.02  # above this sd of b, e^b is linearised at the most probable b, not at 0
 _NUMBERS_AT_ONCE = 500_000
 _PREDICTED_AT_ONCE = 1_000_000
-_GAIN_ROUNDS, _GAIN_CHANGE, _LARGEST_SENSOR_LOG_GAIN = (
-    6,
-    3e-3,
-    2.0,
-)  # most rounds, change that ends them, and bounds of b
+_GAIN_ROUNDS, _GAIN_CHANGE = 6, 3e-3  # most rounds, and the change that ends them
+_LARGEST_SENSOR_LOG_GAIN = 2.0  # bound of b
 _LARGEST_D33_STEP = 1.0  # of log d33
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 _SETTLING = 20
-_OFF_SAMPLE = 1e-6  # of the gap between two samples: a contact point at a sample is past it
-_SOFTER = (1.0, 0.25, 0.06)
-_DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
 _SMOOTH_STARTS = (np.log(1e-3), np.log(3e-2))  # of curves: close fit, and loose
 _CURVE_SETTLING = 8
 _PROMISED, _MARGIN = 10.0, 2.0  # times the gain by the gradient, and nats beyond it, that a fit may still gain
@@ -663,64 +655,6 @@ class Fitter:
                 break
             free = free & ~leaving
         return step, (gradient * step).sum(axis=1)
-
-
-def with_softer_moduli(fitter: Fitter, at: Evaluated) -> Evaluated:
-    """Of curves with an undeclared modulus: also with smaller moduli, since adhesion makes a sample look stiffer."""
-    indices = [index for index, parameter in enumerate(fitter.hypotheses[0].model.parameters) if parameter.proportional]
-    if not indices:
-        return at
-    points = at.points[np.repeat(np.arange(len(at)), len(_SOFTER))]
-    fit = points.fit.copy()
-    fit[:, indices] += np.tile(np.log(_SOFTER), len(at))[:, None]
-    return fitter.evaluate(replace(points, fit=fit), slopes=False)
-
-
-def with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
-    """Of indentations: the best contact point of each curve, by a search with ever finer steps of the depth.
-
-    Given the shared parameters curves are independent, so one set of depths serves all of them.
-    """
-    (hypothesis,) = fitter.hypotheses
-    assert isinstance(hypothesis.model, CurveModel)
-    indices = hypothesis.model.contact_points
-    travels = [curve.displacement_mm for curve in curves_of(fitter.lines.campaign)]
-    deepest, span = np.array([travel.max() for travel in travels]), np.array([np.ptp(travel) for travel in travels])
-    covariance = np.tile([GAIN_PRIOR.middle, 0.0, hypothesis.smooth.middle, *at.points.covariance[0, 3:]], (len(at), 1))
-    levels = fitter.levels(covariance[:1, None])
-    depth = np.repeat(span[None], len(at), axis=0)
-    for ratios in _DEPTHS:
-        depths = depth[:, None] * ratios[:, None]  # (starts, ratios, curves)
-        tried = np.clip(deepest - depths, fitter.low[0, indices], fitter.high[0, indices]).reshape(-1, len(indices))
-        points = at.points[np.repeat(np.arange(len(at)), len(ratios))]
-        fit = points.fit.copy()
-        fit[:, indices] = tried
-        sums = fitter.products(replace(points, fit=fit), slopes=False, place=False).summed(levels)
-        uu, uy, yy = (part[:, 0] for part in (sums.uu, sums.uy, np.broadcast_to(sums.yy, sums.uu.shape)))
-        residual = yy - 2 * uy + uu - (uu - uy) ** 2 / (START_GAIN**-2 + uu)
-        best = residual.reshape(depths.shape).argmin(axis=1)[:, None]
-        depth = np.take_along_axis(depths, best, axis=1)[:, 0]
-    chosen = at.points.fit.copy()
-    chosen[:, indices] = np.clip(deepest - depth, fitter.low[0, indices], fitter.high[0, indices])
-    return fitter.evaluate(replace(at.points, fit=chosen, covariance=covariance), slopes=False)
-
-
-def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """Bounds of fit coordinates (parameters,) that keep each contact point between the samples where it is.
-
-    With adhesion the force jumps as a contact point passes a sample, which no derivative shows.
-    """
-    assert isinstance(hypothesis.model, CurveModel)
-    low, high = low.copy(), high.copy()
-    curves = curves_of(hypothesis.lines.campaign)
-    for index, curve in zip(hypothesis.model.contact_points.tolist(), curves, strict=True):
-        travel = curve.displacement_mm[: int(curve.displacement_mm.argmax()) + 1]
-        before, after = travel[travel < fit[index]], travel[travel >= fit[index]]
-        if len(before) and len(after):
-            first, last = float(before.max()), float(after.min())
-            low[index] = max(low[index], first + _OFF_SAMPLE * (last - first))
-            high[index] = min(high[index], last)
-    return np.minimum(low, fit), np.maximum(high, fit)
 
 
 def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:

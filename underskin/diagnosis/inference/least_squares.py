@@ -22,14 +22,12 @@ from underskin.recordings.curve_course import curve_landmarks, touch
 from underskin.units import Floats, Mask
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
-_TOLERANCE, _OF_STARTS, _EVALUATIONS = (
-    1e-4,
-    1e-3,
-    40,
-)  # of the sum of squares, the same for starting points, and most evaluations
+_TOLERANCE, _OF_STARTS = 1e-4, 1e-3  # of the sum of squares, and the same for starting points
+_EVALUATIONS = 40  # at most
 _STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far wider than a snap-in is deep
 _PASSED = 4  # most samples, either way, that a contact point is moved past
 _RETURN = 0.5  # of the range of displacement: a way back that may end a contact
+_OFF_SAMPLE = 1e-6  # of the gap between two samples: a contact point at a sample is past it
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
 _SAME = 1e-9  # of the range of displacement: smaller differences are rounding
 
@@ -273,3 +271,21 @@ def _solved(
         max_nfev=_EVALUATIONS,
     )
     return start + unit * (np.asarray(result.x) - 1), float(result.cost)
+
+
+def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """Bounds of fit coordinates (parameters,) that keep each contact point between the samples where it is.
+
+    With adhesion the force jumps as a contact point passes a sample, which no derivative shows.
+    """
+    assert isinstance(hypothesis.model, CurveModel)
+    low, high = low.copy(), high.copy()
+    curves = curves_of(hypothesis.lines.campaign)
+    for index, curve in zip(hypothesis.model.contact_points.tolist(), curves, strict=True):
+        travel = curve.displacement_mm[: int(curve.displacement_mm.argmax()) + 1]
+        before, after = travel[travel < fit[index]], travel[travel >= fit[index]]
+        if len(before) and len(after):
+            first, last = float(before.max()), float(after.min())
+            low[index] = max(low[index], first + _OFF_SAMPLE * (last - first))
+            high[index] = min(high[index], last)
+    return np.minimum(low, fit), np.maximum(high, fit)
