@@ -3,6 +3,7 @@
 import json
 import os
 import re
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from bench.soak import SOAK
 from proof.real import recorded
 from rig.description import parse as experiment
 from rig.draw_curves import drawn_curves
@@ -18,6 +20,7 @@ from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.cases import first
 from tests.support.lean_reports import beside, lean_report, whole_report
+from tests.support.pressed_curves import pressed
 from tests.support.slip_campaigns import looked_at
 from underskin import Conditions, SkinDescription, load_table, predict
 from underskin.physics.sphere_law import SphereLaw
@@ -314,6 +317,24 @@ def test_two_mechanisms_share_bend_found(table: SigmaTable) -> None:
     assert set(found) == {"instrument_compliance", "strain_stiffening"}
     (stage,) = found["instrument_compliance"]
     assert stage["low"] < 57.8 < stage["high"] < 70  # alone it would have 124
+
+
+@pytest.mark.slow
+def test_imitated_laws_take_probability(table: SigmaTable) -> None:
+    """Unlisted laws that would look like an explanation take from its probability: fewer of them, the stronger the
+    effect and the more spheres show it."""
+
+    def reported(stiffness: float, radii: Sequence[float]) -> dict[str, Any]:
+        report = lean_report(pressed(stiffness, radii), table, *beside("instrument_compliance"))
+        assert names(report) == ["instrument_compliance"]
+        return report
+
+    weak, strong = reported(30.0, (20.0,)), reported(3.0, (5.0,))
+    assert weak["probability"] < strong["probability"]
+    if SOAK:
+        assert weak["probability"] < reported(30.0, (2.0, 20.0))["probability"]
+    other = [entry for entry in weak["alternatives"] if entry["mechanisms"] == ["none_of_these"]]
+    assert other[0]["probability"] <= weak["probability"]
 
 
 @pytest.mark.soak

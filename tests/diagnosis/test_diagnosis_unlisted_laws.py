@@ -341,12 +341,11 @@ def test_constant_phase_beside_weak_sensors_told(table: SigmaTable) -> None:
     phase = np.exp(-1j * np.radians(1.2))
     turned = changed(made, lambda entry, _, __: complex(phase * kept.get(entry.sensor, 1.0)))
     report = lean_report(turned, table, *beside("sensor_spread", "sensor_relaxation", "timing_delay", "ageing"))
-    law, statement = report["unnamed"], report["statement"]
-    laws = {(entry["acts_on"], entry["axis"]) for entry in (law, *law["rivals"])}
-    assert ("frequency_response", "frequency_hz") in laws
-    assert "What is missing beside sensor spread" in statement
-    assert "the phase by -1." in statement
+    statement = report["statement"]
+    assert "What is missing beside sensor spread turns the frequency response by the same angle at all" in statement
+    assert "the phase by -1.2" in statement
     assert "with it and sensor spread, recordings held out are predicted to" in statement
+    assert ("the reference phase of a lock-in amplifier" in statement) == is_settled(report)
     assert report["location"]["region"]["sensor"] == ["s4"]
     assert "it is largest at sensor s4, where the response is 4" in report["location"]["statement"]
 
