@@ -23,7 +23,7 @@ KERNELS = (
     "underskin.mechanisms.models.sigma_kernels",
     "underskin.physics.bessel_kernel",
     "underskin.physics.contact_kernel",
-    "underskin.surrogate.table_kernel",
+    "underskin.surrogate.spline_kernel",
 )
 
 # Every processor of a kind runs the same code, so that a cache made on one serves another, and gives the same bytes.
@@ -57,13 +57,13 @@ CacheImpl._locator_classes.insert(0, _SourceCacheLocator)
 def compiled(signature: str | None = None) -> Callable[[Function], Function]:
     """A decorator: compiled for this signature when its module is imported, or within its callers where there is none.
 
-    Errors are those of NumPy: a division by zero is infinite.
+    Errors are those of NumPy: a division by zero is infinite. Other threads run meanwhile.
     """
 
     def decorate(function: Function) -> Function:
         if signature is None:
             return numba.njit(function, error_model="numpy", inline="never")
-        return numba.njit(signature, cache=True, error_model="numpy")(function)
+        return numba.njit(signature, cache=True, error_model="numpy", nogil=True)(function)
 
     return decorate
 

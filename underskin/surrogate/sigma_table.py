@@ -7,12 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from underskin.physics import hertz
-from underskin.surrogate.contact_model import ContactModel, ContactRadius, interpolation_coefficients
+from underskin.surrogate.contact_model import ContactModel, ContactRadius
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
 from underskin.surrogate.table_file import Table
 from underskin.units import Floats
-
-__all__ = ["SIGMA_TABLE", "SigmaTable", "interpolation_coefficients", "load_table", "tables_folder"]
 
 SIGMA_TABLE = "sigma.h5"
 
