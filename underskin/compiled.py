@@ -21,7 +21,6 @@ KERNELS = (
     "underskin.diagnosis.kernels",
     "underskin.mechanisms.models.sphere_kernels",
     "underskin.mechanisms.models.sigma_kernels",
-    "underskin.physics.bessel_kernel",
     "underskin.physics.contact_kernel",
     "underskin.surrogate.spline_kernel",
 )

@@ -67,9 +67,8 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     total = integration.array_stress(influence, thickness, sensors, loads)
     radii = np.array([pressure.radius for pressure in pressures])
     if request.contact == "solved":
-        added = finite_strain(solved_contact(table.path.parent / CONTACT_TABLE), request, sensors)
-        total = replace(total, stress=total.stress + added.stress, error=total.error + added.error)
-        radii = added.contact_radius
+        added, added_error, radii = finite_strain(solved_contact(table.path.parent / CONTACT_TABLE), request, sensors)
+        total = replace(total, stress=total.stress + added, error=total.error + added_error)
     inside = total.inside & np.isfinite(total.stress)
     stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
     columns = {

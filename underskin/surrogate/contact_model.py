@@ -8,7 +8,6 @@ Seminara 2018, equation 16). Rows outside the domain are NaN, never extrapolated
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -58,15 +57,16 @@ class ContactModel(ABC):
     def load_over_cube(self, a_over_h: Floats) -> tuple[Floats, Floats]:
         """P/(a/h)³ of the contact at small strain, P = F R (1 − ν²)/(E h³), and d ln a/d ln P."""
 
-    def _tabulate(self, data: Mapping[str, Floats]) -> None:
-        """Set up splines of σ, its errors and the profile at nodes, by "group/name" as in the file of the σ table."""
-        self.axes = tuple(data[f"sigma/{name}"] for name in ("a_over_h", "rt_over_h", "cbrt_load_parameter"))
-        self._sigma = TensorSpline.through(self.axes, data["sigma/sigma"])
-        self._cell_error = _largest_at_corners(data["sigma/discretisation_error"] + data["sigma/interpolation_error"])
-        self._profile_axes = (data["profile/a_over_h"], data["profile/r_over_h"], self.axes[2])
-        self._profile = TensorSpline.through(self._profile_axes, data["profile/profile"])
-        by_radius = np.moveaxis(data["profile/profile"], 1, 0)
-        self._over_radius = make_interp_spline(self._profile_axes[1], by_radius, k=3)
+    def _tabulate(
+        self, axes: tuple[Floats, Floats, Floats], sigma: Floats, rel_error: Floats, radii: Floats, profile: Floats
+    ) -> None:
+        """Set up the splines of σ and the profile (a/h, radii, L^(1/3)), and the bound on σ's error in each cell."""
+        self.axes = axes
+        self._sigma = TensorSpline.through(axes, sigma)
+        self._cell_error = _largest_at_corners(rel_error)
+        self._radii = radii
+        self._profile = TensorSpline.through((axes[0], radii, axes[2]), profile)
+        self._over_radius = make_interp_spline(radii, np.moveaxis(profile, 1, 0), k=3)
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -81,7 +81,7 @@ class ContactModel(ABC):
     @property
     def profile_end(self) -> float:
         """The largest r/h of the profile, included."""
-        return float(self._profile_axes[1][-1])
+        return float(self._radii[-1])
 
     def sigma(self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Sigma:
         """The transmission factor: charge = d33 · (3/2) (rT/h)² · σ · F.
@@ -163,7 +163,7 @@ class ContactModel(ABC):
     @property
     def contact_axes(self) -> tuple[Floats, Floats]:
         """a/h and L^(1/3) of the contacts whose profiles the table holds."""
-        return self._profile_axes[0], self._profile_axes[2]
+        return self.axes[0], self.axes[2]
 
 
 def _largest_at_corners(values: Floats) -> Floats:

@@ -47,20 +47,8 @@ class SolvedContact(ContactModel):
         added = make_interp_spline(nodes, _disc_mean(table, _RHO), k=3)(a)
         error = make_interp_spline(nodes, _disc_maximum(table, _RHO), k=1)(a)
         sigma = linear[:, :, None] + added
-        self._tabulate(
-            {
-                "sigma/a_over_h": a,
-                "sigma/rt_over_h": _RHO,
-                "sigma/cbrt_load_parameter": cbrt_load,
-                "sigma/sigma": sigma,
-                "sigma/discretisation_error": error / sigma,
-                "sigma/interpolation_error": np.full_like(sigma, _SPLINE_ERROR),
-                "profile/a_over_h": a,
-                "profile/r_over_h": r,
-                "profile/profile": profile[:, :, None]
-                + make_interp_spline(nodes, table.profile_over(r).swapaxes(1, 2), k=3)(a),
-            }
-        )
+        profile = profile[:, :, None] + make_interp_spline(nodes, table.profile_over(r).swapaxes(1, 2), k=3)(a)
+        self._tabulate((a, _RHO, cbrt_load), sigma, error / sigma + _SPLINE_ERROR, r, profile)
         self._radius_ratio = RectBivariateSpline(nodes, cbrt_load, table.contact_radius, s=0)
 
     def radius(

@@ -93,11 +93,6 @@ class OffsetSigma:
         return _wavenumbers(self._turns)
 
     @property
-    def wavenumbers(self) -> int:
-        """The number of wave numbers."""
-        return PANEL * _panels(self._turns)
-
-    @property
     def wavenumber(self) -> Floats:
         """k [1/h] at which `linear_at` takes transforms."""
         return self._wavenumbers[0]
@@ -142,15 +137,10 @@ def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_o
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
-def _panels(highest: float) -> int:
-    """The number of panels of [0, end] that resolve an oscillation over this distance."""
-    turns = _WAVENUMBER_END * highest / (2 * np.pi)
-    return int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
-
-
 def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
-    """Gauss–Legendre nodes and weights on panels of [0, end], short enough for the fastest oscillation."""
-    panels = _panels(highest)
+    """Gauss–Legendre nodes and weights on panels of [0, end], short enough for the oscillation over a distance."""
+    turns = _WAVENUMBER_END * highest / (2 * np.pi)
+    panels = int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
     x, w = np.polynomial.legendre.leggauss(PANEL)
     half = _WAVENUMBER_END / panels / 2
     k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
