@@ -7,6 +7,7 @@ An offset sensor averages the contact model's base profile T3(r; a/h, L) over it
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from underskin.surrogate.contact_model import ContactModel
@@ -72,14 +73,12 @@ def positioned_sigma(
     largest_scatter_over_h
         Largest standard deviation of the position, over the thickness, for later calls of `scattered`.
     """
-    farthest, largest_disc = contact_model.profile_end, contact_model.domain["rt_over_h"][1]
+    largest_disc = contact_model.domain["rt_over_h"][1]
     disc_inside = rt_over_h <= largest_disc
-    rt_over_h = min(rt_over_h, largest_disc)
-    largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
-    offsets = _grid(min(largest_offset + 4 * _SPACING, farthest - rt_over_h))
-    radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
-    profile = contact_model.profile(radii, a_over_h[:, None], load_parameter[:, None])
-    sigma = profile @ CubicAxis(radii).disc_averages(offsets, rt_over_h).T
+    largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h + 4 * _SPACING
+    offsets, sigma = sigma_off_centre(
+        contact_model, a_over_h, min(rt_over_h, largest_disc), load_parameter, largest_offset
+    )
     curve = CubicSpline(offsets, np.nan_to_num(sigma), axis=1, bc_type=((1, np.zeros(len(sigma))), "not-a-knot"))
     commanded = _evaluate_rows(curve, offset_over_h[:, None])[:, 0]
     inside = disc_inside & (offset_over_h <= offsets[-1]) & np.isfinite(sigma).all(axis=1)
@@ -87,14 +86,19 @@ def positioned_sigma(
 
 
 def sigma_off_centre(
-    contact_model: ContactModel, a_over_h: float, rt_over_h: float, load_parameter: float
+    contact_model: ContactModel,
+    a_over_h: ArrayLike,
+    rt_over_h: float,
+    load_parameter: ArrayLike,
+    largest_offset: float = np.inf,
 ) -> tuple[Floats, Floats]:
-    """Offsets e/h, from 0 to the end of the table's profile, and σ there of one contact; NaN outside the domain."""
+    """Offsets e/h (offsets,), up to the largest or to the end of the table's profile, and σ there of contacts (…,
+    offsets); NaN outside the domain."""
     farthest = contact_model.profile_end
-    offsets = _grid(farthest - rt_over_h)
-    radii = np.minimum(_grid(farthest), farthest)
-    profile = contact_model.profile(radii, a_over_h, load_parameter)
-    return offsets, CubicAxis(radii).disc_averages(offsets, rt_over_h) @ profile
+    offsets = _grid(min(largest_offset, farthest - rt_over_h))
+    radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
+    profile = contact_model.profile(radii, np.asarray(a_over_h)[..., None], np.asarray(load_parameter)[..., None])
+    return offsets, profile @ CubicAxis(radii).disc_averages(offsets, rt_over_h).T
 
 
 def _grid(end: float) -> Floats:
