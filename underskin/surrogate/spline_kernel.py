@@ -58,30 +58,7 @@ def functions_at(cubics: Floats, u: float, beyond: float) -> tuple[Four, Four]:
     return (v0 + d0 * beyond, v1 + d1 * beyond, v2 + d2 * beyond, v3 + d3 * beyond), (d0, d1, d2, d3)
 
 
-@compiled()
-def _of_three(
-    c: Floats, q: int, r: int, t: int, in_q: tuple[Four, Four], in_r: tuple[Four, Four], in_t: tuple[Four, Four]
-) -> Four:
-    """Value and slopes of a spline of three axes, by the values and slopes of its functions from q, r and t on."""
-    s = by_q = by_r = by_t = 0.0
-    (q_values, q_slopes), (r_values, r_slopes), (t_values, t_slopes) = in_q, in_r, in_t
-    for j in range(4):
-        s_r = slope_r = t_r = 0.0
-        for k in range(4):
-            line = c[q + j, r + k, t : t + 4]
-            along = line[0] * t_values[0] + line[1] * t_values[1] + line[2] * t_values[2] + line[3] * t_values[3]
-            slope = line[0] * t_slopes[0] + line[1] * t_slopes[1] + line[2] * t_slopes[2] + line[3] * t_slopes[3]
-            s_r += r_values[k] * along
-            slope_r += r_slopes[k] * along
-            t_r += r_values[k] * slope
-        s += q_values[j] * s_r
-        by_q += q_slopes[j] * s_r
-        by_r += q_values[j] * slope_r
-        by_t += q_values[j] * t_r
-    return s, by_q, by_r, by_t
-
-
-@compiled(f"void({_SPLINE}, float64, {', '.join([_VARIABLE] * 5)})")
+@compiled(f"void({_SPLINE}, float64, int64[::1], {', '.join([_VARIABLE] * 5)})")
 def spline_rows(
     coefficients: Floats,
     starts: Floats,
@@ -92,6 +69,7 @@ def spline_rows(
     buckets: Integers,
     begin: Integers,
     end: float,
+    chosen: Integers,
     p: Floats,
     p_slopes: Floats,
     q: Floats,
@@ -111,6 +89,8 @@ def spline_rows(
         (functions of each axis); the first axis may have a single function, which is a constant.
     end
         Of the last variable, beyond which the spline is 0. Beyond the other nodes it is continued along its tangent.
+    chosen
+        (rows,) the entry of p and q of each row.
     p, q, r, t
         The variables, (points, rows), with their derivatives (parameters, points, rows); either of points and rows may
         be 1 and is then broadcast.
@@ -123,7 +103,7 @@ def spline_rows(
         of_p, of_q = min(point, p.shape[0] - 1), min(point, q.shape[0] - 1)
         of_r, of_t = min(point, r.shape[0] - 1), min(point, t.shape[0] - 1)
         for row in range(rows):
-            row_p, row_q = min(row, p.shape[1] - 1), min(row, q.shape[1] - 1)
+            row_p, row_q = min(chosen[row], p.shape[1] - 1), min(chosen[row], q.shape[1] - 1)
             row_r, row_t = min(row, r.shape[1] - 1), min(row, t.shape[1] - 1)
             at_p, at_q, at_r, at_t = p[of_p, row_p], q[of_q, row_q], r[of_r, row_r], t[of_t, row_t]
             if at_t > end:
@@ -142,19 +122,32 @@ def spline_rows(
             cell_q = cell_at(starts, limits, buckets, begin, 1, inside_q)
             cell_r = cell_at(starts, limits, buckets, begin, 2, inside_r)
             cell_t = cell_at(starts, limits, buckets, begin, 3, inside_t)
-            p_values, p_by = functions_at(cubics[cell_p], inside_p - lower[cell_p], at_p - inside_p)
-            in_q = functions_at(cubics[cell_q], inside_q - lower[cell_q], at_q - inside_q)
-            in_r = functions_at(cubics[cell_r], inside_r - lower[cell_r], at_r - inside_r)
-            in_t = functions_at(cubics[cell_t], inside_t - lower[cell_t], at_t - inside_t)
+            p_value, p_slope = functions_at(cubics[cell_p], inside_p - lower[cell_p], at_p - inside_p)
+            q_value, q_slope = functions_at(cubics[cell_q], inside_q - lower[cell_q], at_q - inside_q)
+            r_value, r_slope = functions_at(cubics[cell_r], inside_r - lower[cell_r], at_r - inside_r)
+            t_value, t_slope = functions_at(cubics[cell_t], inside_t - lower[cell_t], at_t - inside_t)
+            first_p, first_q, first_r, first_t = first[cell_p], first[cell_q], first[cell_r], first[cell_t]
             total = by_p = by_q = by_r = by_t = 0.0
-            for number in range(functions):
-                part = coefficients[first[cell_p] + number]
-                s, s_q, s_r, s_t = _of_three(part, first[cell_q], first[cell_r], first[cell_t], in_q, in_r, in_t)
-                total += p_values[number] * s
-                by_p += p_by[number] * s
-                by_q += p_values[number] * s_q
-                by_r += p_values[number] * s_r
-                by_t += p_values[number] * s_t
+            for i in range(functions):
+                s_q = slope_q = r_q = t_q = 0.0
+                for j in range(4):
+                    s_r = slope_r = t_r = 0.0
+                    for k in range(4):
+                        c = coefficients[first_p + i, first_q + j, first_r + k, first_t : first_t + 4]
+                        along = c[0] * t_value[0] + c[1] * t_value[1] + c[2] * t_value[2] + c[3] * t_value[3]
+                        slope = c[0] * t_slope[0] + c[1] * t_slope[1] + c[2] * t_slope[2] + c[3] * t_slope[3]
+                        s_r += r_value[k] * along
+                        slope_r += r_slope[k] * along
+                        t_r += r_value[k] * slope
+                    s_q += q_value[j] * s_r
+                    slope_q += q_slope[j] * s_r
+                    r_q += q_value[j] * slope_r
+                    t_q += q_value[j] * t_r
+                total += p_value[i] * s_q
+                by_p += p_slope[i] * s_q
+                by_q += p_value[i] * slope_q
+                by_r += p_value[i] * r_q
+                by_t += p_value[i] * t_q
             value[point, row] = total
             for number in range(len(slopes)):
                 slopes[number, point, row] = (

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
 from underskin.autodiff import Differentiated, as_columns, contiguous, unfilled
-from underskin.units import Array, Floats
+from underskin.units import Array, Floats, Indices
 
 _DEGREE = 3
 _RADIAL, _ANGULAR = 10, 20  # quadrature over a disc
@@ -118,32 +118,36 @@ class TensorSpline:
         constant = [_Constant()] * (4 - len(self.axes))
         return [self.coefficients, *joined([*constant, *self.axes])]
 
-    def at(self, *variables: Differentiated, end: float = math.inf) -> Differentiated:
+    def at(self, *variables: Differentiated, chosen: Indices | None = None, end: float = math.inf) -> Differentiated:
         """Values (…, rows) at the variables (…, rows), one for each axis, with derivatives.
 
-        It is continued along its tangent beyond the nodes, and is 0 where the last variable is beyond `end`.
+        It is continued along its tangent beyond the nodes, and is 0 where the last variable is beyond `end`. With
+        `chosen` (rows,) the first two of four variables hold further entries, of which each row takes one.
         """
         from underskin.surrogate.spline_kernel import spline_rows
 
-        shape = np.broadcast_shapes(*(variable.value.shape for variable in variables))
+        if chosen is None:
+            shape = np.broadcast_shapes(*(variable.value.shape for variable in variables))
+            chosen = np.arange(shape[-1])
+        points = np.broadcast_shapes(*(variable.value.shape[:-1] for variable in variables))
         parameters = len(variables[0].slopes)
-        result = unfilled(parameters, shape)
+        result = unfilled(parameters, (*points, len(chosen)))
         constant = [Differentiated(np.zeros((1, 1)), np.zeros((parameters, 1, 1)))] * (4 - len(variables))
         columns = [array for variable in (*constant, *variables, result) for array in as_columns(variable)]
-        spline_rows(*self.compiled, end, *columns)
+        spline_rows(*self.compiled, end, chosen, *columns)
         return result
 
     def values(self, *columns: ArrayLike) -> Floats:
         """Values at columns of each variable, which broadcast; NaN outside the nodes."""
-        return self._at_columns(columns, np.empty((len(columns), 0, 1))).value
+        return self._at_columns(columns, np.empty((len(columns), 0, 1, 1))).value
 
     def gradient(self, *columns: ArrayLike) -> Floats:
         """Derivatives by each variable along the first axis, as `values`."""
-        return self._at_columns(columns, np.eye(len(columns))[:, :, None]).slopes
+        return self._at_columns(columns, np.eye(len(columns))[:, :, None, None]).slopes
 
     def _at_columns(self, columns: Sequence[ArrayLike], slopes: Floats) -> Differentiated:
         given = np.broadcast_arrays(*(np.asarray(column, dtype=float) for column in columns))
-        variables = [Differentiated(column.ravel(), by) for column, by in zip(given, slopes, strict=True)]
+        variables = [Differentiated(column.reshape(1, -1), by) for column, by in zip(given, slopes, strict=True)]
         result, shape = self.at(*variables), given[0].shape
         outside = np.zeros(shape, dtype=bool)
         for axis, column in zip(self.axes, given, strict=True):

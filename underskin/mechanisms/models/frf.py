@@ -476,7 +476,7 @@ class FrfModel:
         """The approximate size of a response's largest arrays with derivatives by `variables`: limits the points
         computed at once."""
         contacts, lines = len(self.force.ravel()), len(self.design.line_frequency)
-        return _QUANTITIES * contacts * len(self.sigma.wavenumber) + 2 * (1 + variables) * lines
+        return _QUANTITIES * contacts * len(self.sigma.wave_numbers[0]) + 2 * (1 + variables) * lines
 
     @property
     def structure(self) -> Hashable:

@@ -61,12 +61,13 @@ class OffsetSigma:
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
         radial = CubicAxis(radii)
         self._of_rho, self._of_offset = of_rho, of_offset = CubicAxis(np.log(rho)), CubicAxis(offsets)
+        self._offset_axis = joined([of_offset])
         self.end = min(float(offsets[-1]), PROFILE_END)
         # Splines and averages are all linear: the smaller arrays are turned into coefficients before their product
         average = np.stack([radial.disc_averages(np.abs(offsets), ratio) for ratio in rho])
         self._radii, self._average = radii, of_offset.coefficients(of_rho.coefficients(average, 0), 1)
         self.hertz = self._splines(*table.contact_axes, table.profile_over(radii))
-        self._turns = float(offsets[-1] + rho[-1] + table.contact_axes[0][-1])
+        self._farthest = float(offsets[-1] + rho[-1] + table.contact_axes[0][-1])
 
     def _splines(self, a_over_h: Floats, cbrt_load: Floats, profile: Floats) -> TensorSpline:
         """The disc averages of a profile (a, L^(1/3), radii)."""
@@ -89,25 +90,29 @@ class OffsetSigma:
         return self._splines(*table.contact_axes, table.profile_over(self._radii))
 
     @cached_property
-    def _wavenumbers(self) -> tuple[Floats, Floats]:
-        return _wavenumbers(self._turns)
+    def wave_numbers(self) -> tuple[Floats, Floats]:
+        """k [1/h] at which `linear_at` takes transforms, and their weights.
 
-    @property
-    def wavenumber(self) -> Floats:
-        """k [1/h] at which `linear_at` takes transforms."""
-        return self._wavenumbers[0]
+        Gauss–Legendre nodes on panels of [0, end], short enough for the fastest oscillation.
+        """
+        turns = _WAVENUMBER_END * self._farthest / (2 * np.pi)
+        panels = int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
+        x, w = np.polynomial.legendre.leggauss(PANEL)
+        half = _WAVENUMBER_END / panels / 2
+        k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
+        return k.ravel(), np.tile(half * w, panels)
 
     @cached_property
     def _bessel(self) -> Floats:
         """J0(k e) k/3 with the weights of the integral, as functions of the offset (functions, k)."""
-        k, weight = self._wavenumbers
+        k, weight = self.wave_numbers
         bessel = j0(np.multiply.outer(k, self._of_offset.nodes)) * (weight * k / 3)[:, None]
         return np.ascontiguousarray(self._of_offset.coefficients(bessel, 1).T)
 
     @cached_property
     def contact_grid(self) -> CurveGrid:
-        """The grid for contacts with a layer, whose pressure transforms are at `wavenumber`."""
-        return CurveGrid(self.wavenumber)
+        """The grid for contacts with a layer, whose pressure transforms are at `wave_numbers`."""
+        return CurveGrid(self.wave_numbers[0])
 
     def linear_at(self, transforms: Floats, contact: Indices, offset: Floats, points: tuple[int, ...]) -> Floats:
         """Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts (rows,)
@@ -118,7 +123,7 @@ class OffsetSigma:
         linear_sigma(
             self._bessel,
             self.end,
-            *joined([self._of_offset]),
+            *self._offset_axis,
             contact,
             contiguous(transforms.reshape(len(transforms), -1, *transforms.shape[-2:])),
             contiguous(offset.reshape(-1, offset.shape[-1])),
@@ -135,16 +140,6 @@ def offset_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_of
 @lru_cache(maxsize=8)
 def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> OffsetSigma:
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
-
-
-def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
-    """Gauss–Legendre nodes and weights on panels of [0, end], short enough for the oscillation over a distance."""
-    turns = _WAVENUMBER_END * highest / (2 * np.pi)
-    panels = int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
-    x, w = np.polynomial.legendre.leggauss(PANEL)
-    half = _WAVENUMBER_END / panels / 2
-    k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
-    return k.ravel(), np.tile(half * w, panels)
 
 
 class SigmaOfContacts:
@@ -168,7 +163,7 @@ class SigmaOfContacts:
         self._spline = sigma.hertz
         self._linear: Floats | None = None
         if layer is not None or not as_in_the_table(contacts):
-            self._linear, further = _transforms(sigma.wavenumber, contacts, pressed, self.rho.value, layer)
+            self._linear, further = _transforms(sigma.wave_numbers[0], contacts, pressed, self.rho.value, layer)
             self._variables += further
             self._spline = sigma.hertz_strain if layer is None else sigma.contact_strain
         widest, strongest = (axis.nodes[-1] for axis in self._spline.axes[:2])
@@ -177,8 +172,7 @@ class SigmaOfContacts:
     def at(self, contact: Indices, offset: Differentiated) -> Differentiated:
         """σ (…, points) at these offsets e/h from these contacts (points,)."""
         a, x, rho, *further = self._variables
-        within = self._within(a)
-        sigma = self._spline.at(within[contact], x[contact], log(rho), offset, end=self._sigma.end)
+        sigma = self._spline.at(self._within(a), x, log(rho), offset, chosen=contact, end=self._sigma.end)
         if self._linear is None:
             return sigma
         points = sigma.value.shape[:-1]
