@@ -146,12 +146,13 @@ class TensorSpline:
         return self._at_columns(columns, np.eye(len(columns))[:, :, None, None]).slopes
 
     def _at_columns(self, columns: Sequence[ArrayLike], slopes: Floats) -> Differentiated:
-        given = np.broadcast_arrays(*(np.asarray(column, dtype=float) for column in columns))
-        variables = [Differentiated(column.reshape(1, -1), by) for column, by in zip(given, slopes, strict=True)]
-        result, shape = self.at(*variables), given[0].shape
+        arrays = [np.asarray(column, dtype=float) for column in columns]
+        shape = np.broadcast_shapes(*(array.shape for array in arrays))
+        given = [np.broadcast_to(array, shape) for array in arrays]
+        result = self.at(*(Differentiated(x.reshape(1, -1), by) for x, by in zip(given, slopes, strict=True)))
         outside = np.zeros(shape, dtype=bool)
         for axis, column in zip(self.axes, given, strict=True):
             outside |= ~((column >= axis.nodes[0]) & (column <= axis.nodes[-1]))
-        value, by_column = result.value.reshape(shape), result.slopes.reshape(-1, *shape)
+        value, by_column = result.value.reshape(shape), result.slopes.reshape(len(result.slopes), *shape)
         value[outside] = by_column[:, outside] = np.nan
         return Differentiated(value, by_column)
