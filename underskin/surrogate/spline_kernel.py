@@ -21,8 +21,9 @@ from underskin.units import Floats
 
 Integers = NDArray[np.int64]
 Four = tuple[float, float, float, float]
+Axes = tuple[Floats, Floats, Integers, Floats, Floats, Integers, Integers]
 
-AXES = "float64[::1], float64[::1], int64[::1], float64[:, :, ::1], float64[:, ::1], int64[::1], int64[:, ::1]"
+AXES = "Tuple((float64[::1], float64[::1], int64[::1], float64[:, :, ::1], float64[:, ::1], int64[::1], int64[:, ::1]))"
 _SPLINE = f"float64[:, :, :, ::1], {AXES}"
 _VARIABLE = "float64[:, ::1], float64[:, :, ::1]"
 _ROWS = "float64[::1]"
@@ -61,13 +62,7 @@ def functions_at(cubics: Floats, u: float, beyond: float) -> tuple[Four, Four]:
 @compiled(f"void({_SPLINE}, float64, int64[::1], {', '.join([_VARIABLE] * 5)})")
 def spline_rows(
     coefficients: Floats,
-    starts: Floats,
-    lower: Floats,
-    first: Integers,
-    cubics: Floats,
-    limits: Floats,
-    buckets: Integers,
-    begin: Integers,
+    axes: Axes,
     end: float,
     chosen: Integers,
     p: Floats,
@@ -97,6 +92,7 @@ def spline_rows(
     value, slopes
         To be filled, of the same kind.
     """
+    starts, lower, first, cubics, limits, buckets, begin = axes
     functions = min(4, len(coefficients))
     points, rows = value.shape
     for point in range(points):
@@ -161,13 +157,7 @@ def spline_rows(
 @compiled(f"void({_SPLINE}, float64[:, :, ::1], {', '.join([_ROWS] * 5)})")
 def sigma_rows(
     coefficients: Floats,
-    starts: Floats,
-    lower: Floats,
-    first: Integers,
-    cubics: Floats,
-    limits: Floats,
-    buckets: Integers,
-    begin: Integers,
+    axes: Axes,
     cell_error: Floats,
     a: Floats,
     rho: Floats,
@@ -186,6 +176,7 @@ def sigma_rows(
     sigma, rel_error
         (rows,), to be filled.
     """
+    starts, lower, first, cubics, limits, buckets, begin = axes
     step_a, step_rho, step_x = min(len(a) - 1, 1), min(len(rho) - 1, 1), min(len(x) - 1, 1)
     for row in range(len(sigma)):
         at_a, at_rho, at_x = a[row * step_a], rho[row * step_rho], x[row * step_x]
@@ -211,13 +202,7 @@ def sigma_rows(
 
 @compiled(f"void({AXES}, {', '.join([_ROWS] * 4)}, float64[:, ::1])")
 def disc_averages(
-    starts: Floats,
-    lower: Floats,
-    first: Integers,
-    cubics: Floats,
-    limits: Floats,
-    buckets: Integers,
-    begin: Integers,
+    axes: Axes,
     offsets: Floats,
     radius: Floats,
     weight: Floats,
@@ -236,6 +221,7 @@ def disc_averages(
     total
         (discs, functions), to which the averages are added.
     """
+    starts, lower, first, cubics, limits, buckets, begin = axes
     axis = len(limits) - 1
     for disc in range(len(offsets)):
         e = offsets[disc]

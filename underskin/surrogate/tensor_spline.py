@@ -63,7 +63,7 @@ class CubicAxis:
         radius = disc_radius * (x + 1) / 2
         cosine = np.cos(np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR)
         total = np.zeros((len(offsets), len(self.nodes)))
-        disc_averages(*joined([self]), contiguous(offsets), radius, weight * (x + 1) / 2 / _ANGULAR, cosine, total)
+        disc_averages(joined([self]), contiguous(offsets), radius, weight * (x + 1) / 2 / _ANGULAR, cosine, total)
         return total @ self.to_coefficients
 
 
@@ -76,17 +76,18 @@ class _Constant(CubicAxis):
         self._locate(np.arange(2.0), np.zeros(2), np.zeros(2, dtype=np.int64), cubics)
 
 
-def joined(axes: Sequence[CubicAxis]) -> list[Array]:
+def joined(axes: Sequence[CubicAxis]) -> tuple[Array, ...]:
     """The arrays of several axes as `spline_kernel` takes them."""
     begin = np.cumsum([[0, 0], *([len(axis.starts), len(axis.buckets)] for axis in axes)], axis=0)[:-1]
-    return [
-        *(np.concatenate([getattr(axis, name) for axis in axes]) for name in ("starts", "lower")),
+    return (
+        np.concatenate([axis.starts for axis in axes]),
+        np.concatenate([axis.lower for axis in axes]),
         np.concatenate([axis.first for axis in axes]).astype(np.int64),
         np.concatenate([axis.cubics for axis in axes]),
         np.array([axis.limits for axis in axes]),
         np.concatenate([axis.buckets + cell for axis, (cell, _) in zip(axes, begin, strict=True)]).astype(np.int64),
         begin.astype(np.int64),
-    ]
+    )
 
 
 class TensorSpline:
@@ -113,10 +114,10 @@ class TensorSpline:
         return cls(axes, values)
 
     @cached_property
-    def compiled(self) -> list[Array]:
+    def compiled(self) -> tuple[Floats, tuple[Array, ...]]:
         """Its coefficients and axes as `spline_kernel` takes them."""
         constant = [_Constant()] * (4 - len(self.axes))
-        return [self.coefficients, *joined([*constant, *self.axes])]
+        return self.coefficients, joined([*constant, *self.axes])
 
     def at(self, *variables: Differentiated, chosen: Indices | None = None, end: float = math.inf) -> Differentiated:
         """Values (…, rows) at the variables (…, rows), one for each axis, with derivatives.

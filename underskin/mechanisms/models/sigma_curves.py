@@ -123,7 +123,7 @@ class OffsetSigma:
         linear_sigma(
             self._bessel,
             self.end,
-            *self._offset_axis,
+            self._offset_axis,
             contact,
             contiguous(transforms.reshape(len(transforms), -1, *transforms.shape[-2:])),
             contiguous(offset.reshape(-1, offset.shape[-1])),

@@ -7,7 +7,7 @@ axis.
 import numpy as np
 
 from underskin.compiled import compiled
-from underskin.surrogate.spline_kernel import AXES, Integers, cell_at, functions_at
+from underskin.surrogate.spline_kernel import AXES, Axes, Integers, cell_at, functions_at
 from underskin.units import Floats
 
 _COLUMNS = "float64[:, ::1]"
@@ -31,13 +31,7 @@ def _product(a: Floats, b: Floats) -> float:
 def linear_sigma(
     bessel: Floats,
     end: float,
-    starts: Floats,
-    lower: Floats,
-    first: Integers,
-    cubics: Floats,
-    limits: Floats,
-    buckets: Integers,
-    begin: Integers,
+    axis: Axes,
     contact: Integers,
     transforms: Floats,
     e: Floats,
@@ -50,7 +44,9 @@ def linear_sigma(
     bessel
         (functions of e, k) J0(k e) with the weights of the integral.
     end
-        Of e, beyond which the integrals are 0. The arrays after it describe the axis e.
+        Of e, beyond which the integrals are 0.
+    axis
+        Of e.
     contact
         (rows,) the contact of each row.
     transforms
@@ -60,6 +56,7 @@ def linear_sigma(
     result
         (quantities + 1, points, rows), to be filled.
     """
+    starts, lower, first, cubics, limits, buckets, begin = axis
     kernel, slope = np.empty(bessel.shape[1]), np.empty(bessel.shape[1])
     _, points, rows = result.shape
     count, of_points, of_contacts, _ = transforms.shape
