@@ -1,7 +1,8 @@
 """Functions compiled by numba at set-up; later processes load them from its cache.
 
 `python -m underskin.compiled` fills the cache. Modules of compiled functions (named in `KERNELS`) are imported where
-they are called, since importing numba takes a tenth of a second and 50 MB, which small answers do not need.
+they are called, since importing numba takes half a second and 100 MB, which a command that computes nothing does not
+need.
 """
 
 import gc
