@@ -8,12 +8,11 @@ the contact equation over its mean, f(x) at x = r/a, where f(1) = 0 without adhe
 """
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.contact_integral_equation import ContactEquation
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
@@ -100,13 +99,8 @@ def sphere_pressures(
     plane_modulus = youngs_modulus / (1 - layer.poisson_ratio**2)
     load = forces * indenter_radii / (plane_modulus * thickness**3)
     different, row = np.unique(load, return_inverse=True)
-    alpha = _grid().curves(layer).at_load(different, np.zeros_like(different)).alpha.value
+    alpha = curves_of(layer).at_load(different, np.zeros_like(different)).alpha.value
     valid = np.isfinite(alpha)
     shapes = iter(ContactEquation(alpha[valid]).solve(layer).sphere_shape.value if valid.any() else ())
     pressures = [SpherePressure(float(a) * thickness, next(shapes)) if a == a else None for a in alpha]
     return [pressures[i] for i in row]
-
-
-@cache
-def _grid() -> CurveGrid:
-    return CurveGrid(np.zeros(0))

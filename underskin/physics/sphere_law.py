@@ -12,11 +12,10 @@ Finite strain makes δ larger at the same force, by a function of a/h of the lin
 """
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
@@ -61,7 +60,7 @@ class SphereLaw:
         a = widest * np.linspace(0.0, 1.0, _NODES)
         depth, stiffness = (a * np.arctanh(a / radius) if full_sphere else a**2 / radius), 2 * a
         if thickness is not None:
-            ratio = _curves(poisson_ratio).ratios_at(np.maximum(a / thickness, _SMALLEST))
+            ratio = curves_of(Layer(poisson_ratio)).ratios_at(np.maximum(a / thickness, _SMALLEST))
             depth, stiffness = depth * ratio[:, 1], stiffness * ratio[:, 2]
         steps = np.diff(depth) * (stiffness[1:] + stiffness[:-1]) / 2
         force = np.append(0.0, np.cumsum(steps))
@@ -75,8 +74,3 @@ class SphereLaw:
     def __call__(self, depth: Floats) -> Floats:
         """F/E' at depths (samples,), 0 out of contact; beyond `deepest` that of the last depth."""
         return np.asarray(np.interp(np.maximum(depth, 0.0), self._depth, self._root) ** 1.5)
-
-
-@lru_cache(maxsize=64)
-def _curves(poisson_ratio: float) -> ContactCurves:
-    return CurveGrid(np.ones(1)).curves(Layer(poisson_ratio))

@@ -106,14 +106,10 @@ def spline_rows(
                 value[point, row] = 0.0
                 slopes[:, point, row] = 0.0
                 continue
-            inside_p, inside_q = (
-                min(max(at_p, limits[0, 0]), limits[0, 1]),
-                min(max(at_q, limits[1, 0]), limits[1, 1]),
-            )
-            inside_r, inside_t = (
-                min(max(at_r, limits[2, 0]), limits[2, 1]),
-                min(max(at_t, limits[3, 0]), limits[3, 1]),
-            )
+            inside_p = min(max(at_p, limits[0, 0]), limits[0, 1])
+            inside_q = min(max(at_q, limits[1, 0]), limits[1, 1])
+            inside_r = min(max(at_r, limits[2, 0]), limits[2, 1])
+            inside_t = min(max(at_t, limits[3, 0]), limits[3, 1])
             cell_p = cell_at(starts, limits, buckets, begin, 0, inside_p)
             cell_q = cell_at(starts, limits, buckets, begin, 1, inside_q)
             cell_r = cell_at(starts, limits, buckets, begin, 2, inside_r)
@@ -209,7 +205,7 @@ def disc_averages(
     cosine: Floats,
     total: Floats,
 ) -> None:
-    """Averages of the functions of the last axis, a radius, over offset discs, ∫ f(√(e² + s² + 2 e s cos φ)) dA/A.
+    """Averages of the functions of the one axis, a radius, over offset discs, ∫ f(√(e² + s² + 2 e s cos φ)) dA/A.
 
     Parameters
     ----------
@@ -222,15 +218,14 @@ def disc_averages(
         (discs, functions), to which the averages are added.
     """
     starts, lower, first, cubics, limits, buckets, begin = axes
-    axis = len(limits) - 1
     for disc in range(len(offsets)):
         e = offsets[disc]
         for ring in range(len(radius)):
             s = radius[ring]
             for turn in range(len(cosine)):
                 distance = np.sqrt(e * e + s * s + 2 * e * s * cosine[turn])
-                if distance <= limits[axis, 1]:
-                    cell = cell_at(starts, limits, buckets, begin, axis, distance)
-                    values, _ = functions_at(cubics[cell], distance - lower[cell], 0.0)
+                if distance <= limits[0, 1]:
+                    cell = cell_at(starts, limits, buckets, begin, 0, distance)
+                    values = values_at(cubics[cell], distance - lower[cell])
                     for number in range(4):
                         total[disc, first[cell] + number] += weight[ring] * values[number]

@@ -108,7 +108,7 @@ class TensorSpline:
     @classmethod
     def through(cls, nodes: Sequence[Floats], values: Floats) -> "TensorSpline":
         """The spline through values on the grid of these nodes."""
-        axes = [CubicAxis(each) for each in nodes]
+        axes = [CubicAxis(along) for along in nodes]
         for number, axis in enumerate(axes):
             values = axis.coefficients(values, number)
         return cls(axes, values)
