@@ -246,10 +246,7 @@ class FrfModels:
         Inside includes that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
         """
         design, table = model.design, model.sigma
-        if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
-            of_contacts = self._of_pressed(model, contacts)
-        else:
-            of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
+        of_contacts = self._of_pressed(model, contacts)
         nodes, positions = len(model.force), len(design.point_contact)
         contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
         offset = self._offset(model, points, seeds) / contacts.thickness
@@ -263,7 +260,7 @@ class FrfModels:
         ], inside
 
     def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
-        """σ of contacts other than the table's, or whose stiffness is needed."""
+        """σ of the contacts under their forces, which sets their stiffness where it is needed."""
         table = model.sigma
         layer = None
         if contacts.layered or model.needs_stiffness:
@@ -479,7 +476,7 @@ class FrfModel:
         """The approximate size of a response's largest arrays with derivatives by `variables`: limits the points
         computed at once."""
         contacts, lines = len(self.force.ravel()), len(self.design.line_frequency)
-        return _QUANTITIES * contacts * self.sigma.wavenumbers + 2 * (1 + variables) * lines
+        return _QUANTITIES * contacts * len(self.sigma.wave_numbers[0]) + 2 * (1 + variables) * lines
 
     @property
     def structure(self) -> Hashable:

@@ -69,7 +69,7 @@ from underskin.mechanisms.models.sphere_kernels import (
     radius_rows,
 )
 from underskin.mechanisms.parameter import Parameter
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
@@ -104,7 +104,7 @@ class LayerRatios:
     def __init__(self, poisson_ratio: float) -> None:
         """Solve the layer of this Poisson ratio at the nodes (about a millisecond)."""
         alpha = np.linspace(0.0, LARGEST_A_OVER_H, _NODES)
-        ratios = _grid().curves(Layer(poisson_ratio)).ratios_at(np.maximum(alpha, 1e-9))
+        ratios = curves_of(Layer(poisson_ratio)).ratios_at(np.maximum(alpha, 1e-9))
         columns = np.concatenate([ratios, load_contact().softening_coefficients(alpha)], axis=1)
         self.cubics = np.ascontiguousarray(CubicSpline(alpha, columns).c.transpose(1, 0, 2))
         root = alpha * np.sqrt(ratios[:, 1])
@@ -128,12 +128,6 @@ def _half_space() -> Floats:
     cubics = np.zeros((1, 1, 4, 7))
     cubics[0, 0, 3, 4:] = load_contact().softening_coefficients(np.zeros(()))
     return cubics
-
-
-@cache
-def _grid() -> CurveGrid:
-    """A grid of one wave number: stresses are not needed."""
-    return CurveGrid(np.ones(1))
 
 
 @dataclass(frozen=True)
