@@ -49,10 +49,8 @@ class RigLimits:
     @property
     def given(self) -> bool:
         """Whether the user gave any limit."""
-        return any(
-            value is not None
-            for value in (self.preload_n, self.indenter_radius_mm, self.dynamic_force_n, self.dwell_s, self.offset_mm)
-        )
+        limits = (self.preload_n, self.indenter_radius_mm, self.dynamic_force_n, self.dwell_s, self.offset_mm)
+        return any(limit is not None for limit in limits)
 
 
 def inferred(conditions: Conditions, limits: RigLimits) -> RigLimits:
