@@ -7,14 +7,14 @@ campaigns are corrected for the mechanisms (sensors.py).
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.report import DiagnosisResult, reported
+from underskin.diagnosis.reporting.report import DiagnosisResult, Reported, reported
 from underskin.diagnosis.several.histories import (
     CampaignFits,
     SharedParameters,
@@ -115,40 +115,38 @@ def _document(
     if len(usable) < 2:
         documents = [report.document for report in reports.values()]
         return next((document for index, document in enumerate(documents) if index not in usable), documents[0])
-    campaigns, results, suspected = ([parts[index] for index in usable] for parts in (campaigns, results, suspected))
+    used = ([parts[index] for index in usable] for parts in (campaigns, results, suspected))
+    return together_document(name, _skin_over_dates(*used, reports, table))
+
+
+def _skin_over_dates(
+    campaigns: Sequence[Campaign],
+    results: Sequence[DiagnosisResult],
+    suspected: Sequence[frozenset[str]],
+    reports: Mapping[str, Reported],
+    table: SigmaTable,
+) -> SkinOverDates:
+    """Of campaigns with results in their order; `suspected` are the sensors whose level stands apart in each,
+    `reports` those of all campaigns, usable or not."""
     fits = [CampaignFits.of(result) for result in results]
     histories = set_histories(fits)
     leader, acting, dates = histories[0], periods(fits, histories), CampaignDates.of(campaigns)
-    over_dates = SensorsOverDates(
-        [
-            sensors_of(
-                campaign,
-                {
-                    period.mechanism: parameter_values(period.parameters, period.mean)
-                    for period in acting
-                    if index in period.campaigns
-                },
-                table,
-                used_recordings(result),
-            )
-            if fits[index].p_unlisted <= STATED
-            else {}  # no known mechanism explains its levels
-            for index, (campaign, result) in enumerate(zip(campaigns, results, strict=True))
-        ],
-        dates.times,
-        d33_uncertainties(fits, leader),
-        suspected,
-    )
+    sensors: list[dict[str, Sensor]] = []
+    for index, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
+        here = [period for period in acting if index in period.campaigns]
+        values = {period.mechanism: parameter_values(period.parameters, period.mean) for period in here}
+        described = fits[index].p_unlisted <= STATED  # else no known mechanism explains its levels
+        sensors.append(sensors_of(campaign, values, table, used_recordings(result)) if described else {})
+    over_dates = SensorsOverDates(sensors, dates.times, d33_uncertainties(fits, leader), suspected)
 
     def with_causes(change: Change) -> Change:
         if change.sensor is not None:
             return change
-        names = leader.sets[change.since]
         size = float(np.log1p(change.value))
-        return replace(change, causes=causes(fits[change.since], names, size, change.uncertainty))
+        return replace(change, causes=causes(fits[change.since], leader.sets[change.since], size, change.uncertainty))
 
     array = over_dates.array
-    skin = SkinOverDates(
+    return SkinOverDates(
         dates=dates,
         reports=reports,
         provenance=results[-1].provenance,
@@ -156,12 +154,11 @@ def _document(
         p_described=p_described(fits),
         histories=histories,
         periods=acting,
-        sensors=over_dates.campaigns,
+        sensors=sensors,
         failures=failures([faults_of(campaign, result) for campaign, result in zip(campaigns, results, strict=True)]),
         changes=[with_causes(change) for change in over_dates.changes],
         array=None if array is None else replace(array, change=with_causes(array.change)),
     )
-    return together_document(name, skin)
 
 
 def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:

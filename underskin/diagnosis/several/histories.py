@@ -320,17 +320,18 @@ def causes(campaign: CampaignFits, names: Names, log_change: float, deviation: f
     d33 itself and only decreases it, then the most probable first."""
     fit = campaign.moving_fit(names)
     before = float(fit.point.fit[parameter_index(fit, "d33")]) - log_change
-    weights = {AGEING: float(_normal(np.array(log_change), USUAL_CHANGE))} if log_change < 0 else {}
+    weights = {AGEING: float(np.exp(log_normal(log_change, USUAL_CHANGE**2)))} if log_change < 0 else {}
     for name in campaign.problem.lines.mechanisms.named:
         if name not in (*names, AGEING):
             hidden = with_hidden_mechanism(campaign.problem, fit, name, "d33")
             if hidden is not None:
-                density = _normal(hidden.mean - before, float(np.hypot(deviation, _SPACING)))
+                density = np.exp(log_normal(hidden.mean - before, deviation**2 + _SPACING**2))
                 weights[name] = float(hidden.share @ density)
     most = max(weights.values(), default=0.0)
     likely = {name: weight for name, weight in weights.items() if weight > _LIKELY * most}
     return tuple(sorted(likely, key=lambda name: (name != AGEING, -likely[name])))
 
 
-def _normal(offset: Floats, deviation: float) -> Floats:
-    return np.asarray(np.exp(-0.5 * np.square(offset / deviation)) / deviation)
+def log_normal(offset: Floats | float, variance: float) -> Floats:
+    """ln of a normal density, up to its constant."""
+    return np.asarray(-0.5 * (np.square(offset) / variance + np.log(variance)))

@@ -13,6 +13,7 @@ thickness are relative to the declared ones, so that skins that are declared to 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -111,24 +112,32 @@ class Batch:
 @dataclass(frozen=True, eq=False)
 class Populations:
     """`mean` and `spread` τ of the batch (quantities,); `of_skins`: median and ends of the 95 % interval (3, skins,
-    quantities); `departures`: their probabilities by name, for each skin; `batches`: the probability of each prior of
-    μ; `joint`: the probability of the departures of all skins together, by their names."""
+    quantities); `batches`: the probability of each prior of μ; `joint`: the probability of the departures of all skins
+    together, by their names."""
 
     mean: Floats
     spread: Floats
     of_skins: Floats
-    departures: tuple[dict[str, float], ...]
     batches: Floats
     joint: Mapping[tuple[str, ...], float]
 
-    @property
+    @cached_property
+    def departures(self) -> list[dict[str, float]]:
+        """Their probabilities by name, for each skin."""
+        of_skins: list[dict[str, float]] = [{REGULAR: 0.0} for _ in next(iter(self.joint))]
+        for names, share in self.joint.items():
+            for of_skin, name in zip(of_skins, names, strict=True):
+                of_skin[name] = of_skin.get(name, 0.0) + share
+        return of_skins
+
+    @cached_property
     def stated(self) -> tuple[str, ...]:
         """The departure of each skin: the most probable one of skins that more probably depart than not."""
         return tuple(
             REGULAR
-            if probabilities[REGULAR] >= 1 - STATED
-            else max((departure for departure in probabilities if departure != REGULAR), key=probabilities.__getitem__)
-            for probabilities in self.departures
+            if of_skin[REGULAR] >= 1 - STATED
+            else max((departure for departure in of_skin if departure != REGULAR), key=of_skin.__getitem__)
+            for of_skin in self.departures
         )
 
 
@@ -193,14 +202,6 @@ class _Fleet:
         log_weights = self._log_weights_by_states()
         log_share = np.array(list(log_weights.values()))  # (sets, batches, spreads)
         share = np.exp(log_share - np.logaddexp.reduce(log_share, axis=None))
-        of_sets = dict(zip(log_weights, share.sum(axis=(1, 2)).tolist(), strict=True))
-        departures = tuple(
-            {
-                state.departure: float(np.sum([of_sets[states] for states in of_sets if states[number] == index]))
-                for index, state in enumerate(skin_states)
-            }
-            for number, skin_states in enumerate(self.skins)
-        )
         weights, mean, spread, centres, deviations = [], [], [], [], []
         for states, of_batches in zip(log_weights, share, strict=True):
             for batch, of_spreads in zip(self.batches, of_batches, strict=True):
@@ -218,17 +219,16 @@ class _Fleet:
             [[mixture_quantile(level, weight, *column) for column in zip(at.T, sd.T, strict=True)] for at, sd in skins]
             for level in (0.5, 0.025, 0.975)
         ]
-        named = {
-            tuple(skin_states[state].departure for skin_states, state in zip(self.skins, states, strict=True)): share
-            for states, share in of_sets.items()
+        joint = {
+            tuple(skin_states[state].departure for skin_states, state in zip(self.skins, states, strict=True)): of_set
+            for states, of_set in zip(log_weights, share.sum(axis=(1, 2)).tolist(), strict=True)
         }
         return Populations(
             weight @ np.concatenate(mean),
             np.sqrt(weight @ np.concatenate(spread) ** 2),
             np.array(of_skins),
-            departures,
             share.sum(axis=(0, 2)),
-            named,
+            joint,
         )
 
     def _of_skin(self, number: int, states: Sequence[int], batch: Batch) -> tuple[Floats, Floats]:
@@ -296,6 +296,7 @@ class FleetSkin:
         self.declared: Floats = np.log([skin.youngs_modulus_mpa, skin.thickness_mm, 1.0])  # (quantities,)
         tried = set(candidate.problem.lines.mechanisms.named) - set(candidate.search.unsupported)
         self.errors = tuple(name for name in ERRORS if name in tried)
+        self._states = (REGULAR, *self.errors, D33)
         self._fitted: dict[tuple[frozenset[str], str], Gaussian] = {}  # by set and departure
         self._fit(list(dict.fromkeys(candidate.supported(names) for names in sets)))
 
@@ -305,7 +306,7 @@ class FleetSkin:
         odds = log_odds_of_departure(skins) - float(np.log(len(self.errors) + 1))
         weights = [
             self._log_integral(self._fitted[supported, departure], departure) + odds * (departure != REGULAR)
-            for departure in (REGULAR, *self.errors, D33)
+            for departure in self._states
             if (supported, departure) in self._fitted
         ]
         return float(np.logaddexp.reduce(weights)) if weights else -np.inf
@@ -322,7 +323,7 @@ class FleetSkin:
     def states(self, log_shares: Mapping[frozenset[str], float]) -> list[State]:
         """The states under sets of mechanisms of these prior log probabilities, the regular one first."""
         states = []
-        for departure in (REGULAR, *self.errors, D33):
+        for departure in self._states:
             components = [
                 (share, self._fitted[supported, departure])
                 for names, share in log_shares.items()
@@ -378,12 +379,16 @@ class FleetSkin:
     def _about_batch(self, model: Model, lines: Lines, held: Sequence[str]) -> Gaussian:
         """The likelihood that `held` E and thickness are near the batch's, times that by recordings of other kinds."""
         other_kinds = self.candidate.problem.other_kinds
-        slices, rows = parameter_slices(model.names, lines), [DEPARTURES.index(name) for name in held]
+        slices = parameter_slices(model.names, lines)
         matrix = np.eye(len(model.parameters))[[slices[name].start for name in held]]
-        precision = np.diag([QUANTITIES[row].about_batch ** -2.0 for row in rows])
-        about = Gaussian.of(self._centre[rows], precision, 0.0).over(matrix, np.zeros(len(rows)))
+        about = self._near_batch([DEPARTURES.index(name) for name in held]).over(matrix, np.zeros(len(held)))
         from_others = None if other_kinds is None else other_kinds(model, lines)
         return about if from_others is None else from_others + about
+
+    def _near_batch(self, rows: Sequence[int]) -> Gaussian:
+        """The likelihood that these quantities are near the batch's."""
+        precision = np.diag([QUANTITIES[row].about_batch ** -2.0 for row in rows])
+        return Gaussian.of(self._centre[list(rows)], precision, 0.0)
 
     def _likelihood(self, fit: Explanation, best: Evidence, held: Sequence[str]) -> Gaussian:
         """The likelihood of the quantities by one fit: the posterior divided by the priors, of errors and usual
@@ -396,15 +401,14 @@ class FleetSkin:
             of_error = [slices[quantity.departure].start] if quantity.departure in self.errors else []
             for index in (names.index(quantity.name), *of_error):
                 matrix[row, index] = 1.0
-                precision, middle = curvature_of_prior(fit.model.parameters[index])
+                precision, middle = (np.array([part]) for part in curvature_of_prior(fit.model.parameters[index]))
+                prior_variance = 1 / precision
                 if index in of_error and quantity.departure in held:
-                    about, batch_precision = self._centre[row], quantity.about_batch**-2
-                    both = 1 / precision + 1 / batch_precision
-                    log_evidence += 0.5 * (np.log(both * batch_precision) + (about - middle) ** 2 / both)
-                    middle = (precision * middle + batch_precision * about) / (precision + batch_precision)
-                    precision += batch_precision
-                centre[row] += middle
-                variance[row] += 1 / precision
+                    about = self._near_batch([row])
+                    log_evidence -= about.log_integral(middle, precision).item()
+                    middle, prior_variance = about.posterior(middle, precision)
+                centre[row] += middle.item()
+                variance[row] += prior_variance.item()
         by_fit = matrix[:, best.hypothesis.mean_indices]
         mean = matrix @ best.point.fit
         return Gaussian.from_posterior(log_evidence, mean, by_fit @ best.covariance @ by_fit.T, centre, 1 / variance)

@@ -18,7 +18,7 @@ import numpy as np
 
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.report import DiagnosisResult
-from underskin.diagnosis.several.histories import USUAL_CHANGE
+from underskin.diagnosis.several.histories import USUAL_CHANGE, log_normal
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode, Reason
 from underskin.inversion.array_course import FEWEST_DATES, FEWEST_SENSORS, ArrayLevels, array_levels
@@ -296,13 +296,13 @@ class SensorsOverDates:
         log_odds = float(np.log(_P_EXCHANGE))
         for change, expected in ((first, log_ratio), (second, -log_ratio)):
             size, sd = float(np.log1p(change.value)), change.uncertainty
-            log_odds += _log_normal(size - expected, sd**2) - _log_normal(size, sd**2 + USUAL_CHANGE**2)
+            log_odds += float(log_normal(size - expected, sd**2) - log_normal(size, sd**2 + USUAL_CHANGE**2))
         return log_odds
 
 
 def _change(sensor: str | None, before: int, until: int, size: float, sd: float, prior: float) -> Change:
     """A change of ln d33, with the probability that it is one; usual changes are about 20 %."""
-    unchanged = _log_normal(size, sd**2) - _log_normal(size, sd**2 + USUAL_CHANGE**2)
+    unchanged = log_normal(size, sd**2) - log_normal(size, sd**2 + USUAL_CHANGE**2)
     probability = float(1 / (1 + (1 - prior) / prior * np.exp(np.clip(unchanged, -700, 700))))
     return Change(sensor, before, until, float(np.expm1(size)), sd, probability)
 
@@ -311,10 +311,6 @@ def _is_stated(change: Change) -> bool:
     """Whether a change is probable and large enough to be stated."""
     least = _LEAST_OF_ARRAY if change.sensor is None else _LEAST
     return change.probability > _STATED and abs(float(np.log1p(change.value))) > least
-
-
-def _log_normal(offset: float, variance: float) -> float:
-    return float(-0.5 * (offset**2 / variance + np.log(variance)))
 
 
 def changed_once(changes: Sequence[Change]) -> list[Change]:
