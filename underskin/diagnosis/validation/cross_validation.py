@@ -78,15 +78,9 @@ def rows_of_groups(lines: Lines) -> dict[str, Mask]:
     """The rows of each group that can be left out, with enough recordings remaining."""
     if lines.curves:
         return _curve_parts(lines)
-    recordings = frf_of(lines.campaign)
-    columns: dict[str, list[Any]] = {
-        "preload_n": [recording.preload_n for recording in recordings],
-        "indenter_radius_mm": [recording.indenter_radius_mm for recording in recordings],
-        "sensor": [recording.sensor for recording in recordings],
-        "recorded_at": [
-            None if recording.recorded_at is None else str(recording.recorded_at)[:10] for recording in recordings
-        ],
-    }
+    recordings, names = frf_of(lines.campaign), ("preload_n", "indenter_radius_mm", "sensor", "recorded_at")
+    columns: dict[str, list[Any]] = {name: [getattr(recording, name) for recording in recordings] for name in names}
+    columns["recorded_at"] = [None if time is None else str(time)[:10] for time in columns["recorded_at"]]
     rows_by_group = {
         f"{name} {largest}": np.array([value == largest for value in column])[lines.recording]
         for name, column in columns.items()
