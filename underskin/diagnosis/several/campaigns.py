@@ -115,8 +115,9 @@ def _document(
     if len(usable) < 2:
         documents = [report.document for report in reports.values()]
         return next((document for index, document in enumerate(documents) if index not in usable), documents[0])
-    used = ([parts[index] for index in usable] for parts in (campaigns, results, suspected))
-    return together_document(name, _skin_over_dates(*used, reports, table))
+    campaigns, results = [campaigns[index] for index in usable], [results[index] for index in usable]
+    skin = _skin_over_dates(campaigns, results, [suspected[index] for index in usable], reports, table)
+    return together_document(name, skin)
 
 
 def _skin_over_dates(

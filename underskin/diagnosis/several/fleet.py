@@ -131,15 +131,15 @@ def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], suppo
     best = int(share.argmax())
     # Posterior of each skin's set, averaged over all common sets
     posterior = np.einsum("c,ncm->nm", share, np.exp(weights - of_skins[..., None]))
-    chosen, skin = weights[:, best].argmax(axis=1), np.arange(len(skins))
-    probability = share[best] * np.exp((weights[skin, best, chosen] - of_skins[:, best]).sum())
+    chosen, rows = weights[:, best].argmax(axis=1), np.arange(len(skins))
+    probability = share[best] * np.exp((weights[rows, best, chosen] - of_skins[:, best]).sum())
     by_others = np.logaddexp.reduce((log_common - of_skins)[..., None] + change, axis=1)
     by_others -= np.logaddexp.reduce(by_others, axis=1, keepdims=True)
     order = skins[0].candidate.problem.lines.mechanisms.named
     chosen_sets = [skin.candidate.supported(sets[index]) for skin, index in zip(skins, chosen, strict=True)]
     return CommonSet(
         tuple(tuple(name for name in order if name in names) for names in chosen_sets),
-        tuple(posterior[skin, chosen].tolist()),
+        tuple(posterior[rows, chosen].tolist()),
         float(probability),
         tuple(dict(zip(sets, row, strict=True)) for row in by_others.tolist()),
         float(np.logaddexp.reduce(log_common) + evidence.max(axis=1).sum()),

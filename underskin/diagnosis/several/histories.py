@@ -295,7 +295,7 @@ def d33_uncertainties(fits: Sequence[CampaignFits], leader: SetHistory) -> list[
     uncertainties = [0.0]
     for number in range(1, len(fits)):
         pair = moving[number - 1 : number + 1]
-        same = [name for name in pair[0].names if name in pair[1].names and keeps_strength(*pair, name)]
+        same = [name for name in pair[0].names if name in pair[1].names and keeps_strength(pair[0], pair[1], name)]
         variances = [
             max(_d33_variance(fit, same) - _d33_variance(campaign.fit(()), ()), 0.0)
             for fit, campaign in zip(pair, fits[number - 1 : number + 1], strict=True)

@@ -13,7 +13,7 @@ thickness are relative to the declared ones, so that skins that are declared to 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -347,11 +347,7 @@ class FleetSkin:
         alone = self.candidate.problem
         for departure in (REGULAR, *self.errors):
             held = tuple(name for name in self.errors if name != departure)
-
-            def about_batch(model: Model, lines: Lines, held: Sequence[str] = held) -> Gaussian:
-                return self._about_batch(model, lines, held)
-
-            problem = FittingProblem(alone.lines, alone.table, about_batch, self._bench.gain)
+            problem = FittingProblem(alone.lines, alone.table, partial(self._about_batch, held), self._bench.gain)
             for names, fit in zip(sets, _explained(problem, [{*names, *self.errors} for names in sets]), strict=True):
                 if fit is not None:
                     components = [
@@ -376,7 +372,7 @@ class FleetSkin:
             return regular
         return self._fitted[names, max(others, key=lambda name: self._log_integral(self._fitted[names, name], name))]
 
-    def _about_batch(self, model: Model, lines: Lines, held: Sequence[str]) -> Gaussian:
+    def _about_batch(self, held: Sequence[str], model: Model, lines: Lines) -> Gaussian:
         """The likelihood that `held` E and thickness are near the batch's, times that by recordings of other kinds."""
         other_kinds = self.candidate.problem.other_kinds
         slices = parameter_slices(model.names, lines)
