@@ -76,7 +76,8 @@ def effect(lines: Lines, predicted: Array, rows: Mask, gain: float, level: float
     means, rms = 100 * alongs / sizes, 100 * np.sqrt(np.maximum(squares, 0.0) / sizes)
     signed = bool(abs(means[0]) >= _ONE_SIGN * rms[0])
     percent = means if signed else rms
-    return EffectSize(float(percent[0]), *np.quantile(percent[1:], [0.025, 0.975]).tolist(), signed)
+    low, high = np.quantile(percent[1:], [0.025, 0.975]).tolist()
+    return EffectSize(float(percent[0]), low, high, signed)
 
 
 PERMUTATIONS = 999

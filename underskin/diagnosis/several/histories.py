@@ -198,7 +198,7 @@ def set_histories(fits: Sequence[CampaignFits]) -> list[SetHistory]:
     log_evidence -= log_evidence.max(axis=1, keepdims=True)
     log_evidence[log_evidence <= -_PRUNE_NATS] = -np.inf
     weights = log_evidence[0] + [log_prior(len(names), supported) for names in sets]
-    paths = [(weight, (index,)) for index, weight in enumerate(weights.tolist())]
+    paths: list[tuple[float, tuple[int, ...]]] = [(weight, (index,)) for index, weight in enumerate(weights.tolist())]
     for before, after, here in zip(explanations[:-1], explanations[1:], log_evidence[1:].tolist(), strict=True):
         possible = [index for index, log_evidence_of_set in enumerate(here) if np.isfinite(log_evidence_of_set)]
         paths = [path for path in paths if np.isfinite(path[0])]

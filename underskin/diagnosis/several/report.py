@@ -238,7 +238,7 @@ def _mechanism(
     return {**row, "explains_percent": None, "scope": dict(scope)}
 
 
-def _rounded(digits: int = 4, **values: float) -> dict[str, float | None]:
+def _rounded(digits: int = 4, /, **values: float) -> dict[str, float | None]:
     return {name: rounded(float(value), digits) for name, value in values.items()}
 
 

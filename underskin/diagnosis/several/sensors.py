@@ -25,7 +25,7 @@ from underskin.inversion.array_course import FEWEST_DATES, FEWEST_SENSORS, Array
 from underskin.inversion.array_course import changes as changes_between_ends
 from underskin.inversion.invert import invert
 from underskin.prediction.adopted_model import AdoptedModel
-from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.readers.calendar_times import time_zone
 from underskin.surrogate.sigma_table import SigmaTable
@@ -328,7 +328,7 @@ def without_steps(campaign: Campaign, steps: Sequence[Change], number: int) -> C
             factors[change.sensor] = factors.get(change.sensor, 1.0) / (1 + change.value)
     if not factors:
         return campaign
-    recordings = []
+    recordings: list[Recording] = []
     for recording in campaign.recordings:
         if isinstance(recording, FrfRecording) and recording.sensor in factors:
             lines = lines_of(recording)

@@ -110,7 +110,7 @@ class Signatures:
         absorbed = np.linalg.solve(full[:count, :count] + np.diag(precision), shared.T)
         d33 = [index for index, parameter in enumerate(nuisances) if parameter.name == "d33"]
         information = full[count:, count:]
-        return Projection(information, information - shared @ absorbed, absorbed[d33])
+        return Projection(information, information - shared @ absorbed, np.asarray(absorbed[d33], dtype=float))
 
     def _products(self, smooth: float) -> tuple[Floats, Floats]:
         """Re u*J and Re JᵀJ of the nuisances and the signatures; of curves with a smooth error of that share."""
