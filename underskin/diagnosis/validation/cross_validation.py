@@ -11,7 +11,7 @@ sensors' gains where the sensor was not in the training data.
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,6 @@ class PredictionScore:
     noise: float = 0.0  # Σ E|y − m|² from noise alone
     log_score: float = 0.0  # Σ log predictive density of the recordings' levels, relative
     recordings: int = 0
-    pickup: float = 0.0  # the part of `noise` from mains pick-up
 
     def __add__(self, other: "PredictionScore") -> "PredictionScore":
         return PredictionScore(*map(operator.add, astuple(self), astuple(other)))
@@ -196,10 +195,9 @@ def _predict(
     position_variance = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
     noise = noise + position_variance[recording] * np.abs(prediction.value[rows]) ** 2
     noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
-    pickup_noise = 2 * prediction.pickup_variance[rows]
-    noise = noise + pickup_noise
+    noise = noise + 2 * prediction.pickup_variance[rows]
     square = np.abs(held_out_lines.value - value) ** 2
-    return replace(_score(held_out_lines.first, square, noise, np.abs(value) ** 2), pickup=float(pickup_noise.sum()))
+    return _score(held_out_lines.first, square, noise, np.abs(value) ** 2)
 
 
 def _predict_curves(
