@@ -203,7 +203,7 @@ def set_histories(fits: Sequence[CampaignFits]) -> list[SetHistory]:
         possible = [index for index, log_evidence_of_set in enumerate(here) if np.isfinite(log_evidence_of_set)]
         paths = [path for path in paths if np.isfinite(path[0])]
         change = {
-            (first, second): _log_change(before[first], after[second], len(sets[first] ^ sets[second]), supported)
+            (first, second): _log_transition(before[first], after[second], len(sets[first] ^ sets[second]), supported)
             for first in {path[-1] for _, path in paths}
             for second in possible
         }
@@ -223,7 +223,7 @@ def set_histories(fits: Sequence[CampaignFits]) -> list[SetHistory]:
     return [SetHistory(named(path), float(np.exp(weight - total))) for weight, path in paths]
 
 
-def _log_change(before: Explanation | None, after: Explanation | None, mechanisms: int, supported: int) -> float:
+def _log_transition(before: Explanation | None, after: Explanation | None, mechanisms: int, supported: int) -> float:
     """Log prior of the change of a set by so many mechanisms, plus the log agreement of shared parameters."""
     assert before is not None
     assert after is not None
