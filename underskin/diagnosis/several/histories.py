@@ -315,12 +315,12 @@ def _d33_variance(fit: Explanation, known: Sequence[str]) -> float:
     return float(np.linalg.inv(precision)[d33, d33])
 
 
-def causes(campaign: CampaignFits, names: Names, log_change: float, deviation: float) -> Names:
-    """The mechanisms that, added to a campaign's own `names`, would change ln d33 of all sensors so: ageing, which is
-    d33 itself and only decreases it, then the most probable first."""
+def causes(campaign: CampaignFits, names: Names, size: float, deviation: float) -> Names:
+    """The mechanisms that, added to a campaign's own `names`, would change ln d33 of all sensors by `size`: ageing,
+    which is d33 itself and only decreases it, then the most probable first."""
     fit = campaign.moving_fit(names)
-    before = float(fit.point.fit[parameter_index(fit, "d33")]) - log_change
-    weights = {AGEING: float(np.exp(log_normal(log_change, USUAL_CHANGE**2)))} if log_change < 0 else {}
+    before = float(fit.point.fit[parameter_index(fit, "d33")]) - size
+    weights = {AGEING: float(np.exp(log_normal(size, USUAL_CHANGE**2)))} if size < 0 else {}
     for name in campaign.problem.lines.mechanisms.named:
         if name not in (*names, AGEING):
             hidden = with_hidden_mechanism(campaign.problem, fit, name, "d33")
