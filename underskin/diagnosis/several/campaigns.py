@@ -25,8 +25,8 @@ from underskin.diagnosis.several.histories import (
     periods,
     set_histories,
 )
+from underskin.diagnosis.several.joint_report import SkinOverDates, together_document
 from underskin.diagnosis.several.population import STATED
-from underskin.diagnosis.several.report import SkinOverDates, together_document
 from underskin.diagnosis.several.sensors import (
     CampaignDates,
     Change,

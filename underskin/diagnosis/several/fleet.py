@@ -21,6 +21,7 @@ from underskin.diagnosis.reporting.report import DiagnosisResult, report, report
 from underskin.diagnosis.selection.priors import SHOWS, log_prior
 from underskin.diagnosis.several.campaigns import by_frfs, curves_once, refuse_copies, with_curves
 from underskin.diagnosis.several.histories import CampaignFits, Names, log_change, p_described
+from underskin.diagnosis.several.joint_report import Fleet, PooledQuantity, fleet_document
 from underskin.diagnosis.several.population import (
     DEPARTURES,
     ERRORS,
@@ -35,7 +36,6 @@ from underskin.diagnosis.several.population import (
     benches,
     populations,
 )
-from underskin.diagnosis.several.report import Fleet, PooledQuantity, fleet_document
 from underskin.diagnosis.several.sensors import CampaignDates, in_order
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign
