@@ -28,10 +28,10 @@ def test_laws_over_frequency_minimum_phase_turn() -> None:
     for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
         if law.variant in ("echo", "magnitude"):  # neither falls off: their integrals have no end
             continue
-        values = dict(zip([entry.name for entry in law.parameters_bound], coordinates(law, 0.5), strict=True))
+        values = dict(zip([entry.name for entry in law.parameters_stated], coordinates(law, 0.5), strict=True))
         seeds = {
             name: differentiated(entry.from_fit(values[name]))
-            for entry in law.parameters_bound
+            for entry in law.parameters_stated
             for name in [entry.name]
         }
         factor = law.factor(np.exp(wide), seeds).value[0]
@@ -60,7 +60,7 @@ def test_kept_law_over_frequency_law() -> None:
     """What is kept of a law over frequency is that law."""
     frequency = np.geomspace(2.0, 500.0, 9)
     for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
-        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
+        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_stated}
         found = {"law": law.name, "parameters": values}
         said = {"acts_on": "frequency_response", "axis": "frequency_hz", "form": law.description.form}
         stated = {**said, "expression": "FRF", "range": {"frequency_hz": [1.0, 1000.0]}}

@@ -41,7 +41,7 @@ def campaign() -> Campaign:
 
 @pytest.fixture(scope="module")
 def grammar(campaign: Campaign, table: SigmaTable) -> Grammar:
-    return Grammar.of(campaign, lines_of(campaign), table, tuple(CATALOGUE.values()), CATALOGUE)
+    return Grammar.of(campaign, lines_of(campaign), table, CATALOGUE)
 
 
 def lines_of(conditions: Conditions) -> Floats:
@@ -67,8 +67,8 @@ def point(model: FrfModel, own: Sequence[float]) -> Floats:
 def coordinates(law: UnlistedLaw, amplitude: float) -> list[float]:
     """All amplitudes at a share of their priors' sd, what bends the law at the first of its grid."""
     count = len(law.amplitudes)
-    sds = [entry.prior.sd for entry in law.parameters_bound[:count]]  # type: ignore[union-attr]
-    return [*(amplitude * sd for sd in sds), *law.grid[0][: len(law.parameters_bound) - count]]
+    sds = [entry.prior.sd for entry in law.parameters_stated[:count]]  # type: ignore[union-attr]
+    return [*(amplitude * sd for sd in sds), *law.grid[0][: len(law.parameters_stated) - count]]
 
 
 def test_grammar_holds_several_hundred_laws(grammar: Grammar) -> None:
@@ -97,7 +97,7 @@ def test_derivatives_are_those_of_differences(grammar: Grammar, campaign: Campai
         model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
         fit = point(model, coordinates(law, 0.31))
         exact = model.predict(fit).slopes
-        for place in range(len(law.parameters_bound)):
+        for place in range(len(law.parameters_stated)):
             step = np.zeros(len(fit))
             step[place] = 1e-6
             ahead, behind = (model.predict(fit + sign * step, slopes=False).value for sign in (1, -1))
@@ -108,9 +108,8 @@ def test_derivatives_are_those_of_differences(grammar: Grammar, campaign: Campai
 def one_law(acts_on: str, axis: Axis, campaign: Campaign, table: SigmaTable) -> tuple[RecordingLaw, FrfModel]:
     """A linear law over an axis, from its least value on, in a model."""
     shape = next(entry for entry in shapes(axis) if entry.form == "linear")
-    beside = tuple(CATALOGUE.values())
-    law = RecordingLaw(acts_on, axis, shape, LevelTables(campaign, table, beside))  # type: ignore[arg-type]
-    return law, FrfModel([law], campaign, table, beside)
+    law = RecordingLaw(acts_on, axis, shape, LevelTables(campaign, table))  # type: ignore[arg-type]
+    return law, FrfModel([law], campaign, table)
 
 
 def along(campaign: Campaign, name: str) -> Axis:
@@ -181,7 +180,7 @@ def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
     for law in grammar.laws[:: 1 if SOAK else 4]:
         if not isinstance(law, RecordingLaw) or law.axis.words or law.description.form == "free":
             continue
-        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
+        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_stated}
         said = {"acts_on": law.description.acts_on, "axis": law.axis.name, "form": law.description.form}
         stated = {**said, "expression": "E", "range": {law.axis.name: [law.axis.low, law.axis.high]}}
         found = {"law": law.name, "parameters": values}
@@ -234,9 +233,7 @@ def test_many_columns_share_half_axes(campaign: Campaign, table: SigmaTable) -> 
         replace(entry, conditions={f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
         for entry in frf_of(campaign)
     )
-    many = Grammar.of(
-        Conditions("many", campaign.skin, entries), lines_of(campaign), table, tuple(CATALOGUE.values()), CATALOGUE
-    )
+    many = Grammar.of(Conditions("many", campaign.skin, entries), lines_of(campaign), table, CATALOGUE)
     shares = np.exp(many.log_shares)
     added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.description.axis)
     one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.description.axis == "order")
@@ -246,7 +243,7 @@ def test_many_columns_share_half_axes(campaign: Campaign, table: SigmaTable) -> 
 def test_every_law_expression_without_powers_ten(grammar: Grammar) -> None:
     """Every law has an expression without powers of ten."""
     for law in grammar.laws:
-        own = zip(law.parameters_bound, coordinates(law, 0.3), strict=True)
+        own = zip(law.parameters_stated, coordinates(law, 0.3), strict=True)
         text = expression(law, {entry.name: entry.from_fit(at) for entry, at in own})
         assert "=" in text
         assert "e-" not in text

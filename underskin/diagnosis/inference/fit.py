@@ -28,6 +28,7 @@ from underskin.diagnosis.inference.hypothesis import (
 from underskin.diagnosis.inference.least_squares import LeastSquares, between_samples
 from underskin.diagnosis.inference.products import FrfProducts, Products, joined
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, SeveralLevels
+from underskin.mechanisms.laws.adhesion import Adhesion
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf import FrfModels
 from underskin.units import Floats, Indices, Mask
@@ -509,7 +510,7 @@ class Fitter:
     def _between_samples(self, at: Evaluated) -> Self:
         """With contact points confined to the interval between samples that they are in, where adhesion moves them."""
         (hypothesis,) = self.hypotheses
-        if not any(self.lines.mechanisms[name].moves_contact_points for name in hypothesis.model.names):
+        if Adhesion.name not in hypothesis.model.names:
             return self
         held = copy(self)
         held.low, held.high = (

@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
 from underskin.diagnosis.noise import START_GAIN, USUAL_DRIFT
+from underskin.mechanisms.laws.adhesion import Adhesion
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.campaign import CurveConditions, CurveRecording, curves_of
 from underskin.recordings.curve_course import curve_landmarks, touch
@@ -56,7 +57,7 @@ class LeastSquares:
         self._precision, self._centre = np.sqrt(priors[:, 0]), priors[:, 1]
         travels = [curve.displacement_mm for curve in curves_of(lines.campaign)]
         self._approach = [_distinct(travel[: int(travel.argmax()) + 1]) for travel in travels]
-        self._has_jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
+        self._has_jumps = Adhesion.name in model.names
         curves = curves_of(lines.campaign) if self._has_jumps else []
         self._snap_in_intervals = [_snap_in_interval(curve) for curve in curves]
         contacts = [_visible_contact(curve) for curve in curves]

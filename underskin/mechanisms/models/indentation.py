@@ -58,9 +58,8 @@ from underskin.mechanisms.models.composition import (
     required_modulus,
     thickness_parameter,
 )
-from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
+from underskin.mechanisms.models.curve_state import Curve, Relaxation, Samples, memories, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
-from underskin.mechanisms.models.relaxation import Relaxation, memories
 from underskin.mechanisms.models.sphere_kernels import (
     contact_rows,
     creep_edge_rows,
@@ -463,7 +462,7 @@ class IndentationModel(CurveModel):
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
         )
         for mechanism in self._mechanisms:
-            mechanism.on_curve(curve, values[mechanism.name])
+            mechanism.act(curve, values[mechanism.name])
         return curve
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:

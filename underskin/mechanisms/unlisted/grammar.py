@@ -18,9 +18,8 @@ from functools import lru_cache
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp, log
-from underskin.mechanisms.base import Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.base import Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.mechanisms.unlisted.axes import BUILT_IN, Axis, axes_of, every_axis
 from underskin.mechanisms.unlisted.forms import Shape, constant, shapes
@@ -70,20 +69,20 @@ class FrequencyLaw(UnlistedLaw):
         self.variant = law.variant
         self.share = law.share
         self.amplitudes = tuple(parameter.name for parameter in law.amplitudes)
-        self.parameters_bound = (*law.amplitudes, *law.shape_parameters)
+        self.parameters_stated = (*law.amplitudes, *law.shape_parameters)
         self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
         self.factor = law.factor
         self.middle_hz = middle
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-        """The factor on each distinct line."""
-        return self.factor(design.line_frequency, values)
+    def act(self, state: FrfState, values: Values) -> None:
+        """Set the factor on each distinct line."""
+        state.factor = self.factor(state.design.line_frequency, values)
 
     def tangents(self, frequency: Floats) -> Array:
         """∂ ln factor by each amplitude at 0, at the grid of the shape parameters (points, frequencies, amplitudes)."""
         points, count = len(self.grid), len(self.amplitudes)
         values: dict[str, Differentiated] = {}
-        for number, parameter in enumerate(self.parameters_bound):
+        for number, parameter in enumerate(self.parameters_stated):
             slopes = np.zeros((count, points, 1))
             value = np.zeros((points, 1))
             if number < count:
@@ -286,19 +285,17 @@ class Grammar:
         conditions: Conditions,
         frequency: Floats,
         table: SigmaTable,
-        further_mechanisms: Sequence[Mechanism],
         listed: Collection[str],
     ) -> "Grammar":
         """The laws for FRFs at these distinct lines [Hz].
 
-        `further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well. `listed`: names of
-        mechanisms; a law that one of them describes exactly is left out.
+        `listed`: names of mechanisms; a law that one of them describes exactly is left out.
         """
         laws: list[UnlistedLaw] = []
         shares: list[float] = []
         axes = axes_of(conditions) if len(conditions.recordings) >= _LEAST_RECORDINGS else []
         columns = [axis for axis in axes if axis.name not in BUILT_IN]
-        tables = LevelTables(conditions, table, further_mechanisms)
+        tables = LevelTables(conditions, table)
         lines = np.unique(frequency)
         for axis in axes:
             share = 1.0 if axis.name in BUILT_IN else _COLUMNS / len(columns)
@@ -362,9 +359,7 @@ _ROUNDING = 1e-9  # of the range, by which a value may lie beyond it
 CAMPAIGN_SPECIFIC_AXES = ("order",)  # axes without meaning for other recordings
 
 
-def bound_to(
-    law: UnlistedLaw, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]
-) -> tuple[UnlistedLaw, Mask]:
+def bound_to(law: UnlistedLaw, conditions: Conditions, table: SigmaTable) -> tuple[UnlistedLaw, Mask]:
     """The law on these recordings, and which of them (recordings,) lie in its range.
 
     A recording beyond the range, or without a value on its axis, is predicted at the end of the range.
@@ -375,7 +370,7 @@ def bound_to(
     axis, inside = _on(law.axis, conditions, ids)
     if isinstance(law, LagLaw):
         return law.on(axis), inside
-    return law.on(axis, LevelTables(conditions, table, further_mechanisms)), inside
+    return law.on(axis, LevelTables(conditions, table)), inside
 
 
 def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, Mask]:
