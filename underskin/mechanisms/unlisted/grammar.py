@@ -13,7 +13,8 @@ A law found on one campaign applies to other recordings of the skin within its r
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import add
 
 import numpy as np
 
@@ -31,29 +32,18 @@ from underskin.mechanisms.unlisted.laws import (
     LevelTables,
     RecordingLaw,
     UnlistedLaw,
+    changes,
 )
 from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form
 from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Mask
 
-_REASON = "nothing is known of it; as large as what is usually left out"
 _BAND = "anywhere within the measured band"
 _BELOW = 30.0  # times below the band a corner may lie whose phase still shows in it
 _BUMPS, _BUMP_WIDTH = 8, 0.55  # of a free response; width over the distance of neighbours
 
 Factor = Callable[[Floats, Values], Differentiated]  # at frequencies [Hz]
-
-
-@dataclass(frozen=True, eq=False)
-class _Law:
-    form: Form
-    variant: str
-    amplitudes: tuple[Parameter, ...]
-    shape_parameters: tuple[Parameter, ...]
-    grid: Sequence[Sequence[float]]
-    factor: Factor
-    share: float = 1.0
 
 
 class FrequencyLaw(UnlistedLaw):
@@ -62,17 +52,25 @@ class FrequencyLaw(UnlistedLaw):
     stage = Stage.LINES
     order = 210
 
-    def __init__(self, law: _Law, middle: float) -> None:
-        """`middle` of the band [Hz], to which powers refer."""
-        self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", law.form, law.variant])
-        self.description = LawDescription("frequency_response", "frequency_hz", law.form)
-        self.variant = law.variant
-        self.share = law.share
-        self.amplitudes = tuple(parameter.name for parameter in law.amplitudes)
-        self.parameters_stated = (*law.amplitudes, *law.shape_parameters)
-        self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
-        self.factor = law.factor
-        self.middle_hz = middle
+    middle_hz: float  # of the band, to which powers refer
+
+    def __init__(
+        self,
+        form: Form,
+        variant: str,
+        amplitudes: tuple[Parameter, ...],
+        shape_parameters: tuple[Parameter, ...],
+        grid: Sequence[Sequence[float]],
+        factor: Factor,
+        share: float = 1.0,
+    ) -> None:
+        """`factor` at frequencies, as a function of the amplitudes and the shape parameters."""
+        self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", form, variant])
+        self.description = LawDescription("frequency_response", "frequency_hz", form)
+        self.variant, self.share, self.factor = variant, share, factor
+        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
+        self.parameters_stated = (*amplitudes, *shape_parameters)
+        self.grid = np.array(grid, dtype=float).reshape(len(grid), -1)
 
     def act(self, state: FrfState, values: Values) -> None:
         """Set the factor on each distinct line."""
@@ -102,11 +100,14 @@ def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
         return []
     middle = float(np.sqrt(low * high))
     laws = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
-    return [FrequencyLaw(law, middle) for law in laws]
+    for law in laws:
+        law.middle_hz = middle
+    return laws
 
 
 def _amplitude(sd: float, name: str = "law_change") -> Parameter:
-    return Parameter(name, "-", -6 * sd, 6 * sd, Normal(0.0, sd), "linear", 0.0, _REASON)
+    (amplitude,) = changes(name, "-", sd, 1)
+    return amplitude
 
 
 def _corner(low: float, high: float, name: str = "law_corner") -> Parameter:
@@ -117,7 +118,7 @@ def _over_band(low: float, high: float, count: int) -> list[float]:
     return np.linspace(np.log(low), np.log(high), count).tolist()
 
 
-def _phases(middle: float) -> list[_Law]:
+def _phases(middle: float) -> list[FrequencyLaw]:
     """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a dispersive delay; and a pure delay."""
     exponent = Parameter(
         "law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴", closed=(0.0,)
@@ -131,10 +132,13 @@ def _phases(middle: float) -> list[_Law]:
 
     grid = [(value,) for value in (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)]
     lag = _amplitude(0.2, "law_lag")
-    return [_Law("power", "phase", (lag,), (exponent,), grid, factor), _Law("linear", "delay", (lag,), (), [()], late)]
+    return [
+        FrequencyLaw("power", "phase", (lag,), (exponent,), grid, factor),
+        FrequencyLaw("linear", "delay", (lag,), (), [()], late),
+    ]
 
 
-def _powers(low: float, high: float, middle: float) -> list[_Law]:
+def _powers(low: float, high: float, middle: float) -> list[FrequencyLaw]:
     """Minimum phase: (if)^n; a step from 1 to 1 + A; beyond a corner (1 + if/f1)^n; below one (1 + f1/(if))^(−n)."""
 
     def power(frequency: Floats, values: Values) -> Differentiated:
@@ -155,14 +159,14 @@ def _powers(low: float, high: float, middle: float) -> list[_Law]:
     from_below = [(at,) for at in _over_band(low / _BELOW, high, 8)]
     order = _amplitude(0.7, "law_exponent")
     return [
-        _Law("power", "magnitude", (_amplitude(0.15, "law_exponent"),), (), [()], power),
-        _Law("saturating", "step", (_amplitude(0.3),), (corner,), grid, step),
-        _Law("threshold", "corner", (order,), (corner,), grid, beyond, 0.5),
-        _Law("threshold", "high_pass", (order,), (lower,), from_below, beneath, 0.5),
+        FrequencyLaw("power", "magnitude", (_amplitude(0.15, "law_exponent"),), (), [()], power),
+        FrequencyLaw("saturating", "step", (_amplitude(0.3),), (corner,), grid, step),
+        FrequencyLaw("threshold", "corner", (order,), (corner,), grid, beyond, 0.5),
+        FrequencyLaw("threshold", "high_pass", (order,), (lower,), from_below, beneath, 0.5),
     ]
 
 
-def _peaks(low: float, high: float) -> list[_Law]:
+def _peaks(low: float, high: float) -> list[FrequencyLaw]:
     """A resonance at one frequency in all recordings, added to the response: 1 + A u²/(1 − u² + 2iζu), and variants."""
     corner = _corner(0.8 * low, 1.25 * high, "law_centre")
     damping = Parameter("law_damping", "-", 5e-3, 1.0, Normal(-2.8, 1.0), "log", None, "sharp to broad")
@@ -177,18 +181,18 @@ def _peaks(low: float, high: float) -> list[_Law]:
         "spring": lambda *_: 1.0,
     }
 
-    def of(name: str) -> _Law:
+    def of(name: str) -> FrequencyLaw:
         def factor(frequency: Floats, values: Values) -> Differentiated:
             u = frequency / values["law_centre"]
             numerator = numerators[name](u, values)
             return 1.0 + values["law_change"] * (numerator / (1.0 - u * u + 2j * values["law_damping"] * u))
 
-        return _Law("peak", name, (_amplitude(0.2),), (corner, damping), grid, factor, 1 / len(numerators))
+        return FrequencyLaw("peak", name, (_amplitude(0.2),), (corner, damping), grid, factor, 1 / len(numerators))
 
     return [of(name) for name in numerators]
 
 
-def _echo(low: float, high: float) -> _Law:
+def _echo(low: float, high: float) -> FrequencyLaw:
     """1 + A e^(−2πif/f1): an echo, whose ripples recur every f1."""
     spacing = _corner(2.2 * (high - low) / 60, 2 * (high - low), "law_period")
 
@@ -197,27 +201,21 @@ def _echo(low: float, high: float) -> _Law:
 
     turns = np.arange(1.0, 14.0, 0.5)
     grid = [(float(np.log((high - low) / turn)),) for turn in turns.tolist()]
-    return _Law("periodic", "echo", (_amplitude(0.15),), (spacing,), grid, factor)
+    return FrequencyLaw("periodic", "echo", (_amplitude(0.15),), (spacing,), grid, factor)
 
 
-def _free(low: float, high: float) -> _Law:
+def _free(low: float, high: float) -> FrequencyLaw:
     """ln |FRF| a sum of bumps over ln f, the phase by Kramers and Kronig."""
     centres = np.linspace(np.log(low), np.log(high), _BUMPS)
     width = _BUMP_WIDTH * (centres[1] - centres[0])
     names = tuple(f"law_change_{number + 1}" for number in range(_BUMPS))
 
     def factor(frequency: Floats, values: Values) -> Differentiated:
-        total: Differentiated | None = None
         away = (np.log(frequency) - centres[:, None]) / width
-        for name, log_magnitude, phase in zip(
-            names, np.exp(-0.5 * away**2), phase_of_bump(away, float(width)), strict=True
-        ):
-            part = values[name] * (log_magnitude + 1j * phase)
-            total = part if total is None else total + part
-        assert total is not None
-        return exp(total)
+        bumps = np.exp(-0.5 * away**2) + 1j * phase_of_bump(away, float(width))
+        return exp(reduce(add, [values[name] * bump for name, bump in zip(names, bumps, strict=True)]))
 
-    return _Law("free", "minimum_phase", tuple(_amplitude(0.1, name) for name in names), (), [()], factor)
+    return FrequencyLaw("free", "minimum_phase", tuple(_amplitude(0.1, name) for name in names), (), [()], factor)
 
 
 @lru_cache(maxsize=8)

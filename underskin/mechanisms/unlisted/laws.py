@@ -12,7 +12,8 @@ Laws are bound to the recordings of a campaign; they are mechanisms like any oth
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
+from operator import add
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
@@ -283,11 +284,11 @@ class RecordingLaw(UnlistedLaw):
         if self._acts_on == "position":
             half = len(self.amplitudes) // 2
             x, y = (
-                _summed([values[name] * feature for name, feature in zip(names, features, strict=True)])
+                reduce(add, [values[name] * feature for name, feature in zip(names, features, strict=True)])
                 for names in (self.amplitudes[:half], self.amplitudes[half:])
             )
             return self.tables.moved(rows, x, y)
-        change = _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
+        change = reduce(add, [values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
         if self.shape.logarithmic:
             log = change
         elif self._acts_on == "force":
@@ -334,13 +335,6 @@ def log_of(quantity: Differentiated) -> Differentiated:
     inside = factor > _LEAST
     value = np.where(inside, np.log(np.where(inside, factor, 1.0)), np.log(_LEAST) + factor / _LEAST - 1)
     return chain(value, (1 / np.where(inside, factor, _LEAST), quantity))
-
-
-def _summed(parts: Sequence[Differentiated]) -> Differentiated:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total
 
 
 @lru_cache(maxsize=64)
@@ -397,7 +391,7 @@ class LagLaw(UnlistedLaw):
         features = self.shape.features(self.axis.of(ids), values)
         if self.shape.logarithmic:
             features = [exp(values["law_exponent"] * features[0])]
-        return _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
+        return reduce(add, [values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
 
     def act(self, state: FrfState, values: Values) -> None:
         """Set the factor on each distinct line."""
