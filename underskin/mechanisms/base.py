@@ -44,11 +44,6 @@ class Stage(Enum):
     ADDED_CHARGE = "charge from elsewhere, as a covariance"
     CURVE = "curves"
 
-    @property
-    def position(self) -> int:
-        """Its index in the order of composition."""
-        return list(Stage).index(self)
-
 
 class Unsupported(UnderskinError):
     """A campaign cannot support a mechanism. Attributes: `mechanism`, `reason` (what is lacking, in words)."""
@@ -92,6 +87,11 @@ class Mechanism:
         for name in TEXTS:
             if isinstance(text := vars(cls).get(name), str):
                 setattr(cls, name, " ".join(text.split()))
+
+    @property
+    def rank(self) -> tuple[int, int, str]:
+        """Its place in the order of composition."""
+        return list(Stage).index(self.stage), self.order, self.name
 
     @property
     def needs_lines(self) -> bool:

@@ -205,4 +205,4 @@ def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechan
 
 
 def _in_order(mechanisms: Iterator[Mechanism] | list[Mechanism]) -> tuple[Mechanism, ...]:
-    return tuple(sorted(mechanisms, key=lambda mechanism: (mechanism.stage.position, mechanism.order, mechanism.name)))
+    return tuple(sorted(mechanisms, key=lambda mechanism: mechanism.rank))

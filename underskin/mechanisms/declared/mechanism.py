@@ -12,7 +12,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from operator import add, mul, sub, truediv
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -60,27 +61,27 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
             inner = _value(operand, values)
             return -inner if isinstance(op, ast.USub) else inner
         case ast.BinOp(left=left, op=op, right=right):
-            return _combined(op, _value(left, values), _value(right, values))
+            return _OPERATORS[type(op)](_value(left, values), _value(right, values))
         case ast.Call(func=ast.Name(id=name), args=args):
             return FUNCTIONS[name][1](*(_value(argument, values) for argument in args))
     raise AssertionError(node)  # the grammar has no other node
 
 
-def _combined(op: ast.operator, a: Value, b: Value) -> Value:
-    match op:
-        case ast.Add():
-            return a + b
-        case ast.Sub():
-            return a - b
-        case ast.Mult():
-            return a * b
-        case ast.Div():
-            return a / b
+def _power(a: Value, b: Value) -> Value:
     if isinstance(b, Differentiated):
         return _exp(b * _log(a))
     if isinstance(a, Differentiated):
         return a ** float(np.asarray(b).real) if np.ndim(b) == 0 else _exp(_log(a) * b)
     return np.asarray(a, dtype=complex if np.iscomplexobj(a) else float) ** b
+
+
+_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Value]] = {
+    ast.Add: add,
+    ast.Sub: sub,
+    ast.Mult: mul,
+    ast.Div: truediv,
+    ast.Pow: _power,
+}
 
 
 def _log(x: Value) -> Value:
@@ -111,7 +112,7 @@ def _larger(a: Value, b: Value) -> Value:
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # number of arguments, function
     "exp": (1, _exp),
     "log": (1, _log),
-    "sqrt": (1, lambda x: _combined(ast.Pow(), x, 0.5)),
+    "sqrt": (1, lambda x: _power(x, 0.5)),
     "sin": (1, _by(np.sin, np.cos)),
     "cos": (1, _by(np.cos, lambda x: -np.sin(x))),
     "tanh": (1, _by(np.tanh, lambda x: 1 - np.tanh(x) ** 2)),
@@ -305,11 +306,7 @@ class DeclaredOfCurves(DeclaredMechanism):
 
     def _change(self, values: Mapping[str, Floats], samples: Samples, force: Floats) -> Floats:
         """The expression at samples (points, curves, samples) where the contact force is `force` [N]."""
-        axes: dict[str, Value] = {
-            "displacement_mm": 1e3 * np.maximum(samples.travel, 0.0),
-            "force_n": np.maximum(force, 0.0),
-            "time_s": self._since_the_beginning(samples),
-        }
+        axes = {name: samples.along(name, force, self.start_times or {}) for name in self.axes_read}
         with np.errstate(all="ignore"):
             result = np.asarray(value_of(self.laws[0], {**values, **axes})) + np.zeros(
                 np.broadcast(samples.travel, force).shape
@@ -319,8 +316,3 @@ class DeclaredOfCurves(DeclaredMechanism):
             -_LARGEST_FACTOR,
             _LARGEST_FACTOR,
         )
-
-    def _since_the_beginning(self, samples: Samples) -> Floats:
-        start_times = self.start_times or {}
-        first = [start_times.get(name, float(times[0])) for name, times in zip(samples.ids, samples.time, strict=True)]
-        return np.asarray(samples.time - np.array(first)[:, None])

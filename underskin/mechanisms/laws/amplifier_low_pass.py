@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,7 +50,8 @@ class AmplifierLowPass(Mechanism):
     ) -> tuple[Parameter, ...]:
         """The corner, up to five times the highest line, and the order."""
         corner, order = self.parameters_stated
-        return corner.up_to(_BEYOND * _highest_hz(conditions)), order
+        highest = max(_BEYOND * _highest_hz(conditions), 2 * corner.low)
+        return replace(corner, high=min(corner.high, highest)), order
 
     def act(self, state: FrfState, values: Values) -> None:
         """The filter's transfer function."""

@@ -6,7 +6,7 @@ Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for wh
 1993, section 7.6). Memories have the pairs on a last axis of their own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,6 +63,16 @@ class Samples:
     ids: Sequence[str]
     travel: Floats
     time: Floats
+
+    def along(self, axis: str, force: Floats, origins: Mapping[str, float]) -> Floats:
+        """An axis of laws of curves: the depth beyond the contact point [mm], the contact force [N], or the time since
+        the origin of each recording, by its id, else its first sample [s]."""
+        if axis == "displacement_mm":
+            return np.asarray(1e3 * np.maximum(self.travel, 0.0))
+        if axis == "force_n":
+            return np.maximum(force, 0.0)
+        first = [origins.get(name, float(times[0])) for name, times in zip(self.ids, self.time, strict=True)]
+        return np.asarray(self.time - np.array(first)[:, None])
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,7 @@ class FrfModels:
                     )
                 mechanisms[key].add(number, indices)
             self._alike.setdefault(model.structure, []).append(number)
-        self._mechanisms = sorted(mechanisms.values(), key=_composition_order)
+        self._mechanisms = sorted(mechanisms.values(), key=lambda candidate: candidate.mechanism.rank)
         self._at_stage: dict[Stage, list[MechanismInModels]] = {}
         for candidate in self._mechanisms:
             if candidate.mechanism.moves_predictions:
@@ -342,12 +342,6 @@ def _response(level: Differentiated, inside: Mask, lines: Differentiated | None,
     if lines is not None:
         lines = Differentiated(lines.value, lines.slopes[:count])
     return Response(Differentiated(level.value, level.slopes[:count]), position_slopes, lines, inside)
-
-
-def _composition_order(candidate: MechanismInModels) -> tuple[int, int, str]:
-    """The sort key of the order of composition."""
-    mechanism = candidate.mechanism
-    return mechanism.stage.position, mechanism.order, mechanism.name
 
 
 def _split_by_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:

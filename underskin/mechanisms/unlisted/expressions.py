@@ -87,7 +87,8 @@ class CurveLaw(UnlistedLaw):
 
     def features(self, samples: Samples, force: Floats, values: Values) -> Sequence[Feature]:
         """The features at samples (points, curves, samples) where the contact force is `force` [N]."""
-        return self.shape.features(self._axis_values(samples, force), values)
+        origins = self._extent.turn_times if self.shape.variant == TURN else self._extent.start_times
+        return self.shape.features(samples.along(self.axis.name, force, origins), values)
 
     def _change(self, values: Values, samples: Samples, force: Floats) -> Floats:
         """What is added to the force or the travel, or the factor on the force."""
@@ -98,15 +99,6 @@ class CurveLaw(UnlistedLaw):
         ]
         total = np.asarray(reduce(add, parts))
         return total if self.description.acts_on in ("force", "position") else 1 + total
-
-    def _axis_values(self, samples: Samples, force: Floats) -> Floats:
-        """The axis at each sample."""
-        if self.axis.name == "displacement_mm":
-            return np.asarray(1e3 * np.maximum(samples.travel, 0.0))
-        if self.axis.name == "force_n":
-            return np.maximum(force, 0.0)
-        origin = self._extent.turn_times if self.shape.variant == TURN else self._extent.start_times
-        return np.asarray(samples.time - np.array([origin[name] for name in samples.ids])[:, None])
 
 
 def curve_laws(extent: Extent, *, timed: bool) -> list[tuple[CurveLaw, float]]:

@@ -22,7 +22,7 @@ from underskin.autodiff import Differentiated, exp, log
 from underskin.mechanisms.base import Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.mechanisms.unlisted.axes import BUILT_IN, Axis, axes_of, every_axis
+from underskin.mechanisms.unlisted.axes import Axis, axes_of, every_axis
 from underskin.mechanisms.unlisted.forms import Shape, constant, shapes
 from underskin.mechanisms.unlisted.laws import (
     LAG_KINDS,
@@ -34,7 +34,7 @@ from underskin.mechanisms.unlisted.laws import (
     UnlistedLaw,
     changes,
 )
-from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form
+from underskin.mechanisms.unlisted.vocabulary import AXES, ActsOn, Form
 from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Mask
@@ -292,15 +292,15 @@ class Grammar:
         laws: list[UnlistedLaw] = []
         shares: list[float] = []
         axes = axes_of(conditions) if len(conditions.recordings) >= _LEAST_RECORDINGS else []
-        columns = [axis for axis in axes if axis.name not in BUILT_IN]
+        columns = [axis for axis in axes if axis.name not in AXES]
         tables = LevelTables(conditions, table)
         lines = np.unique(frequency)
         for axis in axes:
-            share = 1.0 if axis.name in BUILT_IN else _COLUMNS / len(columns)
+            share = 1.0 if axis.name in AXES else _COLUMNS / len(columns)
             for law in [*_over_recordings(axis, lines, tables, listed), *_constants(axis, axes, tables, listed)]:
                 laws.append(law)
                 shares.append(share * _share(law))
-        total = sum(1.0 for axis in axes if axis.name in BUILT_IN) + (_COLUMNS if columns else 0.0)
+        total = sum(1.0 for axis in axes if axis.name in AXES) + (_COLUMNS if columns else 0.0)
         log_shares = np.log(np.array(shares) / max(total, 1.0)) if shares else np.zeros(0)
         over_frequency = frequency_laws(lines) if len(lines) >= _LEAST_LINES else []
         frequency_shares = [_FREQUENCY * _share(law) for law in over_frequency]
@@ -347,7 +347,7 @@ def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[s
     if axis.name == "sensor":
         return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in listed)
     if acts_on == "position":
-        return axis.name in _POSITION_AXES or axis.name not in BUILT_IN
+        return axis.name in _POSITION_AXES or axis.name not in AXES
     if acts_on == "force":  # a force that is scaled is a modulus that is
         return not shape.logarithmic and axis.name not in ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")
     return True
