@@ -99,6 +99,7 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"changes": {"relative_to": "upper_corner"}}, "parameters[upper_corner].relative_to", "another"),
         ({"changes": {"acts_on": "line_variance"}}, "parameters[upper_corner].acts_on", "mean"),
         ({"act": lambda *_: 1 / 0}, "law (frf) at the priors' centres", "ZeroDivisionError"),
+        ({"act": lambda *_: None}, "law (frf)", "must change the recordings"),
         ({"parameters": lambda *_: None}, "parameters", "tuple"),
     ],
 )

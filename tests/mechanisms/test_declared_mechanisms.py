@@ -224,7 +224,7 @@ def test_law_report_kept_read() -> None:
     mechanism = parse(text.encode(), "warm_up.yaml")
     names = {"change", "approach", "recorded_at"}
     law = read(mechanism.laws[0].text, "law", names)
-    value = law({"change": -0.2, "approach": 3.0, "recorded_at": np.array([8.0, 18.0])})
+    value = value_of(law, {"change": -0.2, "approach": 3.0, "recorded_at": np.array([8.0, 18.0])})
     assert np.asarray(value) == pytest.approx([1.0, 0.8])
 
 

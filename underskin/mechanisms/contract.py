@@ -162,12 +162,16 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     model = _result_of(field, lambda: _model(mechanism, campaign, kind))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
+    values = []
     for fit, label in points:
         with np.errstate(all="ignore"):
             answer = _result_of(f"{field} at {label}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
             raise not_finite(f"{field} at {label}", None, "gives numbers that are not finite")
+        values.append(answer.value)
+    same = count > 0 and mechanism.moves_predictions and all(np.array_equal(value, values[0]) for value in values)
+    _require(field, None, not same, "must change the recordings: act sets what is listed for its stage")
     if isinstance(model, FrfModel):
         _check_several_points(model, np.array([fit for fit, _ in points]), field)
 
