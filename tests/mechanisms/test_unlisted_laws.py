@@ -85,16 +85,16 @@ def test_grammar_holds_several_hundred_laws(grammar: Grammar) -> None:
 
 @pytest.mark.slow
 def test_amplitudes_of_0_are_the_base_model(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
-    base = predicted(FrfModel((), campaign, table, tuple(CATALOGUE.values())), ())
+    base = predicted(FrfModel((), campaign, table), ())
     for law in of_each_combination(grammar)[:: 1 if SOAK else 3]:
-        model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
+        model = FrfModel([law], campaign, table)
         assert predicted(model, coordinates(law, 0.0)) == pytest.approx(base, rel=1e-9), law.name
 
 
 @pytest.mark.slow
 def test_derivatives_are_those_of_differences(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
     for law in of_each_combination(grammar)[:: 1 if SOAK else 3]:
-        model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
+        model = FrfModel([law], campaign, table)
         fit = point(model, coordinates(law, 0.31))
         exact = model.predict(fit).slopes
         for place in range(len(law.parameters_stated)):
@@ -136,18 +136,18 @@ def test_law_base_model_skin_changes(acts_on: str, size: float, campaign: Campai
             thickness *= factor
         skin = replace(campaign.skin, youngs_modulus_mpa=modulus, thickness_mm=thickness)
         alone = Conditions("one", skin, (replace(entry, indenter_radius_mm=radius),))
-        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        expected = predicted(FrfModel((), alone, table), ())
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), (acts_on, number)
 
 
 def test_force_lost_smaller_preload(campaign: Campaign, table: SigmaTable, grammar: Grammar) -> None:
     """A force that is lost is a smaller preload."""
     lost = next(law for law in grammar.laws if combination(law) == ("force", "preload_n", "threshold"))
-    model = FrfModel([lost], campaign, table, tuple(CATALOGUE.values()))
+    model = FrfModel([lost], campaign, table)
     found = predicted(model, [0.2])
     for number, entry in enumerate(frf_of(campaign)):
         alone = Conditions("one", campaign.skin, (replace(entry, preload_n=entry.preload_n - 0.2),))
-        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        expected = predicted(FrfModel((), alone, table), ())
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), number
 
 
@@ -161,7 +161,7 @@ def test_place_wanders_press_elsewhere(campaign: Campaign, table: SigmaTable) ->
         assert entry.position_mm is not None
         there = entry.position_mm[0] + 0.8 * share, entry.position_mm[1] - 0.5 * share
         alone = Conditions("one", campaign.skin, (replace(entry, position_mm=there),))
-        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        expected = predicted(FrfModel((), alone, table), ())
         assert found[model.recording == number] == pytest.approx(expected, rel=3e-3), number
 
 
@@ -169,7 +169,7 @@ def test_part_campaign_order_range_whole(campaign: Campaign, table: SigmaTable) 
     """A part of a campaign has the order and the range of the whole."""
     law, model = one_law("gain", along(campaign, "previous_preload_n"), campaign, table)
     part = replace(campaign, recordings=campaign.recordings[3:9])
-    of_part = FrfModel([law], part, table, tuple(CATALOGUE.values()))
+    of_part = FrfModel([law], part, table)
     kept = (model.recording >= 3) & (model.recording < 9)
     assert predicted(of_part, [0.3]) == pytest.approx(predicted(model, [0.3])[kept])
 
