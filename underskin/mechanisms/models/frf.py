@@ -16,6 +16,7 @@ have it. The derivatives of a point are those by its own model's parameters, in 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -113,20 +114,24 @@ Part = tuple[Indices, Response]  # which points, and their response
 
 
 class FrfModels:
-    """Several models of the same conditions and skin."""
+    """Several models of the same conditions and skin.
+
+    Attributes: `at_stage`, the mechanisms of each stage that move predictions; `nuisances`, indices (models,) of d33
+    and of the factors on the declared values.
+    """
 
     def __init__(self, models: Sequence[FrfModel]) -> None:
         """Find which models have which mechanism, and which press the same contacts."""
         self._models = tuple(models)
         self._count = max(len(model.parameters) for model in models)
         self._log = np.zeros((len(models), self._count), dtype=bool)
-        self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].nuisance_indices}
+        self.nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].nuisance_indices}
         mechanisms: dict[Hashable, MechanismInModels] = {}
         self._alike: dict[Hashable, list[int]] = {}
         for number, model in enumerate(models):
             self._log[number, : len(model.parameters)] = [parameter.scale == "log" for parameter in model.parameters]
             for name, index in model.nuisance_indices.items():
-                self._nuisances[name][number] = index
+                self.nuisances[name][number] = index
             for mechanism in model.mechanisms:
                 indices = model.parameter_indices(mechanism)
                 key = mechanism.name, tuple(indices)
@@ -136,11 +141,10 @@ class FrfModels:
                     )
                 mechanisms[key].add(number, indices)
             self._alike.setdefault(model.structure, []).append(number)
-        self._mechanisms = sorted(mechanisms.values(), key=lambda candidate: candidate.mechanism.rank)
-        self._at_stage: dict[Stage, list[MechanismInModels]] = {}
-        for candidate in self._mechanisms:
+        self.at_stage: dict[Stage, list[MechanismInModels]] = {}
+        for candidate in sorted(mechanisms.values(), key=lambda candidate: candidate.mechanism.rank):
             if candidate.mechanism.moves_predictions:
-                self._at_stage.setdefault(candidate.mechanism.stage, []).append(candidate)
+                self.at_stage.setdefault(candidate.mechanism.stage, []).append(candidate)
 
     def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
         """The responses at points (points, parameters) of these models, in rising order of `owner`, in parts of some
@@ -157,16 +161,15 @@ class FrfModels:
             if present:
                 rows = {number: np.arange(edges[number], edges[number + 1]) for number in present}
                 for points, contacts in self._pressed(rows, seeds):
-                    level, inside = self._level_and_inside(self._models[present[0]], points, contacts, seeds)
-                    of_lines = self._line_factor(self._models[present[0]], points, contacts, seeds) if lines else None
-                    parts.append((points, _response(level, inside, of_lines, seeds)))
+                    pressed = _Pressed(self, self._models[present[0]], points, contacts, seeds)
+                    parts.append((points, pressed.response(lines=lines)))
         return parts
 
     def _pressed(self, rows: dict[int, Indices], seeds: ParameterBatch) -> list[tuple[Indices, Contacts]]:
         """The contacts of these models' points, declared values changed by the mechanisms, grouped by structure."""
         sets: dict[tuple[MechanismInModels, ...], list[int]] = {}
         for number in rows:
-            at_contact = (candidate for stage in _CONTACT for candidate in self._at_stage.get(stage, ()))
+            at_contact = (candidate for stage in _CONTACT for candidate in self.at_stage.get(stage, ()))
             key = tuple(candidate for candidate in at_contact if candidate.has[number])
             sets.setdefault(key, []).append(number)
         groups: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
@@ -189,7 +192,7 @@ class FrfModels:
     def _contacts(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Contacts:
         """The declared contacts at all force nodes, one node after another."""
         nodes, design = len(model.force), model.design
-        factors = {name: seeds.of(points, indices) for name, indices in self._nuisances.items() if name != "d33"}
+        factors = {name: seeds.of(points, indices) for name, indices in self.nuisances.items() if name != "d33"}
         return Contacts(
             force=model.force.ravel(),
             indenter_radius=np.tile(design.indenter_radius, nodes),
@@ -199,53 +202,61 @@ class FrfModels:
             poisson_ratio=constant(model.poisson_ratio, seeds.variables, (len(points),)),
         )
 
-    def _acted(
-        self,
-        stage: Stage,
-        model: FrfModel,
-        points: Indices,
-        contacts: Contacts,
-        seeds: ParameterBatch,
-        sigma: Differentiated | None = None,
-    ) -> Iterator[tuple[FrfState, Indices | None]]:
+
+@dataclass(frozen=True)
+class _Pressed:
+    """Contacts of one structure at some of the points; `model` is one of those that press them."""
+
+    models: FrfModels
+    model: FrfModel
+    points: Indices
+    contacts: Contacts
+    seeds: ParameterBatch
+
+    def response(self, *, lines: bool) -> Response:
+        """The response, with the derivatives by the contact's position separate from the others; without `lines` no
+        line factors."""
+        sigma, inside = self._sigma()
+        level = self._level(sigma).spread(len(self.model.design.point))
+        factor = self._line_factor() if lines else None
+        seeds, position_slopes = self.seeds, None
+        count = seeds.variables - len(seeds.position)
+        if seeds.position:
+            position_slopes = level.slopes[count:]
+        if factor is not None:
+            factor = Differentiated(factor.value, factor.slopes[:count])
+        inside = np.broadcast_to(inside, (len(self.points), inside.shape[-1]))[:, self.model.design.point]
+        return Response(Differentiated(level.value, level.slopes[:count]), position_slopes, factor, inside)
+
+    def _acted(self, stage: Stage, sigma: Differentiated | None = None) -> Iterator[tuple[FrfState, Indices | None]]:
         """What each mechanism of this stage made of the state, with the indices of the points whose models have it
         (None: all)."""
-        owner = seeds.owner[points]
-        for candidate in self._at_stage.get(stage, ()):
+        owner = self.seeds.owner[self.points]
+        for candidate in self.models.at_stage.get(stage, ()):
             subset: Indices | None = np.flatnonzero(candidate.has[owner])
             if not len(subset):
                 continue
-            subset = None if len(subset) == len(points) else subset
-            values = candidate.values(points if subset is None else points[subset], seeds)
-            state = FrfState(model.design, contacts.at_points(subset))
+            subset = None if len(subset) == len(owner) else subset
+            values = candidate.values(self.points if subset is None else self.points[subset], self.seeds)
+            state = FrfState(self.model.design, self.contacts.at_points(subset))
             state.sigma = None if sigma is None else sigma.at_points(subset)
             candidate.mechanism.act(state, values)
             yield state, subset
 
-    def _level_and_inside(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
-    ) -> tuple[Differentiated, Mask]:
-        """The FRF before the dynamics [C/N], and which recordings are inside the table, at points of one contact
-        structure; `model` is one of their models."""
-        sigma, inside = self._sigma_at_points(model, points, contacts, seeds)
-        level = self._level(model, points, contacts, sigma, seeds).spread(len(model.design.point))
-        return level, np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, model.design.point]
-
-    def _sigma_at_points(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
-    ) -> tuple[list[Differentiated], Mask]:
+    def _sigma(self) -> tuple[list[Differentiated], Mask]:
         """σ at each position for each force node, and which positions are inside the table at all of them.
 
         Inside includes that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
         """
+        model, contacts = self.model, self.contacts
         design, table = model.design, model.sigma
         if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
-            of_contacts = self._of_pressed(model, contacts)
+            of_contacts = self._of_pressed()
         else:
             of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
         nodes, positions = len(model.force), len(design.point_contact)
         contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
-        offset = self._offset(model, points, contacts, seeds) / contacts.thickness
+        offset = self._offset() / contacts.thickness
         repeated = np.tile(np.arange(positions), nodes)
         sigma = of_contacts.at(contact, offset.spread(positions)[repeated] if nodes > 1 else offset)
         near = (offset.value <= table.end) & (offset.value + of_contacts.rho.value <= PROFILE_END)
@@ -255,10 +266,10 @@ class FrfModels:
             sigma
         ], inside
 
-    def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
+    def _of_pressed(self) -> SigmaOfContacts:
         """σ of contacts other than the table's, or whose stiffness is needed."""
-        table = model.sigma
-        layer = None
+        model, contacts = self.model, self.contacts
+        table, layer = model.sigma, None
         if contacts.layered or model.needs_stiffness:
             layer = layer_curves(table.contact_grid, layer_of(contacts))
         pressed = press(contacts, layer if contacts.layered else None)
@@ -266,14 +277,14 @@ class FrfModels:
             contacts.stiffness = stiffness(contacts, pressed, layer)
         return SigmaOfContacts(table, contacts, model.sensor_radius, pressed, layer if contacts.layered else None)
 
-    def _offset(self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch) -> Differentiated:
+    def _offset(self) -> Differentiated:
         """The distance of each contact from its sensor's centre [m], with derivatives by position where it varies."""
-        design = model.design
-        moved = [(subset, state.shift) for state, subset in self._acted(Stage.POSITION, model, points, contacts, seeds)]
+        design, seeds, count = self.model.design, self.seeds, len(self.points)
+        moved = [(subset, state.shift) for state, subset in self._acted(Stage.POSITION)]
         if not (seeds.position or moved):
-            distance = np.tile(np.hypot(design.point_x, design.point_y), (len(points), 1))
+            distance = np.tile(np.hypot(design.point_x, design.point_y), (count, 1))
             return Differentiated(distance, np.zeros((seeds.variables, *distance.shape)))
-        still = constant(0.0, seeds.variables, (len(points),))
+        still = constant(0.0, seeds.variables, (count,))
         x, y = (
             coordinate + shift
             for coordinate, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
@@ -281,67 +292,53 @@ class FrfModels:
         for subset, shift in moved:
             if shift is not None:
                 x, y = (
-                    coordinate.plus(displacement, subset, len(points))
+                    coordinate.plus(displacement, subset, count)
                     for coordinate, displacement in zip((x, y), shift, strict=True)
                 )
         distance = np.hypot(x.value, y.value)
         away = np.where(distance > 0, distance, 1.0)
         return chain(distance, (x.value / away, x), (y.value / away, y))
 
-    def _level(
-        self, model: FrfModel, points: Indices, contacts: Contacts, sigma: list[Differentiated], seeds: ParameterBatch
-    ) -> Differentiated:
+    def _level(self, sigma: list[Differentiated]) -> Differentiated:
         """The FRF of each recording before the dynamics [C/N]."""
-        design, count = model.design, len(points)
+        model, design, count = self.model, self.model.design, len(self.points)
         oscillating = sigma[0]
-        for state, subset in self._acted(Stage.LOAD_INCREMENT, model, points, contacts, seeds):
+        for state, subset in self._acted(Stage.LOAD_INCREMENT):
             assert state.factor is not None
             first_harmonic = sigma[1] * model.weights[0][design.point_contact]
             for node, weight in zip(sigma[2:], model.weights[1:], strict=True):
                 first_harmonic = first_harmonic + node * weight[design.point_contact]
             oscillating = oscillating.plus(state.factor * (first_harmonic - sigma[0]).at_points(subset), subset, count)
-        rho = model.sensor_radius / contacts.thickness
-        charge = oscillating * (1.5e-12 * seeds.of(points, self._nuisances["d33"]) * rho * rho)
-        for state, subset in self._acted(Stage.SENSOR, model, points, contacts, seeds, sigma[0]):
+        rho = model.sensor_radius / self.contacts.thickness
+        charge = oscillating * (1.5e-12 * self.seeds.of(self.points, self.models.nuisances["d33"]) * rho * rho)
+        for state, subset in self._acted(Stage.SENSOR, sigma[0]):
             charge = charge.times(state.factor, subset, count)
         level = charge[design.point]
-        for state, subset in self._acted(Stage.NEIGHBOURS, model, points, contacts, seeds):
+        for state, subset in self._acted(Stage.NEIGHBOURS):
             if state.factor is not None:
                 neighbours = charge.at_points(subset)[design.neighbour_point]
                 theirs = state.factor * sum_rows(neighbours, design.neighbour_recording, len(design.point))
                 level = level.plus(theirs, subset, count)
-        for state, subset in self._acted(Stage.RECORDING, model, points, contacts, seeds):
+        for state, subset in self._acted(Stage.RECORDING):
             level = level.times(state.factor, subset, count)
         return level
 
-    def _line_factor(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
-    ) -> Differentiated | None:
+    def _line_factor(self) -> Differentiated | None:
         """The complex factor of each distinct line; None without any such mechanism."""
         product: Differentiated | None = None
-        count, lines = len(points), len(model.design.line_frequency)
-        for state, subset in self._acted(Stage.LINES, model, points, contacts, seeds):
+        count, lines = len(self.points), len(self.model.design.line_frequency)
+        for state, subset in self._acted(Stage.LINES):
             factor = state.factor
             if product is None and subset is None:
                 product = factor
             elif factor is not None:
                 base = (
-                    constant(np.ones(1, dtype=complex), seeds.variables, (count,)).spread(lines)
+                    constant(np.ones(1, dtype=complex), self.seeds.variables, (count,)).spread(lines)
                     if product is None
                     else product
                 )
                 product = base.times(factor, subset, count)
         return product
-
-
-def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: ParameterBatch) -> Response:
-    """The response, with the derivatives by the contact's position separate from the others."""
-    count, position_slopes = seeds.variables - len(seeds.position), None
-    if seeds.position:
-        position_slopes = level.slopes[count:]
-    if lines is not None:
-        lines = Differentiated(lines.value, lines.slopes[:count])
-    return Response(Differentiated(level.value, level.slopes[:count]), position_slopes, lines, inside)
 
 
 def _split_by_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
