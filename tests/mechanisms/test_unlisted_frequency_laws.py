@@ -71,8 +71,8 @@ def test_kept_law_over_frequency_law() -> None:
         kept = parse(document(report, "kept").encode(), "kept.yaml")
         short = {name.removeprefix("law_"): value for name, value in values.items()}
         exact = law.factor(frequency, {name: differentiated(value) for name, value in values.items()}).value[0]
-        found = value_of(kept.laws[0], {**short, "frequency_hz": frequency})
-        assert found == pytest.approx(exact, abs=2e-3), law.name
+        factor = value_of(kept.laws[0], {**short, "frequency_hz": frequency})
+        assert factor == pytest.approx(exact, abs=2e-3), law.name
 
 
 def differentiated(value: float) -> Differentiated:

@@ -9,6 +9,7 @@ import pytest
 from bench.soak import SOAK
 from underskin.mechanisms import CATALOGUE
 from underskin.mechanisms.declared.document import parse
+from underskin.mechanisms.declared.mechanism import value_of
 from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
@@ -191,7 +192,7 @@ def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
         exact = change_along(law, values, x).reshape(len(x), -1)
         axes = {law.axis.name: x, **({"preload_n": np.ones(len(x))} if law.axis.relative else {})}
         for place, expected in zip(kept.laws, exact.T, strict=True):
-            told = np.broadcast_to(np.asarray(place({**short, **axes})), x.shape)
+            told = np.broadcast_to(np.asarray(value_of(place, {**short, **axes})), x.shape)
             change = told if law.description.acts_on in ("force", "position") else told - 1
             assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
 

@@ -8,6 +8,7 @@ force or time of each sample.
 """
 
 import ast
+from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -169,6 +170,10 @@ class DeclaredMechanism(Mechanism):
         self.needs = f"{' and '.join(axes)} {self.needs_axes}"
         self.acts_on, self.laws, self.axes_read = acts_on, laws, axes
         self.parameters_stated = parameters
+
+    @abstractmethod
+    def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredMechanism":
+        """A copy bound to the recordings of a campaign."""
 
     @property
     def axes(self) -> tuple[str, ...]:  # type: ignore[override]

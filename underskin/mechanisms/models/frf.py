@@ -233,10 +233,10 @@ class _Pressed:
         (None: all)."""
         owner = self.seeds.owner[self.points]
         for candidate in self.models.at_stage.get(stage, ()):
-            subset: Indices | None = np.flatnonzero(candidate.has[owner])
-            if not len(subset):
+            having = np.flatnonzero(candidate.has[owner])
+            if not len(having):
                 continue
-            subset = None if len(subset) == len(owner) else subset
+            subset = None if len(having) == len(owner) else having
             values = candidate.values(self.points if subset is None else self.points[subset], self.seeds)
             state = FrfState(self.model.design, self.contacts.at_points(subset))
             state.sigma = None if sigma is None else sigma.at_points(subset)
