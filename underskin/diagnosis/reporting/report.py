@@ -338,11 +338,11 @@ _MEANINGS = {
 
 def _meanings(mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
     """The joint meaning of each mechanism's parameters, where a single value does not show it."""
-    values = {
-        mechanism["name"]: {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+    meanings = [
+        _MEANINGS[mechanism["name"]]({parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]})
         for mechanism in mechanisms
-    }
-    meanings = [_MEANINGS[name](parameters) for name, parameters in values.items() if name in _MEANINGS]
+        if mechanism["name"] in _MEANINGS
+    ]
     return [meaning for meaning in meanings if meaning]
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, log
+from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.dataset import Lines, curve_lines
 from underskin.diagnosis.inference.evidence import parts
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
@@ -28,6 +28,7 @@ from underskin.mechanisms.laws import platen_friction, strain_stiffening
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.thickness_error import ThicknessError
 from underskin.mechanisms.models.composed import Model
+from underskin.mechanisms.models.composition import fit_coordinates
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter
@@ -38,7 +39,7 @@ from underskin.units import Floats, to_si
 
 (UNKNOWN_THICKNESS,) = ThicknessError.parameters_stated
 THICKNESS_ERROR = ThicknessError.name
-PLATEN_FRICTION = platen_friction.PlatenFriction.name
+PLATEN_FRICTION, STRAIN_STIFFENING = platen_friction.PlatenFriction.name, strain_stiffening.StrainStiffening.name
 THICKNESS = (LayeredContact.name, UNKNOWN_THICKNESS.name)
 
 
@@ -115,9 +116,8 @@ class OtherKind:
         """Curves with the modulus free (`free_modulus_problem`), and the explanations that a search found for them."""
         self.kind, self.problem = kind, problem
         self._explanations = {frozenset(explanation.names): explanation for explanation in explanations}
-        mechanisms, conditions = problem.lines.mechanisms, problem.lines.campaign
-        self.supported = tuple(name for name in mechanisms.named if self._supports(name))
-        self._may_hide = may_hide(conditions, self.supported)
+        self.supported = tuple(name for name in problem.lines.mechanisms.named if self._supports(name))
+        self._may_hide = may_hide(problem.lines.campaign, self.supported)
         self.posteriors: dict[frozenset[str], CurvePosterior] = {}
 
     def _supports(self, name: str) -> bool:
@@ -143,7 +143,7 @@ class OtherKind:
         self, posterior: CurvePosterior, names: frozenset[str], shared: Sequence[str]
     ) -> CurvePosterior:
         """Widened where a law extrapolates the modulus to no strain, by a part of how much the law reduces it."""
-        plain = [name for name in names if name != strain_stiffening.StrainStiffening.name]
+        plain = [name for name in names if name != STRAIN_STIFFENING]
         if len(plain) == len(names):
             return posterior
         reduction = float(posterior.mean[0] - self.posterior(plain, shared).mean[0])  # hidden mechanisms cancel
@@ -267,19 +267,14 @@ def _quantities(
             )
             for index, parameter in zip(range(span.start, span.stop), parameters[span], strict=True)
         }
-        for key, quantity in _shared_parameters(lines.mechanisms[name], lines.kind, seeds).items():
+        shared_values = fit_coordinates(lines.mechanisms[name].parameters_stated, seeds)
+        if name == STRAIN_STIFFENING:
+            shared_values = strain_stiffening.shared_parameters(lines.kind, seeds)
+        for key, quantity in shared_values.items():
             quantities.append((name, key))
             values.append(float(quantity.value[0]))
             rows.append(quantity.slopes[:, 0])
     return tuple(quantities), np.array(values), np.array(rows)
-
-
-def _shared_parameters(mechanism: Mechanism, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
-    """Fit coordinates for recordings of another kind, by parameter name, that follow from the values for this kind."""
-    if mechanism.name == strain_stiffening.StrainStiffening.name:
-        return strain_stiffening.shared_parameters(kind, values)
-    logarithmic = {parameter.name for parameter in mechanism.parameters_stated if parameter.scale == "log"}
-    return {name: log(value) if name in logarithmic else value for name, value in values.items()}
 
 
 def _unit_slope(parameter: Parameter, fit: Floats, index: int, count: int) -> Floats:

@@ -408,9 +408,6 @@ def _sets(answers: Sequence[Answer]) -> list[tuple[str, ...]]:
 _SEATING_SHARE = 0.1  # of each curve's displacement
 
 
-_STIFFENING = StrainStiffening.name  # a platen that seats bends the beginning of a compression alike
-
-
 def without_seating(
     campaign: Campaign, names: Sequence[str], table: SigmaTable
 ) -> tuple[FittingProblem, Finding] | None:
@@ -419,7 +416,7 @@ def without_seating(
     None where they do, and where `names` has no stiffening, or a law that needs a curve's whole history, such as
     relaxation, which cannot be fitted to the shortened curves.
     """
-    if _STIFFENING not in names or ContactCreep.name in names:
+    if StrainStiffening.name not in names or ContactCreep.name in names:
         return None
     if not all(_is_pressed(recording) for recording in campaign.recordings):
         return None
@@ -428,12 +425,12 @@ def without_seating(
         return None
     problem = FittingProblem(rows, table)
     (stiffening_fit,) = problem.explain([Request(tuple(names))])
-    (plain_fit,) = problem.explain([Request(tuple(name for name in names if name != _STIFFENING))])
+    (plain_fit,) = problem.explain([Request(tuple(name for name in names if name != StrainStiffening.name))])
     assert stiffening_fit is not None
     assert plain_fit is not None
     if stiffening_fit.log_evidence - plain_fit.log_evidence > SHOWS:
         return None
-    arguments = {"percent": 100 * _SEATING_SHARE, "mechanisms": _STIFFENING}
+    arguments = {"percent": 100 * _SEATING_SHARE, "mechanisms": StrainStiffening.name}
     return problem, Finding(Reason.SEATING, "", "displacement_mm", arguments)
 
 

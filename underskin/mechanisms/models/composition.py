@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.autodiff import Differentiated
+from underskin.autodiff import Differentiated, log
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, required
 from underskin.mechanisms.base import Kind, Mechanism, Unsupported, Values
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
@@ -161,6 +161,12 @@ def parameters_together(
 ) -> dict[str, tuple[Parameter, ...]]:
     """The parameters of each mechanism by its name, in a model with all of these mechanisms."""
     return {mechanism.name: mechanism.parameters(conditions, kind, mechanisms) for mechanism in mechanisms}
+
+
+def fit_coordinates(parameters: Sequence[Parameter], values: Values) -> Values:
+    """Values of parameters as fit coordinates, by their names; those of other parameters as they are."""
+    logarithmic = {parameter.name for parameter in parameters if parameter.scale == "log"}
+    return {name: log(value) if name in logarithmic else value for name, value in values.items()}
 
 
 def kind_of(conditions: Conditions) -> Kind:
