@@ -152,7 +152,8 @@ def _shown(
         jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
     snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
     shown = _thinned(
-        path_fractions(sample_mm, measured, landmarks.noise), [landmarks.turn, *(at for at in jumps if at is not None)]
+        path_fractions(sample_mm, measured, landmarks, "indentation" if raw.kind == "indentation" else "compression"),
+        [landmarks.turn, *(at for at in jumps if at is not None)],
     )
     return ShownCurve(
         name=raw.id,

@@ -6,10 +6,10 @@ import numpy as np
 
 from underskin.autodiff import constant
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts, FrfState, layer_curves, press, stiffness
+from underskin.mechanisms.models.contact_state import Contacts, FrfState, press, stiffness
 from underskin.mechanisms.models.frf_design import frf_design
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
-from underskin.physics.contact_curves import CurveGrid
+from underskin.physics.contact_curves import curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.recordings.campaign import Conditions, FrfRecording
 from underskin.recordings.frf.estimation import lines_of, resonance
@@ -81,7 +81,7 @@ def _resonance_guesses(conditions: Conditions) -> list[tuple[float, float]]:
         thickness=constant(thickness, 0, (1,)),
         poisson_ratio=constant(skin.poisson_ratio, 0, (1,)),
     )
-    curves = layer_curves(CurveGrid(np.zeros(1)), Layer(skin.poisson_ratio))
+    curves = curves_of(Layer(skin.poisson_ratio))
     spring = stiffness(contacts, press(contacts, None), curves).value[0]
     contact_of = design.point_contact[design.point]
     masses = [1e3 * spring[contact_of[index]] / (2 * np.pi * peak.frequency) ** 2 for index, peak in resonances]

@@ -47,6 +47,7 @@ class CurveModel(ABC):
 
     sensor: Indices | None = None
     pickup: Pickup | None = None
+    hidden_jumps = False  # whether contact may begin or end with a jump that no curve shows
 
     def __init__(
         self,

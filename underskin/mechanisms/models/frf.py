@@ -250,10 +250,7 @@ class _Pressed:
         """
         model, contacts = self.model, self.contacts
         design, table = model.design, model.sigma
-        if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
-            of_contacts = self._of_pressed()
-        else:
-            of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
+        of_contacts = self._of_pressed()
         nodes, positions = len(model.force), len(design.point_contact)
         contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
         offset = self._offset() / contacts.thickness
@@ -267,7 +264,7 @@ class _Pressed:
         ], inside
 
     def _of_pressed(self) -> SigmaOfContacts:
-        """σ of contacts other than the table's, or whose stiffness is needed."""
+        """σ of the contacts under their forces, which sets their stiffness where it is needed."""
         model, contacts = self.model, self.contacts
         table, layer = model.sigma, None
         if contacts.layered or model.needs_stiffness:
@@ -455,7 +452,7 @@ class FrfModel:
         """The approximate size of a response's largest arrays with derivatives by `variables`: limits the points
         computed at once."""
         contacts, lines = len(self.force.ravel()), len(self.design.line_frequency)
-        return _QUANTITIES * contacts * self.sigma.wavenumbers + 2 * (1 + variables) * lines
+        return _QUANTITIES * contacts * len(self.sigma.wave_numbers[0]) + 2 * (1 + variables) * lines
 
     @property
     def structure(self) -> Hashable:
