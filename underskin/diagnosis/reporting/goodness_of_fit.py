@@ -140,8 +140,7 @@ def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]
 
     The interval allows for mechanisms that an apparent modulus may hide.
     """
-    mechanisms = problem.lines.mechanisms
-    hiding = may_hide(mechanisms, problem.lines.campaign, mechanisms.named)
+    hiding = may_hide(problem.lines.campaign, problem.lines.mechanisms.named)
     return with_hidden(_apparent_modulus(problem, explanation), hidden_factors(hiding, explanation.names))
 
 

@@ -47,6 +47,7 @@ from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.findings.lacking import Lacking
+from underskin.mechanisms.laws import contact_creep, strain_stiffening
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Campaign, IndentationRecording
@@ -241,7 +242,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             idle=_idle(diagnosis, named) if named is not None else (),
             at_bounds=[bound.words for bound in at_bounds(named)] if named is not None else (),
             mechanisms=mechanisms,
-            meanings=_meanings(problem, mechanisms) if named is not None else (),
+            meanings=_meanings(mechanisms) if named is not None else (),
         )
         # The shape of the residual is not stated where a mechanism that may explain it was not tried
         shape = "" if untried else statements.shape_clause(diagnosis.shape)
@@ -329,15 +330,20 @@ def _mechanisms_of_curves(diagnosis: DiagnosisResult, leader: Answer) -> list[di
     return [{**mechanism, "probability": round(present.get(mechanism["name"], 0.0), 3)} for mechanism in mechanisms]
 
 
-def _meanings(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
+_MEANINGS = {
+    contact_creep.ContactCreep.name: contact_creep.meaning,
+    strain_stiffening.StrainStiffening.name: strain_stiffening.meaning,
+}
+
+
+def _meanings(mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
     """The joint meaning of each mechanism's parameters, where a single value does not show it."""
-    values = {
-        mechanism["name"]: {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+    meanings = [
+        _MEANINGS[mechanism["name"]]({parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]})
         for mechanism in mechanisms
-    }
-    return [
-        meaning for name, parameters in values.items() if (meaning := problem.lines.mechanisms[name].told(parameters))
+        if mechanism["name"] in _MEANINGS
     ]
+    return [meaning for meaning in meanings if meaning]
 
 
 def _alternatives(search: Search) -> list[dict[str, Any]]:

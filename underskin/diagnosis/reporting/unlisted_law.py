@@ -57,7 +57,7 @@ class LeadingLaw:
             return None
         values = {
             parameter.name: parameter.from_fit(at)
-            for parameter, at in zip(law.parameters_bound, explanation.coordinates(law.name), strict=True)
+            for parameter, at in zip(law.parameters_stated, explanation.coordinates(law.name), strict=True)
         }
         return cls(law, values, explanation)
 
@@ -131,7 +131,7 @@ class LeadingLaw:
         covariance = self.explanation.best.covariance[np.ix_(rows, rows)]
         here = self.change(x, self.values)
         slopes = []
-        for parameter in self.law.parameters_bound:
+        for parameter in self.law.parameters_stated:
             moved = {
                 **self.values,
                 parameter.name: parameter.from_fit(parameter.to_fit(self.values[parameter.name]) + _STEP),
@@ -230,7 +230,7 @@ def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
     """The fitted parameters with readable names; of a sine the amplitude, start and period."""
     law, explanation = leading.law, leading.explanation
     first = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[law.name].start
-    stated = [parameter_with_interval(explanation, first + index) for index in range(len(law.parameters_bound))]
+    stated = [parameter_with_interval(explanation, first + index) for index in range(len(law.parameters_stated))]
     if isinstance(law, RecordingLaw | LagLaw | CurveLaw):
         if law.shape.form == "periodic" and len(law.amplitudes) == law.shape.count:
             stated = [*_wave(leading, law), *stated[2:]]
@@ -251,7 +251,7 @@ def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[di
     }
     turn = half_width / max(size, 1e-12) * leading.values["law_period"] / (2 * np.pi)
     start_interval = {"value": rounded(start), "low": rounded(start - turn), "high": rounded(start + turn)}
-    unit = law.parameters_bound[0].unit
+    unit = law.parameters_stated[0].unit
     return [
         {"name": "amplitude", "unit": unit, **amplitude_interval},
         {"name": "start", "unit": law.axis.unit, **start_interval},
@@ -364,7 +364,7 @@ def _log_factor(leading: LeadingLaw, law: RecordingLaw, base: int, at: float) ->
     design = leading.explanation.best.hypothesis.frf_model.design
     moved = law.on(replace(law.axis, values=dict.fromkeys(design.ids, at), range=leading.ends), law.tables)
     seeds = {name: Differentiated(np.array([[value]]), np.zeros((0, 1, 1))) for name, value in leading.values.items()}
-    factor: Floats = np.broadcast_to(moved.on_recordings(design, seeds).value, (1, len(design.ids)))
+    factor: Floats = np.broadcast_to(moved.factor(design.ids, seeds).value, (1, len(design.ids)))
     return float(np.log(max(float(factor[0, base]), 1e-12)))
 
 

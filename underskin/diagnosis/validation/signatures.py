@@ -36,10 +36,11 @@ from underskin.diagnosis.selection.priors import SHOWS, least_evidence, log_prio
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind, Stage, Unsupported
+from underskin.mechanisms.laws.contact_creep import ContactCreep
+from underskin.mechanisms.laws.strain_stiffening import StrainStiffening
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording, samples_of
 from underskin.recordings.usual_scatter import USUAL_GAIN
 from underskin.surrogate.sigma_table import SigmaTable
@@ -391,8 +392,7 @@ def without_seating(
     None where they do, and where `names` has no stiffening, or a law that needs a curve's whole history, such as
     relaxation, which cannot be fitted to the shortened curves.
     """
-    imitated = [name for name in names if name in CATALOGUE and CATALOGUE[name].imitated_by_seating]
-    if not imitated or any(CATALOGUE[name].needs_history for name in names):
+    if StrainStiffening.name not in names or ContactCreep.name in names:
         return None
     if not all(_is_pressed(recording) for recording in campaign.recordings):
         return None
@@ -401,12 +401,12 @@ def without_seating(
         return None
     problem = FittingProblem(rows, table)
     (stiffening_fit,) = problem.explain([Request(tuple(names))])
-    (plain_fit,) = problem.explain([Request(tuple(name for name in names if name not in imitated))])
+    (plain_fit,) = problem.explain([Request(tuple(name for name in names if name != StrainStiffening.name))])
     assert stiffening_fit is not None
     assert plain_fit is not None
     if stiffening_fit.log_evidence - plain_fit.log_evidence > SHOWS:
         return None
-    arguments = {"percent": 100 * _SEATING_SHARE, "mechanisms": " and ".join(imitated)}
+    arguments = {"percent": 100 * _SEATING_SHARE, "mechanisms": StrainStiffening.name}
     return problem, Finding(Reason.SEATING, "", "displacement_mm", arguments)
 
 

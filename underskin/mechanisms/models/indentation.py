@@ -51,6 +51,7 @@ from scipy.interpolate import CubicSpline
 from underskin.autodiff import constant, contiguous
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Values
+from underskin.mechanisms.laws.adhesion import Adhesion as AdhesionLaw
 from underskin.mechanisms.models.composition import (
     STRAIN_SHARE,
     contact_point,
@@ -58,9 +59,8 @@ from underskin.mechanisms.models.composition import (
     required_modulus,
     thickness_parameter,
 )
-from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
+from underskin.mechanisms.models.curve_state import Curve, Relaxation, Samples, memories, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
-from underskin.mechanisms.models.relaxation import Relaxation, memories
 from underskin.mechanisms.models.sphere_kernels import (
     contact_rows,
     creep_edge_rows,
@@ -435,7 +435,7 @@ class IndentationModel(CurveModel):
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
         recordings = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
-        sticks = any(mechanism.moves_contact_points for mechanism in mechanisms)
+        sticks = any(mechanism.name == AdhesionLaw.name for mechanism in mechanisms)
         nuisances = _nuisances(recordings, conditions.skin, sticks)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
         self._ids = [recording.id for recording in recordings]
@@ -466,7 +466,7 @@ class IndentationModel(CurveModel):
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
         )
         for mechanism in self._mechanisms:
-            mechanism.on_curve(curve, values[mechanism.name])
+            mechanism.act(curve, values[mechanism.name])
         return curve
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
