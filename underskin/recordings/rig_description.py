@@ -428,7 +428,7 @@ def spring_constant(value: float | Property, stated: Stated, file: str) -> float
 
 def _number(given: str | float) -> float | None:
     """A number as written, with a decimal point or comma; None where a comma may separate thousands."""
-    return text.number(given, text.decimal_mark(lambda _: [[given]], "\t")) if isinstance(given, str) else given
+    return text.number(given, text.decimal_mark([[given]], "\t")) if isinstance(given, str) else given
 
 
 def _property_value(value: Property, stated: Stated, file: str) -> str | float:

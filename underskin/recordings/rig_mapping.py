@@ -30,6 +30,13 @@ from underskin.recordings.readers.unit_labels import (
     ratio_of,
     unit,
 )
+from underskin.recordings.regular_samples import (
+    complete_lines,
+    evenly_sampled,
+    longest_complete,
+    mean_step,
+    sorted_spectrum,
+)
 from underskin.recordings.rig_description import (
     AUTOMATIC,
     BLOCK_NAME,
@@ -63,23 +70,6 @@ def range_of(field: str, column: Floats) -> str:
     """The range of the finite values of a column with at least one."""
     finite = column[np.isfinite(column)]
     return readable(field, float(finite.min()), float(finite.max()))
-
-
-_JITTER = 0.01  # of a sample: more is not evenly sampled
-
-
-def mean_step(time: Floats) -> float:
-    """The mean step between samples, in the unit of `time`."""
-    with np.errstate(all="ignore"):
-        return float((time[-1] - time[0]) / max(len(time) - 1, 1))
-
-
-def even_rate(time: Floats) -> float | None:
-    """Samples per unit of `time`; None where it is not evenly spaced and rising."""
-    step = mean_step(time)
-    with np.errstate(all="ignore"):
-        jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
-    return 1 / step if step > 0 and jitter <= _JITTER * step else None
 
 
 _LEAST_TARED = 16  # samples needed for a level and its noise
@@ -143,6 +133,7 @@ class MappedBlock:
             only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
             raise self._error("", only)
         columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
+        columns = self._complete(columns)
         columns = {field: self._tared(field, column) for field, column in columns.items()}
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
@@ -153,6 +144,16 @@ class MappedBlock:
         if rate is not None and "time_s" not in columns:
             columns["time_s"] = np.arange(len(columns[next(iter(columns))])) / rate
         return columns
+
+    def _complete(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        """The columns without lines, or parts of a time series, that hold no number."""
+        is_series = self.rig.kind == "frf" and "frequency_hz" not in columns
+        try:
+            complete, note = (longest_complete if is_series else complete_lines)(columns)
+        except ValueError as error:
+            raise self._error("", str(error)) from None
+        self.warnings += [note] if note else []
+        return complete
 
     def _with_parts(self, values: Mapping[str, Values]) -> dict[str, Values]:
         """The columns with real and imaginary part instead of magnitude and phase."""
@@ -362,6 +363,8 @@ class MappedBlock:
         """Without the line at 0 Hz; time series with their sample rate."""
         time = given.get("time_s")
         columns = {name: column for name, column in given.items() if name != "time_s"}
+        if "frequency_hz" in columns:
+            columns = self._sorted(columns)
         frequency = columns.get("frequency_hz")
         if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
             self.warnings.append("the line at 0 Hz is left out")
@@ -369,7 +372,8 @@ class MappedBlock:
         rate = self.block.sample_rate_hz if time is None else None
         stated = self.rig.recording.get("sample_rate_hz")
         if "force_n" in columns and stated is None:
-            rate = rate if time is None else self._rate(time)
+            if time is not None:
+                columns, rate = self._evenly_sampled(columns, time)
             columns |= {} if rate is None else {"sample_rate_hz": rate}
         elif (
             rate is not None and isinstance(stated, int | float) and not math.isclose(rate, stated, rel_tol=_SAME_RATE)
@@ -393,11 +397,21 @@ class MappedBlock:
         self.taken["dynamic_force_n"] = f"measured: √2 times the rms of the force about its drift, {amplitude:.4g} N"
         return {"dynamic_force_n": amplitude}
 
-    def _rate(self, time: Floats) -> float:
-        rate = even_rate(time)
-        if rate is None:
-            raise self._error("time_s", f"samples are not evenly spaced (step {shown(mean_step(time))} s)")
-        return rate
+    def _sorted(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        try:
+            spectrum, notes = sorted_spectrum(columns)
+        except ValueError as error:
+            raise self._error("frequency_hz", str(error)) from None
+        self.warnings += notes
+        return spectrum
+
+    def _evenly_sampled(self, columns: Mapping[str, Floats], time: Floats) -> tuple[dict[str, Floats], float]:
+        try:
+            even, rate, note = evenly_sampled(columns, time)
+        except ValueError as error:
+            raise self._error("time_s", f"{error} (step {shown(mean_step(time))} s)") from None
+        self.warnings += [note] if note else []
+        return even, rate
 
     def _error(self, place: str, reason: str | Requirement) -> FileError:
         return FileError(self.file, place, reason)

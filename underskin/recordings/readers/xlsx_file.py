@@ -12,7 +12,6 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import date, datetime, time
-from io import BytesIO
 from typing import Any, BinaryIO
 
 import openpyxl
@@ -191,7 +190,7 @@ def _with_table(name: str, sheets: dict[str, str]) -> tuple[str, str]:
 
 def _campaign(place: str, text: str, file: str) -> Document:
     try:
-        return csv_template.read(BytesIO(text.encode()), file, place)
+        return csv_template.of_text(text, file, place)
     except FileError as error:
         raise _at(place, error) from None
 
@@ -210,7 +209,7 @@ def _tables(sheets: dict[str, str], file: str) -> Contents:
     errors: list[FileError] = []
     for name, sheet in sheets.items():
         try:
-            tables[name] = csv_file.read(BytesIO(sheet.encode()), file)
+            tables[name] = csv_file.of_text(sheet, file)
         except csv_file.NoTable as error:
             errors.append(_on_sheet(name, error))
         except FileError as error:
