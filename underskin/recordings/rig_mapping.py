@@ -24,6 +24,7 @@ from underskin.recordings.readers.channel_arithmetic import FIELD
 from underskin.recordings.readers.unit_labels import (
     DECIBEL,
     contradicts,
+    decibel_reference,
     exponents,
     field_unit,
     meanings,
@@ -106,7 +107,7 @@ def rise_of(column: Floats, count: int) -> Rise | None:
 _PERCENT = 100.0
 _OF_UNIT = re.compile(r"unit|einheit|scale|skala|format|amplitude", re.IGNORECASE)
 _SAME_RATE = 1e-3  # relative
-_NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
+_NO_DECIBELS = "decibels are a logarithm: state their reference as the unit, such as dB re 1 pC/N, or the ratio itself"
 _LEAST_SAMPLES, _STILL = 16, 1e-9  # samples of a measured force; share of its largest value that is rounding
 
 
@@ -171,6 +172,10 @@ class MappedBlock:
 
     def _refuse_stated_decibels(self) -> None:
         """Reject a magnitude where a property of the file, such as `Y-axis unit: dB`, states decibels."""
+        mapping = self.rig.channels[MAGNITUDE]
+        channel = self.block.headed(mapping.channel)
+        if decibel_reference(mapping.unit or (channel.label if channel else "")) is not None:
+            return
         for name, value in self.stated.items():
             stated_unit = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
             if stated_unit is not None and stated_unit.dimension == DECIBEL:
@@ -215,12 +220,28 @@ class MappedBlock:
             return channel.values / (_PERCENT if in_percent else 1.0), repr(channel.name)
         target = "frf_re_pc_per_n" if field in (COMPLEX_FRF, MAGNITUDE) else field
         label = self._true_unit(channel, mapping, "angle" if field == PHASE else field_unit(target).dimension)
-        scale = self._degrees(label, place) if field == PHASE else self._scale(target, label, mapping, place)
+        values = channel.values
+        reference = decibel_reference(label) if field == MAGNITUDE else None
+        if reference is not None:
+            values = self._ratio(channel, reference, place)
+        scale = (
+            self._degrees(label, place)
+            if field == PHASE
+            else self._scale(target, reference or label, mapping, place)
+        )
         through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
         sign = self._automatic_sign(mapping) if mapping.sign == AUTOMATIC else int(mapping.sign or 1)
         turned = ", turned round" if sign == -1 else ""
         with np.errstate(all="ignore"):
-            return channel.values * sign * scale, f"{channel.name!r} in {label}{through}{turned}"
+            return values * sign * scale, f"{channel.name!r} in {label}{through}{turned}"
+
+    def _ratio(self, channel: Channel, reference: str, place: str) -> Values:
+        """The ratio to the reference that decibels state; raises FileError where the label states another one."""
+        labelled = decibel_reference(channel.label)
+        if labelled is not None and unit(labelled) != unit(reference):
+            raise self._error(place, f"is labelled {channel.label!r}, not decibels re {reference}")
+        with np.errstate(all="ignore"):
+            return 10 ** (channel.values / 20)
 
     def _automatic_sign(self, mapping: SignalMapping) -> int:
         """-1 where a channel falls during loading: determined from the raw channels, so that travel and deflection are

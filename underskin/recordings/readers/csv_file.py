@@ -109,7 +109,7 @@ def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: s
             raise tables.no_row(index, line, table, file)
     for index, line in enumerate(above):
         cells = [cell.replace(",", "") if text.is_grouped(cell) else cell for cell in table.cells(line)]
-        if len(cells) == table.width and all(text.number(cell, table.decimal) is not None for cell in cells):
+        if len(cells) > max(table.columns) and all(text.number(cell, table.decimal) is not None for cell in cells):
             raise tables.no_row(index, line, table, file)
 
 

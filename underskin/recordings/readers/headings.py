@@ -103,7 +103,7 @@ def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
     for index in range(table.start - 1, -1, -1):
         if not lines[index].strip():
             continue
-        bare = uncommented(lines[index]).strip()
+        bare = uncommented(lines[index]).strip(BLANKS)
         label = _LABEL.match(bare)
         kind = "" if label is None else "units" if label["units"] else "names"
         cells = _cells(bare[label.end() :] if label else bare, table)

@@ -94,8 +94,10 @@ class WorkbookSheets:
             ):
                 warnings.simplefilter("ignore")
                 sheets = [book.worksheets[index] for book in self._books]
-                lines = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
-            while lines and not lines[-1]:
+                rows = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
+            width = max((row.count(SEPARATOR) for row in rows), default=0)
+            lines = [row + SEPARATOR * (width - row.count(SEPARATOR)) for row in rows]
+            while lines and not lines[-1].strip():
                 lines.pop()
             if lines:
                 yield sheet.title, "\n".join(lines)
