@@ -9,7 +9,8 @@
       force_n: {channel: Corrected_Force(N), sign: -1}
 
 `skin` and `recording` hold campaign fields common to all files; `{property: ...}` takes one from the properties that
-the file or the block states. `channels` maps each campaign field to a channel and its conversion, `curves` says how the
+the file or the block states. `channels` maps each campaign field to a channel, or to a list of channels that follow
+each other, and its conversion, `curves` says how the
 curves of a file are separated, `estimator` how FRFs are estimated from time series (H1, H2 or Hv), `derived` defines
 channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each curve.
 
@@ -177,7 +178,8 @@ class Trim:
 class RigDescription:
     """A rig: the kind of its recordings, the fields common to them, the mapping of channels, and what makes one curve:
     `"file"`, `"groups"`, a channel that separates curves, or None (each block is one). `derived` holds formulas by the
-    names of the channels that they define, in their order. `document` is as given."""
+    names of the channels that they define, in their order; `joined` the channels that are joined to one, by its name.
+    `document` is as given."""
 
     kind: str
     skin: Mapping[str, Any]
@@ -189,6 +191,7 @@ class RigDescription:
     estimator: Estimator | None = None
     derived: Mapping[str, Formula] = dataclasses.field(default_factory=dict)
     trim: Trim | None = None
+    joined: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
 
     def with_recording(self, values: Mapping[str, Any]) -> "RigDescription":
         """The rig description with some fields of the recordings set for one file; `document` is unchanged."""
@@ -219,11 +222,14 @@ def from_dict(document: Any) -> RigDescription:
         raise not_one_of("kind", shown(kind), KINDS)
     of_skin = {model_field.name for model_field in fields(SkinDescription)}
     of_recording = {model_field.name for model_field in fields(KINDS[kind])} - {"kind", "estimator"}
+    given_channels, joined = _joined(get("channels"), kind)
     readings: dict[str, Callable[[], Any]] = {
         "name": lambda: field.name("name", get("name", SCHEMA), False),
-        "skin": lambda: _require_known_fields("skin", get("skin"), of_skin),
-        "recording": lambda: _recording(_require_known_fields("recording", get("recording", {}), of_recording)),
-        "channels": lambda: _channels(_require_known_fields("channels", get("channels"), channel_fields(kind))),
+        "skin": lambda: _stated_by_file("skin", _require_known_fields("skin", get("skin"), of_skin)),
+        "recording": lambda: _stated_by_file(
+            "recording", _require_known_fields("recording", get("recording", {}), of_recording)
+        ),
+        "channels": lambda: _channels(_require_known_fields("channels", given_channels, channel_fields(kind))),
         "units_checked": lambda: field.flag("units_checked", get("units_checked", False), False),
         "curves": lambda: _curves(get("curves")),
         "estimator": lambda: _estimator(get("estimator"), get("channels")),
@@ -232,7 +238,7 @@ def from_dict(document: Any) -> RigDescription:
     }
     values = all_of(readings)
     del values["name"]  # that of the document
-    rig = RigDescription(kind=kind, document=document, **values)
+    rig = RigDescription(kind=kind, document=document, joined=joined, **values)
     all_of({name: partial(_check_automatic_sign, rig, name) for name in rig.channels})
     return rig
 
@@ -259,11 +265,35 @@ def _require_known_fields(prefix: str, document: Any, field_names: set[str]) -> 
     return mapping(prefix, document)
 
 
-def _recording(given: Mapping[str, Any]) -> Mapping[str, Any | Property]:
+def _joined(channels: Any, kind: str) -> tuple[Any, dict[str, tuple[str, ...]]]:
+    """The channels with one name in place of each list of channels, and these lists by their names."""
+    joined: dict[str, tuple[str, ...]] = {}
+
+    def named_once(value: Any, place: str) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        plain = {key: named_once(item, f"{place}.{key}") for key, item in value.items()}
+        parts = plain.get("channel")
+        if not isinstance(parts, list):
+            return plain
+        if kind == "frf":
+            raise conflicting(f"{place}.channel", shown(parts), "is for curves: an FRF has one channel for each field")
+        if len(parts) < 2:
+            raise too_few(f"{place}.channel", shown(parts), "must be a name, or a list of two or more")
+        names = tuple(field.name(f"{place}.channel[{index}]", part, False) for index, part in enumerate(parts))
+        name = " and ".join(names)[: field.LONGEST_NAME]
+        joined[name] = names
+        return {**plain, "channel": name}
+
+    return named_once(channels, "channels"), joined
+
+
+def _stated_by_file(prefix: str, given: Mapping[str, Any]) -> Mapping[str, Any | Property]:
+    """The fields, with a Property for each whose value the file states."""
     stated = {
-        name: partial(_built, Property, f"recording.{name}", value)
+        name: partial(_built, Property, f"{prefix}.{name}", value)
         for name, value in given.items()
-        if isinstance(value, Mapping)
+        if isinstance(value, Mapping) and name != "tolerances"
     }
     return {**given, **all_of(stated)}
 

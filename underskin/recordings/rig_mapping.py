@@ -1,15 +1,13 @@
 """From an instrument's channels to a campaign document, by a rig description.
 
-Channels that were started at different times are cut to their common samples (`aligned`); the blocks of a file are
-split into curves (`curve_parts`); `MappedBlock` converts the channels of one block to the fields of one recording, in
-the fields' units, and says in words what it used; `apply` does all of it for a file.
+The blocks of a file are split into curves (`curve_parts`); `MappedBlock` converts the channels of one block to the
+fields of one recording, in the fields' units, and says in words what it used; `apply` does all of it for a file.
 """
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
 from pathlib import PurePath
 from typing import Any
 
@@ -18,6 +16,7 @@ import numpy as np
 from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
+from underskin.recordings.common_samples import aligned, with_joined
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.channel_arithmetic import FIELD
@@ -225,9 +224,7 @@ class MappedBlock:
         if reference is not None:
             values = self._ratio(channel, reference, place)
         scale = (
-            self._degrees(label, place)
-            if field == PHASE
-            else self._scale(target, reference or label, mapping, place)
+            self._degrees(label, place) if field == PHASE else self._scale(target, reference or label, mapping, place)
         )
         through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
         sign = self._automatic_sign(mapping) if mapping.sign == AUTOMATIC else int(mapping.sign or 1)
@@ -442,81 +439,6 @@ def _centred(column: Floats) -> Floats:
     return column - column.mean()
 
 
-_OFF_SAMPLE = 0.05  # of a step: at half the rate a phase of 9°, and Re FRF 1.2 % too small
-_LEAST_COMMON = 2  # samples in common
-
-
-def aligned(contents: Contents, names: Collection[str], file: str) -> Contents:
-    """The contents with the named channels cut to their common samples in every block, by the stated start times; with
-    a warning.
-
-    Raises FileError that names both channels where their rates differ, or their starts differ by fractions of a sample.
-    """
-    blocks, warnings = [], list(contents.warnings)
-    for block in contents.blocks:
-        used = {channel.name: channel for name in names if (channel := block.headed(name)) is not None}
-        rate = _common_rate(list(used.values()), file)
-        with_rate = block if rate is None else replace(block, sample_rate_hz=rate)
-        if len({channel.starts_s for channel in used.values()}) < 2:
-            blocks.append(with_rate)
-            continue
-        cut, cut_warnings = _cut_to_common(with_rate, used, file)
-        blocks.append(cut)
-        warnings += cut_warnings
-    return replace(contents, blocks=tuple(blocks), warnings=tuple(dict.fromkeys(warnings)))
-
-
-def _common_rate(used: list[Channel], file: str) -> float | None:
-    sampled = {channel.sample_rate_hz: channel for channel in used if channel.sample_rate_hz is not None}
-    if len(sampled) > 1:
-        (first, channel), (second, later), *_ = sampled.items()
-        reason = f"{channel.name!r} has {first:g} samples a second, {later.name!r} {second:g}: they must have one rate"
-        raise FileError(file, "", reason)
-    return next(iter(sampled), None)
-
-
-def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[Block, list[str]]:
-    """The block with the used channels cut, and a warning; unchanged where they start within one sample."""
-    first, last = min(used.values(), key=_starts_s), max(used.values(), key=_starts_s)
-    start_times = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
-    if block.sample_rate_hz is None:
-        raise FileError(file, "", f"{start_times}, and no sample rate is stated by which to align them")
-    late = {name: (last.starts_s - channel.starts_s) * block.sample_rate_hz for name, channel in used.items()}
-    skipped = {name: round(samples) for name, samples in late.items()}
-    odd = next((name for name in used if abs(late[name] - skipped[name]) > _OFF_SAMPLE), None)
-    if odd is not None:
-        reason = f"that is {late[odd]:.4g} samples: they can be aligned by whole samples alone"
-        raise FileError(file, "", f"{start_times}: {reason}; resample one of them, or correct the times")
-    if not any(skipped.values()):
-        return block, []
-    count = min(len(channel.values) - skipped[name] for name, channel in used.items())
-    if count < _LEAST_COMMON:
-        raise FileError(file, "", f"{start_times}: they have no samples in common")
-    channels = tuple(
-        replace(channel, values=channel.values[skipped[channel.name] : skipped[channel.name] + count])
-        if channel.name in used
-        else channel
-        for channel in block.channels
-    )
-    warning = f"{start_times}: they were aligned, with {count} samples in common"
-    return replace(block, channels=channels), [warning]
-
-
-def _starts_s(channel: Channel) -> float:
-    return channel.starts_s
-
-
-def _time(block: Block, channel: Channel) -> str:
-    """The start time of a channel, or its delay after the first where the file states no time."""
-    if block.recorded_at is None:
-        return f"{channel.starts_s:g} s"
-    try:
-        moment = datetime.fromisoformat(block.recorded_at) + timedelta(seconds=channel.starts_s)
-    except OverflowError:
-        return f"{channel.starts_s:g} s after {block.recorded_at}"
-    return moment.isoformat().replace("+00:00", "Z")
-
-
 _MOST_CURVES = 1000  # of a block
 _LEAST_OF_CURVE = 2  # of a curve
 
@@ -604,15 +526,14 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     """
     in_formulas = [name for formula in rig.derived.values() for name in formula.names]
     contents = aligned(contents, dict.fromkeys([*_channel_names(rig), *in_formulas]), file)
-    contents = channel_arithmetic.with_derived(
-        contents, rig.derived, lambda part: _stated(contents, part, part.name), file
-    )
+    contents = _with_derived(rig, contents, file)
     blocks = _with_channels(rig, contents, file)
     warnings = [*contents.warnings, *doubts(contents, rig.curves)]
     if len(blocks) < len(contents.blocks):
         warnings.append(f"{len(contents.blocks) - len(blocks)} parts without the rig's channels are left out")
     stem = _printable(PurePath(file).stem)
     recordings = []
+    skins: list[dict[str, Any]] = []
     taken: dict[str, str] = {"": contents.layout} if contents.layout else {}
     curves = curve_parts(blocks, rig.curves, file)
     parts = [(_trimmed(block, rig.trim, file), block_name) for block, block_name in curves]
@@ -622,6 +543,7 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
         stated = _stated(contents, block, block_name)
         common = {name: common_value(name, value, stated, file) for name, value in rig.recording.items()}
+        skins.append({name: common_value(name, value, stated, file) for name, value in rig.skin.items()})
         recorded_at = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
         mapped = MappedBlock(rig, block, stated, file)
         estimated = {} if rig.estimator is None else {"estimator": rig.estimator}
@@ -629,19 +551,27 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         recordings.append({**identity, **mapped.spring(), **common, **mapped.fields()})
         warnings += mapped.warnings
         taken |= {name: how for name, how in mapped.taken.items() if name not in taken}
-    document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
+    for name in (name for name in rig.skin if any(skin[name] != skins[0][name] for skin in skins)):
+        values = " and ".join(dict.fromkeys(str(shown(skin[name])) for skin in skins))
+        raise FileError(file, f"skin.{name}", f"parts of the file state {values}: all must be of one skin")
+    document = {"schema": SCHEMA, "name": stem, "skin": skins[0], "recordings": recordings}
     return MappedFile({**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings)), taken)
 
 
 def has_channels(rig: RigDescription, contents: Contents) -> bool:
     """Whether a part of a file holds every channel that the rig names, or can derive."""
     try:
-        derived = channel_arithmetic.with_derived(
-            contents, rig.derived, lambda block: _stated(contents, block, block.name), ""
-        )
-        return bool(_with_channels(rig, derived, ""))
+        return bool(_with_channels(rig, _with_derived(rig, contents, ""), ""))
     except FileError:
         return False
+
+
+def _with_derived(rig: RigDescription, contents: Contents, file: str) -> Contents:
+    """The contents with the channels that the rig joins or derives."""
+    contents = with_joined(contents, rig.joined, file)
+    return channel_arithmetic.with_derived(
+        contents, rig.derived, lambda block: _stated(contents, block, block.name), file
+    )
 
 
 def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[Block]:
