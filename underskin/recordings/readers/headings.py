@@ -20,6 +20,7 @@ _LABEL = re.compile(
 )
 _WIDE_BLANKS = re.compile(r"\t|\s{2,}")
 _WITH_UNITS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")  # Load (uN)
+_VALUE = re.compile(r"[-+]?\.?\d[-+\d.,:/ %]*([eE][-+]?\d+)?")
 _NO_UNITS = ("", "-", "–", "1", "%", "°C", "K", "#", "a.u.", "n/a")
 
 
@@ -43,16 +44,19 @@ class _Candidate:
         return self.label == "names" or any(unit(labelled_unit(cell)) is not None for cell in self.cells)
 
     def is_units(self) -> bool:
+        """Whether it holds units: some of them, among other words, by more than a letter, which may be a symbol."""
         units = [without_brackets(cell) for cell in self.cells]
-        unit_count = sum(unit(cell) is not None for cell in units)
-        other_count = sum(cell not in _NO_UNITS for cell in units) - unit_count
-        states_values = any("=" in cell or ":" in cell for cell in units)  # k=3 N/m
-        return self.label == "units" or (
-            self.label == "" and unit_count > 0 and other_count <= unit_count and not states_values
+        known = [cell for cell, label in zip(self.cells, units, strict=True) if unit(label) is not None]
+        other_count = sum(label not in _NO_UNITS for label in units) - len(known)
+        states_values = any("=" in label or ":" in label for label in units)  # k=3 N/m
+        are_units = len(known) > 0 and (
+            other_count == 0 or (other_count <= len(known) and len(max(known, key=len)) > 1)
         )
+        return self.label == "units" or (self.label == "" and are_units and not states_values)
 
-    def holds_number(self) -> bool:
-        return any(text.number(cell, mark) is not None for cell in self.cells for mark in ".,")
+    def holds_value(self) -> bool:
+        """Whether a cell is a number, with either decimal mark, a date or a time."""
+        return any(_VALUE.fullmatch(cell.strip()) for cell in self.cells)
 
 
 def find(lines: Sequence[str], table: Table, file: str) -> Headings:
@@ -62,13 +66,11 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
     """
     _require_closed_quotes(lines, table, file)
     candidates = list(_candidates(lines, table))
-    units = next((candidate for candidate in candidates if candidate.is_units()), None)
+    units = _units(candidates)
     named = [candidate for candidate in candidates if candidate is not units and _is_full(candidate, table)]
-    if units is not None and not units.label and any(one.is_next and one.line > units.line for one in named):
-        units = None  # above names that are next to the numbers
     names = _names(named, units)
-    if names is None and units is not None and _is_full(units, table):  # a line of units also serves as names
-        names = units
+    if names is None and units is not None and _is_full(units, table):  # which also serves as names
+        names, units = units, units if all(unit(cell) for cell in units.cells) else None
     if names is None:
         return Headings([(f"column {number}", "") for number in range(1, table.width + 1)])
     padding = [""] * table.width
@@ -82,12 +84,19 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
     )
 
 
+def _units(candidates: Sequence[_Candidate]) -> _Candidate | None:
+    """The line of units: one that is called so, or the nearest that is none of values."""
+    labelled = next((candidate for candidate in candidates if candidate.label == "units"), None)
+    nearest = next((candidate for candidate in candidates if not candidate.holds_value()), None)
+    return labelled or (nearest if nearest is not None and nearest.is_units() else None)
+
+
 def _names(candidates: Sequence[_Candidate], units: _Candidate | None) -> _Candidate | None:
     """The line of names among those from the nearest to the farthest; above a line of `units` the nearest to it."""
     if units is not None and units.label == "":
         # Lines under the units are no names, which would then lack these units.
         return next((candidate for candidate in candidates if candidate.line < units.line), None)
-    words = [candidate for candidate in candidates if not candidate.holds_number()]
+    words = [candidate for candidate in candidates if not candidate.holds_value()]
     if words and words[0].is_next and not words[0].label:
         return words[0]
     sure = (candidate for candidate in words if candidate.is_sure())
@@ -111,7 +120,7 @@ def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
             is_next = False
             continue
         candidate = _Candidate(index, cells, kind, is_next)
-        if is_next or not candidate.holds_number():
+        if is_next or not candidate.holds_value():
             yield candidate
         is_next = is_next and candidate.is_units()
 
