@@ -1,9 +1,11 @@
 """A table with known numbers, written in the layouts of instruments, is read right or refused, and never wrong."""
 
+import cmath
 import math
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from hypothesis import event, given
 from hypothesis import strategies as st
 
@@ -142,3 +144,100 @@ def test_layouts_of_instruments(layout: Layout) -> None:
         return
     event("read")
     assert wrong(layout, found) == []
+
+
+COMPLEX = {
+    "i": "{re}{im:+}i",
+    "python": "({re}{im:+}j)",
+    "pair": "({re},{im})",
+    "blanks": "{re} {sign} {size}i",
+    "polar": "{r!r}∠{degrees!r}°",
+    "polar in rad": "{r!r} ∠ {angle!r} rad",
+}
+NUMBER = st.floats(-1e6, 1e6).map(lambda number: round(number, 4))
+
+
+@given(
+    st.lists(st.builds(complex, NUMBER, NUMBER), min_size=3, max_size=8),
+    st.sampled_from(sorted(COMPLEX)),
+    st.sampled_from([",", ";", "\t"]),
+)
+def test_complex_numbers_in_a_cell(values: list[complex], form: str, separator: str) -> None:
+    cells = [
+        COMPLEX[form].format(
+            re=value.real,
+            im=value.imag,
+            sign="-" if math.copysign(1, value.imag) < 0 else "+",
+            size=abs(value.imag),
+            r=abs(value),
+            angle=cmath.phase(value),
+            degrees=math.degrees(cmath.phase(value)),
+        )
+        for value in values
+    ]
+    if separator == "," and form == "pair":
+        cells = [f'"{cell}"' for cell in cells]
+    rows = [f"{10 * number}{separator}{cell}" for number, cell in enumerate(cells, start=1)]
+    text = "\n".join([f"Frequency [Hz]{separator}FRF [pC/N]", *rows])
+    (block,) = contents(text.encode(), "frf.csv").blocks
+    frequency, frf = block.channels
+    assert frequency.values.tolist() == [10.0 * number for number in range(1, len(values) + 1)]
+    assert frf.values == pytest.approx(np.array(values), rel=1e-12, abs=1e-9)
+
+
+@pytest.mark.parametrize("cell", ["1.2-3.4i extra", "(1.2,)", "1.2∠-30", "i", "1.2+i3", "1,2+3.4i", "1.2+3.4k"])
+def test_no_complex_number_is_refused(cell: str) -> None:
+    rows = "".join(f"{number};1.5-0.5i\n" for number in range(1, 6))
+    with pytest.raises(FileError, match="line 4: must be a row of 2 numbers"):
+        contents(f"f;H\n1;1+1i\n2;1+2i\n3;{cell}\n{rows}".encode(), "frf.csv")
+
+
+@given(st.integers(3, 30), st.integers(1, 28), st.sampled_from([",", ";", "\t"]))
+def test_shorter_columns_end_where_they_do(rows: int, helper: int, separator: str) -> None:
+    """Columns beside the table that end before it have the numbers that they have."""
+    helper = min(helper, rows - 1)
+    lines = [separator.join([str(row), str(row / 8), str(row * 10) if row < helper else ""]) for row in range(rows)]
+    text = "\n".join([separator.join(["Time [s]", "Force [N]", "sum"]), *lines])
+    if helper == 1:
+        lines[0] = lines[0].rpartition(separator)[0] + separator
+    (block,) = contents(text.encode(), "run.csv").blocks
+    by_name = {channel.name: channel.values.tolist() for channel in block.channels}
+    assert by_name["Time [s]"] == [float(row) for row in range(rows)]
+    assert by_name["Force [N]"] == [row / 8 for row in range(rows)]
+    assert by_name.get("sum", []) == [10.0 * row for row in range(helper)][: len(by_name.get("sum", []))]
+
+
+def test_a_number_behind_the_end_of_a_column_is_refused() -> None:
+    rows = ["0,1,2", "1,2,3", "2,,4", "3,4,5"]
+    with pytest.raises(FileError, match=r"line 4: must be a row of 3 numbers"):
+        contents("\n".join(["a,b,c", *rows]).encode(), "run.csv")
+
+
+@given(st.lists(st.integers(2, 6), min_size=2, max_size=4), st.sampled_from([",", ";", "\t"]), st.booleans())
+def test_several_tables_in_a_file(lengths: list[int], separator: str, blank: bool) -> None:
+    lines: list[str] = []
+    for number, length in enumerate(lengths):
+        lines += [f"Curve{separator}{number}", f"Depth [mm]{separator}Force [N]"]
+        lines += [f"{row}{separator}{100 * number + row}" for row in range(length)]
+        lines += [""] if blank else []
+    found = contents("\n".join(lines).encode(), "curves.csv")
+    assert [block.channels[1].values.tolist() for block in found.blocks] == [
+        [100.0 * number + row for row in range(length)] for number, length in enumerate(lengths)
+    ]
+    assert [found.properties[f"{number}.Curve"] for number in range(1, len(lengths) + 1)] == [
+        str(number) for number in range(len(lengths))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "value"),
+    [
+        ("Force Constant, nN/nm:\t1.5", "Force Constant, nN/nm", "1.5"),
+        ("X, um: 25.0", "X, um", "25.0"),
+        ("Preload, N = 1.5", "Preload, N", "1.5"),
+        ('Operator,"Smith, J."', "Operator", "Smith, J."),
+    ],
+)
+def test_a_comma_in_the_name_of_a_property(line: str, name: str, value: str) -> None:
+    found = contents(f"{line}\n\nDepth [mm],Force [N]\n0,1\n1,2\n2,3\n".encode(), "run.csv")
+    assert found.properties[name] == value
