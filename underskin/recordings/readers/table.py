@@ -137,7 +137,7 @@ def find(lines: Sequence[str]) -> Table | None:
         if rows > most:
             width = max(room(line, separator) for line in run)
             complex_ones = frozenset(
-                column for column in columns if any(text.number(row[column], decimal) is None for row in cells)
+                column for column in columns if any(complex_number(row[column], decimal) is not None for row in cells)
             )
             best, most = Table(0, separator, decimal, columns, width, complex_ones), rows
     if best is None:
@@ -158,22 +158,26 @@ def _count(line: str, separator: str, decimal: str) -> int:
 
 
 def _columns(line: str, separator: str, decimal: str) -> tuple[int, ...]:
-    """Which cells of a line are numbers; empty where fewer than two are."""
-    columns = tuple(
+    """Which cells of a line are numbers, or overloads beside numbers; empty where fewer than two are numbers."""
+    cells = split(line, separator)
+    numbers = {
         index
-        for index, cell in enumerate(split(line, separator))
+        for index, cell in enumerate(cells)
         if text.number(cell, decimal) is not None or complex_number(cell, decimal) is not None
-    )
-    return columns if len(columns) >= _LEAST else ()
+    }
+    if len(numbers) < _LEAST:
+        return ()
+    return tuple(index for index, cell in enumerate(cells) if index in numbers or _OVERLOAD.fullmatch(cell))
 
 
 def _longest_run(columns_of: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], int, int]:
-    """The columns, the first line and the length of the longest run of lines with numbers in the same columns."""
+    """The columns, the first line and the length of the longest run of lines with numbers in the same columns; of equal
+    ones the first with most columns."""
     best: tuple[tuple[int, ...], int, int] = ((), 0, 0)
     first = 0
     for columns, run in groupby(columns_of):
         length = sum(1 for _ in run)
-        if columns and length > best[2]:
+        if columns and (length, len(columns)) > (best[2], len(best[0])):
             best = (columns, first, length)
         first += length
     return best
