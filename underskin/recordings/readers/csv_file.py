@@ -70,10 +70,9 @@ def _table(written: str, file: str) -> tuple[Sequence[str], Table]:
     """The lines at the start, and the table whose rows start among them; the style of a long file follows from sampled
     lines."""
     blocks = text.blocks(written)
-    _, head = next(blocks)
-    sample = [line for _, block in blocks for line in block[:_SAMPLED]]
-    if sample:
-        head = head[:_HEAD]
+    _, first = next(blocks)
+    head = first[:_HEAD]
+    sample = [*first[_HEAD:][-_SAMPLED:], *(line for _, block in blocks for line in block[:_SAMPLED])]
     table = tables.find([*head, *sample])
     if sample and (table is None or table.start >= len(head)):
         head = written.split("\n")
