@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.recordings.test_magnitude_and_phase import RIG
-from underskin.errors import FileError
+from underskin.errors import FileError, InvalidInput
 from underskin.recordings import Reading, read_file, rig_description
 from underskin.recordings.campaign import FrfRecording, IndentationRecording
 from underskin.recordings.regular_samples import even_rate, evenly_sampled, sorted_spectrum
@@ -235,3 +235,51 @@ def test_what_cannot_be_joined_is_refused(changes: dict[str, Any], message: str)
     above = "Thickness: 2.5\nRadius: 4\n"
     with pytest.raises(Exception, match=message):
         curve(above, **changes)
+
+
+WIDE: dict[str, Any] = {
+    **RIG,
+    "skin": {**RIG["skin"], "sensors": [{"id": "s01", "x_mm": 0, "y_mm": 0}, {"id": "s02", "x_mm": 8, "y_mm": 0}]},
+    "recording": {name: value for name, value in RIG["recording"].items() if name != "sensor"},
+    "channels": {"frequency_hz": {"channel": "f"}},
+    "recordings": [
+        {
+            "sensor": sensor,
+            "channels": {
+                "frf_magnitude_pc_per_n": {"channel": f"{sensor} |H|"},
+                "frf_phase_deg": {"channel": f"{sensor} phase"},
+            },
+        }
+        for sensor in ("s01", "s02")
+    ],
+}
+
+
+def test_a_pair_of_columns_for_each_sensor() -> None:
+    headings = "f [Hz],s01 |H| [pC/N],s01 phase [deg],s02 |H| [pC/N],s02 phase [deg]"
+    text = f"{headings}\n10,7,0,8,90\n20,7.5,0,8.5,90\n".encode()
+    reading = read_file(text, "wide.csv", rig_description.from_dict(WIDE))
+    assert reading.problems == []
+    found = [recording for recording in reading.campaign.recordings if isinstance(recording, FrfRecording)]
+    assert [(recording.id, recording.sensor) for recording in found] == [("wide s01", "s01"), ("wide s02", "s02")]
+    assert found[0].frf_re_pc_per_n == pytest.approx([7, 7.5])
+    assert found[1].frf_im_pc_per_n == pytest.approx([8, 8.5])
+    with pytest.raises(FileError, match=r"lacks s02 \|H\|, s02 phase"):
+        read_file(text.replace(b"s02", b"s03"), "wide.csv", rig_description.from_dict(WIDE))
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ([], "recordings = .*: must be a list of recordings"),
+        ("s01", "recordings = 's01': must be a list"),
+        ([{"sensor": "s01", "chanels": {}}], r"recordings\[0\]: recording.chanels"),
+        (
+            [*WIDE["recordings"], {"sensor": "s03", "channels": {"force": {"channel": "F"}}}],
+            r"recordings\[2\]: channels",
+        ),
+    ],
+)
+def test_wrong_entries_are_named(entries: Any, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        rig_description.from_dict({**WIDE, "recordings": entries})

@@ -10,7 +10,8 @@
 
 `skin` and `recording` hold campaign fields common to all files; `{property: ...}` takes one from the properties that
 the file or the block states. `channels` maps each campaign field to a channel, or to a list of channels that follow
-each other, and its conversion, `curves` says how the
+each other, and its conversion, `recordings` lists the fields and channels of several recordings in the same rows (a column
+a sensor), `curves` says how the
 curves of a file are separated, `estimator` how FRFs are estimated from time series (H1, H2 or Hv), `derived` defines
 channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each curve.
 
@@ -45,7 +46,7 @@ from underskin.recordings.readers.channel_arithmetic import Formula
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.validation import mapping, named, shown
-from underskin.several_errors import SeveralInvalid, all_of, noting
+from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
 from underskin.units import LAB
 
 _FULL_PERCENT = 100.0  # %
@@ -135,7 +136,19 @@ _TARED = ("force_n", "charge_pc", "displacement_mm")
 _OF_CURVES = ("displacement_mm", "force_n")
 CURVE_EXTENTS = ("file", "groups")  # what may make one curve, besides values of a channel
 _FIELDS = (
-    *("schema", "name", "kind", "skin", "recording", "derived", "channels", "curves", "trim", "estimator"),
+    *(
+        "schema",
+        "name",
+        "kind",
+        "skin",
+        "recording",
+        "recordings",
+        "derived",
+        "channels",
+        "curves",
+        "trim",
+        "estimator",
+    ),
     "units_checked",
 )
 _Model = TypeVar("_Model")
@@ -179,7 +192,7 @@ class RigDescription:
     """A rig: the kind of its recordings, the fields common to them, the mapping of channels, and what makes one curve:
     `"file"`, `"groups"`, a channel that separates curves, or None (each block is one). `derived` holds formulas by the
     names of the channels that they define, in their order; `joined` the channels that are joined to one, by its name.
-    `document` is as given."""
+    `entries` are the descriptions of each of several recordings in the same rows. `document` is as given."""
 
     kind: str
     skin: Mapping[str, Any]
@@ -192,10 +205,12 @@ class RigDescription:
     derived: Mapping[str, Formula] = dataclasses.field(default_factory=dict)
     trim: Trim | None = None
     joined: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
+    entries: "tuple[RigDescription, ...]" = ()
 
     def with_recording(self, values: Mapping[str, Any]) -> "RigDescription":
         """The rig description with some fields of the recordings set for one file; `document` is unchanged."""
-        return dataclasses.replace(self, recording={**self.recording, **values})
+        entries = tuple(entry.with_recording(values) for entry in self.entries)
+        return dataclasses.replace(self, recording={**self.recording, **values}, entries=entries)
 
 
 def parse(data: bytes, file: str) -> RigDescription:
@@ -217,6 +232,8 @@ def parse(data: bytes, file: str) -> RigDescription:
 def from_dict(document: Any) -> RigDescription:
     """The rig description of a document; raises SeveralInvalid with all invalid fields."""
     document = field.of_schema("rig description", document, SCHEMA, _FIELDS)
+    if "recordings" in document:
+        return _with_entries(document)
     kind, get = document.get("kind", "frf"), document.get
     if not isinstance(kind, str) or kind not in KINDS:
         raise not_one_of("kind", shown(kind), KINDS)
@@ -241,6 +258,30 @@ def from_dict(document: Any) -> RigDescription:
     rig = RigDescription(kind=kind, document=document, joined=joined, **values)
     all_of({name: partial(_check_automatic_sign, rig, name) for name in rig.channels})
     return rig
+
+
+def _with_entries(document: Mapping[str, Any]) -> RigDescription:
+    """The rig description of several recordings in the same rows: the fields and channels of each entry of `recordings`
+    add to those common to all."""
+    given = document["recordings"]
+    if not isinstance(given, list) or not given:
+        raise too_few("recordings", shown(given), "must be a list of recordings, such as {sensor: s01, channels: {…}}")
+    common = {name: value for name, value in document.items() if name != "recordings"}
+
+    def merged(place: str, entry: Any) -> RigDescription:
+        fields_of_entry = dict(mapping(place, entry))
+        channels = mapping(f"{place}.channels", fields_of_entry.pop("channels", {}))
+        recording = {**mapping("recording", common.get("recording", {})), **fields_of_entry}
+        both = {**mapping("channels", common.get("channels", {})), **channels}
+        try:
+            return from_dict({**common, "recording": recording, "channels": both})
+        except InvalidInput as error:
+            raise SeveralInvalid([one.at(f"{place}: {one.field}") for one in errors_of(error)]) from None
+
+    places = [f"recordings[{index}]" for index in range(len(given))]
+    entries = all_of({place: partial(merged, place, entry) for place, entry in zip(places, given, strict=True)})
+    first = entries[places[0]]
+    return dataclasses.replace(first, document=document, entries=tuple(entries.values()))
 
 
 def channel_fields(kind: str) -> set[str]:

@@ -520,10 +520,27 @@ class MappedFile:
 
 
 def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
-    """The campaign document, one recording for each curve in a block that holds the rig's channels.
+    """The campaign document, one recording for each curve in a block that holds the rig's channels, and for each of the
+    rig's entries, called after its sensor or its number.
 
     Raises FileError that names the channel or property that is missing or whose unit does not fit.
     """
+    if not rig.entries:
+        return _applied(rig, contents, file)
+    mapped = [_applied(entry, contents, file) for entry in rig.entries]
+    sensors = [entry.recording.get("sensor") for entry in rig.entries]
+    are_distinct = all(isinstance(sensor, str) and sensors.count(sensor) == 1 for sensor in sensors)
+    recordings = []
+    for number, (entry, of_entry) in enumerate(zip(rig.entries, mapped, strict=True), start=1):
+        name = str(sensors[number - 1]) if are_distinct else str(number)
+        has_id = "id" in entry.recording
+        for recording in of_entry.document["recordings"]:
+            recordings.append(recording if has_id else {**recording, "id": _label(recording["id"], _printable(name))})
+    warnings = dict.fromkeys(warning for of_entry in mapped for warning in of_entry.warnings)
+    return MappedFile({**mapped[0].document, "recordings": recordings}, list(warnings), mapped[0].taken)
+
+
+def _applied(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     in_formulas = [name for formula in rig.derived.values() for name in formula.names]
     contents = aligned(contents, dict.fromkeys([*_channel_names(rig), *in_formulas]), file)
     contents = _with_derived(rig, contents, file)
@@ -561,7 +578,7 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
 def has_channels(rig: RigDescription, contents: Contents) -> bool:
     """Whether a part of a file holds every channel that the rig names, or can derive."""
     try:
-        return bool(_with_channels(rig, _with_derived(rig, contents, ""), ""))
+        return all(_with_channels(one, _with_derived(one, contents, ""), "") for one in rig.entries or (rig,))
     except FileError:
         return False
 
