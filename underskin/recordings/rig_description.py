@@ -9,11 +9,11 @@
       force_n: {channel: Corrected_Force(N), sign: -1}
 
 `skin` and `recording` hold campaign fields common to all files; `{property: ...}` takes one from the properties that
-the file or the block states. `channels` maps each campaign field to a channel, or to a list of channels that follow
-each other, and its conversion, `recordings` lists the fields and channels of several recordings in the same rows (a column
-a sensor), `curves` says how the
-curves of a file are separated, `estimator` how FRFs are estimated from time series (H1, H2 or Hv), `derived` defines
-channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each curve.
+the file or the block states. `channels` maps each campaign field to a channel and its conversion; a list of channels is
+one, one after the other. `recordings` lists the fields and channels of several recordings in the same rows (a column a
+sensor). `curves` says how the curves of a file are separated, `estimator` how FRFs are estimated from time series (H1,
+H2 or Hv), `derived` defines channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each
+curve.
 
 Also here: the values of properties, converted to the unit of their campaign field.
 """
@@ -136,20 +136,8 @@ _TARED = ("force_n", "charge_pc", "displacement_mm")
 _OF_CURVES = ("displacement_mm", "force_n")
 CURVE_EXTENTS = ("file", "groups")  # what may make one curve, besides values of a channel
 _FIELDS = (
-    *(
-        "schema",
-        "name",
-        "kind",
-        "skin",
-        "recording",
-        "recordings",
-        "derived",
-        "channels",
-        "curves",
-        "trim",
-        "estimator",
-    ),
-    "units_checked",
+    *("schema", "name", "kind", "units_checked", "skin", "recording", "recordings"),
+    *("derived", "channels", "curves", "trim", "estimator"),
 )
 _Model = TypeVar("_Model")
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF

@@ -530,12 +530,12 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     mapped = [_applied(entry, contents, file) for entry in rig.entries]
     sensors = [entry.recording.get("sensor") for entry in rig.entries]
     are_distinct = all(isinstance(sensor, str) and sensors.count(sensor) == 1 for sensor in sensors)
-    recordings = []
-    for number, (entry, of_entry) in enumerate(zip(rig.entries, mapped, strict=True), start=1):
-        name = str(sensors[number - 1]) if are_distinct else str(number)
-        has_id = "id" in entry.recording
-        for recording in of_entry.document["recordings"]:
-            recordings.append(recording if has_id else {**recording, "id": _label(recording["id"], _printable(name))})
+    names = [_printable(str(sensor if are_distinct else number)) for number, sensor in enumerate(sensors, start=1)]
+    recordings = [
+        recording if "id" in entry.recording else {**recording, "id": _label(recording["id"], name)}
+        for entry, name, of_entry in zip(rig.entries, names, mapped, strict=True)
+        for recording in of_entry.document["recordings"]
+    ]
     warnings = dict.fromkeys(warning for of_entry in mapped for warning in of_entry.warnings)
     return MappedFile({**mapped[0].document, "recordings": recordings}, list(warnings), mapped[0].taken)
 
