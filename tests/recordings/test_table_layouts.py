@@ -192,10 +192,10 @@ def test_no_complex_number_is_refused(cell: str) -> None:
         contents(f"f;H\n1;1+1i\n2;1+2i\n3;{cell}\n{rows}".encode(), "frf.csv")
 
 
-@given(st.integers(3, 30), st.integers(1, 28), st.sampled_from([",", ";", "\t"]))
+@given(st.integers(4, 30), st.integers(1, 28), st.sampled_from([",", ";", "\t"]))
 def test_shorter_columns_end_where_they_do(rows: int, helper: int, separator: str) -> None:
     """Columns beside the table that end before it have the numbers that they have."""
-    helper = min(helper, rows - 1)
+    helper = min(helper, rows - 2)
     lines = [separator.join([str(row), str(row / 8), str(row * 10) if row < helper else ""]) for row in range(rows)]
     text = "\n".join([separator.join(["Time [s]", "Force [N]", "sum"]), *lines])
     if helper == 1:
@@ -207,8 +207,9 @@ def test_shorter_columns_end_where_they_do(rows: int, helper: int, separator: st
     assert by_name.get("sum", []) == [10.0 * row for row in range(helper)][: len(by_name.get("sum", []))]
 
 
-def test_a_number_behind_the_end_of_a_column_is_refused() -> None:
-    rows = ["0,1,2", "1,2,3", "2,,4", "3,4,5"]
+@pytest.mark.parametrize("rows", [["0,1,2", "1,2,3", "2,,4", "3,4,5"], ["0,1,2", "1,2,3", "2,,4"]])
+def test_an_empty_cell_among_the_rows_is_refused(rows: list[str]) -> None:
+    """A number below an empty cell is refused by the line of that cell, and so is an empty cell in the last row."""
     with pytest.raises(FileError, match=r"line 4: must be a row of 3 numbers"):
         contents("\n".join(["a,b,c", *rows]).encode(), "run.csv")
 

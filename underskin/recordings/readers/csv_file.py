@@ -41,10 +41,7 @@ def of_text(written: str, file: str) -> Contents:
     found = headings.find(head, table, file)
     repeated = frozenset(head[line].strip() for line in found.lines)
     reader = RowReader(table, repeated, file)
-    for first, lines in text.blocks(written):
-        skipped = max(0, table.start - first)
-        if skipped < len(lines):
-            reader.take(first + skipped, lines[skipped:])
+    reader.take_all(written)
     _refuse_other_rows(head[: table.start], reader.under, table, file)
     column_warnings = [*_text_column_warnings(reader, table, found, file), *_overload_warnings(reader, found)]
     above, *between, under = (

@@ -294,7 +294,18 @@ class RowReader:
         self.overloads: dict[int, OtherCells] = {}
         self.count = 0
 
-    def take(self, first: int, lines: Sequence[str]) -> None:
+    def take_all(self, written: str) -> None:
+        """Read the rows of a text."""
+        for first, lines in text.blocks(written):
+            skipped = max(0, self._table.start - first)
+            if skipped < len(lines):
+                self._take(first + skipped, lines[skipped:])
+        for section in self.sections:
+            for count, *line in section.ended.values():
+                if section.count - count < _LEAST:  # a row with an empty cell is no end of a column
+                    raise no_row(*line, self._table, self._file)
+
+    def _take(self, first: int, lines: Sequence[str]) -> None:
         """Read lines, the first of which has the index `first`."""
         table = self._table
         numbers = plain_numbers(lines, table.separator, table.decimal, table.width) if self._is_plain else None
@@ -303,7 +314,7 @@ class RowReader:
             self._section(first).add(first + len(lines) - 1, len(lines), numbers)
         elif len(lines) > _FEW and self._is_plain:
             for start in range(0, len(lines), _FEW):
-                self.take(first + start, lines[start : start + _FEW])
+                self._take(first + start, lines[start : start + _FEW])
         else:
             for index, line in enumerate(lines, start=first):
                 self._take_line(index, line)
