@@ -301,9 +301,9 @@ class RowReader:
             if skipped < len(lines):
                 self._take(first + skipped, lines[skipped:])
         for section in self.sections:
-            for count, *line in section.ended.values():
+            for count, index, line in section.ended.values():
                 if section.count - count < _LEAST:  # a row with an empty cell is no end of a column
-                    raise no_row(*line, self._table, self._file)
+                    raise no_row(index, line, self._table, self._file)
 
     def _take(self, first: int, lines: Sequence[str]) -> None:
         """Read lines, the first of which has the index `first`."""
