@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 Columns = Mapping[str, Floats]
 
@@ -105,11 +105,11 @@ def longest_complete(columns: Columns) -> tuple[dict[str, Floats], str]:
     return {name: column[first:last] for name, column in columns.items()}, f"{gaps}: {part}, which alone is used"
 
 
-def _missing(columns: Columns) -> Floats:
+def _missing(columns: Columns) -> Mask:
     """Which lines have NaN in a column; none where the columns differ in length, which is refused later."""
     if len({len(column) for column in columns.values()}) != 1:
         return np.zeros(0, bool)
-    return np.isnan(np.stack([*columns.values()])).any(axis=0)
+    return np.asarray(np.isnan(np.stack([*columns.values()])).any(axis=0))
 
 
 def _lacking(columns: Columns) -> str:
