@@ -283,3 +283,18 @@ def test_a_pair_of_columns_for_each_sensor() -> None:
 def test_wrong_entries_are_named(entries: Any, message: str) -> None:
     with pytest.raises(InvalidInput, match=message):
         rig_description.from_dict({**WIDE, "recordings": entries})
+
+
+def test_a_complex_phase_is_refused() -> None:
+    text = b"f [Hz];M [pC/N];p [deg]\n10;7;1+2i\n20;7;1-2i\n"
+    fields_of = {"frequency_hz": "f", "frf_magnitude_pc_per_n": "M", "frf_phase_deg": "p"}
+    channels = {field: {"channel": name} for field, name in fields_of.items()}
+    with pytest.raises(FileError, match="a channel of complex numbers can only be"):
+        read_file(text, "frf.csv", rig_description.from_dict({**RIG, "channels": channels}))
+
+
+@pytest.mark.parametrize("times", ["1e308,-1e308,1e308", "0,0,0", "3,2,1", "0,1e300,2e300", "1,2", "5"])
+def test_times_that_are_no_clock(times: str) -> None:
+    time = np.array([float(cell) for cell in times.split(",")])
+    rate = even_rate(time)
+    assert rate is None or rate > 0

@@ -32,9 +32,9 @@ def even_rate(time: Floats) -> float | None:
         jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
     if step > 0 and jitter <= _JITTER * step:
         return 1 / step
-    if not step > 0 or not np.isfinite(time).all():
-        return None
     start, step = _regression(time)
+    if not 0 < step < np.inf:
+        return None
     digit = _last_digit(time, step)
     off = np.abs(time - (start + step * np.arange(len(time)))).max()
     is_rounded = digit <= _FINE * step and off <= digit and np.abs(np.diff(time) - step).max() <= 2 * digit
@@ -42,10 +42,12 @@ def even_rate(time: Floats) -> float | None:
 
 
 def _regression(time: Floats) -> tuple[float, float]:
-    """Start and step of the line through the times of all samples."""
+    """Start and step of the line through the times of all samples; step 0 where there is none."""
     index = np.arange(len(time)) - (len(time) - 1) / 2
-    step = float(index @ time / (index @ index))
-    return float(time.mean()) + step * float(index[0]), step
+    with np.errstate(all="ignore"):
+        step = float(index @ time / max(index @ index, 1.0))
+        start = float(time.mean()) + step * float(index[0])
+    return (start, step) if np.isfinite(step) and np.isfinite(start) else (0.0, 0.0)
 
 
 def _last_digit(time: Floats, step: float) -> float:
@@ -68,14 +70,18 @@ def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], f
     rate = even_rate(time)
     if rate is not None:
         return dict(columns), rate, ""
-    start, step = _regression(time) if np.isfinite(time).all() and len(time) > 1 else (0.0, 0.0)
-    off = time - (start + step * np.arange(len(time)))
-    steps = np.diff(time)
-    if not (step > 0 and np.abs(steps - step).max() < _HALF * step and off.std() <= _RESAMPLED * step):
+    start, step = _regression(time)
+    with np.errstate(all="ignore"):
+        off = time - (start + step * np.arange(len(time)))
+        is_clock = step > 0 and np.abs(np.diff(time) - step).max() < _HALF * step and off.std() <= _RESAMPLED * step
+    if not is_clock:
         raise ValueError("samples are not evenly spaced")
     even = start + step * np.arange(len(time))
     even = even[(even >= time[0]) & (even <= time[-1])]
-    resampled = {name: np.asarray(CubicSpline(time, column)(even)) for name, column in columns.items()}
+    if not all(np.isfinite(column).all() for column in columns.values()):
+        raise ValueError("samples are not evenly spaced, and a channel holds no finite number in some")
+    with np.errstate(all="ignore"):
+        resampled = {name: np.asarray(CubicSpline(time, column)(even)) for name, column in columns.items()}
     jitter = f"{100 * off.std() / step:.2g} % of a step rms"
     return resampled, 1 / step, f"the clock varies by {jitter}: the samples were interpolated at even times"
 

@@ -128,10 +128,10 @@ class MappedBlock:
         if COMPLEX_FRF in values:
             frf = values.pop(COMPLEX_FRF)
             values |= {"frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
-        values = self._with_parts(values)
         if any(np.iscomplexobj(column) for column in values.values()):
             only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
             raise self._error("", only)
+        values = self._with_parts(values)
         columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
         columns = self._complete(columns)
         columns = {field: self._tared(field, column) for field, column in columns.items()}
@@ -166,7 +166,8 @@ class MappedBlock:
             raise self._error("", Requirement(Mention(MAGNITUDE), f" is below 0, as no magnitude is: {_NO_DECIBELS}"))
         if len(magnitude) != len(phase):
             raise self._error("", Requirement(Mention(MAGNITUDE), " and ", Mention(PHASE), " differ in length"))
-        frf = magnitude * np.exp(1j * np.radians(phase))
+        with np.errstate(all="ignore"):
+            frf = magnitude * np.exp(1j * np.radians(phase))
         return {**rest, "frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
 
     def _refuse_stated_decibels(self) -> None:
@@ -409,8 +410,9 @@ class MappedBlock:
             return {}
         position = np.linspace(-1.0, 1.0, len(force))
         shaken = force - force.mean() - position * (position @ force) / (position @ position)
-        amplitude = float(np.sqrt(2) * shaken.std())
-        if amplitude <= _STILL * float(np.abs(force).max()):
+        with np.errstate(all="ignore"):
+            amplitude = float(np.sqrt(2) * shaken.std())
+        if not _STILL * float(np.abs(force).max()) < amplitude < np.inf:
             return {}
         self.taken["dynamic_force_n"] = f"measured: √2 times the rms of the force about its drift, {amplitude:.4g} N"
         return {"dynamic_force_n": amplitude}
