@@ -45,7 +45,7 @@ def _regression(time: Floats) -> tuple[float, float]:
     """Start and step of the line through the times of all samples; step 0 where there is none."""
     index = np.arange(len(time)) - (len(time) - 1) / 2
     with np.errstate(all="ignore"):
-        step = float(index @ time / max(index @ index, 1.0))
+        step = float(index @ time / max(float(index @ index), 1.0))
         start = float(time.mean()) + step * float(index[0])
     return (start, step) if np.isfinite(step) and np.isfinite(start) else (0.0, 0.0)
 
