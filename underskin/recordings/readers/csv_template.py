@@ -13,8 +13,7 @@ Separator, decimal mark and units are those of the file: `;` and `,` work, `prel
 `sep=;` and lines that begin with `#` are ignored; a line of words below a blank one under the table is a note. A cell
 in quotes may hold the separator. An empty cell of a quantity that a recording has once repeats the one above; an empty
 `id` continues the recording, and so does the same id in every row. A column `conditions.NAME` holds any further
-condition. Surplus cells, repeated fields and recordings that start twice are rejected. Long runs of rows of one id are
-read at once, others row by row.
+condition. Surplus cells, repeated fields and recordings that start twice are rejected.
 """
 
 import cmath
