@@ -2,7 +2,6 @@
 
 import io
 import time
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -13,8 +12,8 @@ from tests.recordings.contents_of_files import contents
 from tests.recordings.test_recordings_cells import ABOVE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.readers import csv_file, text
-from underskin.recordings.readers.cells import PlainRows, RowStyle, Table
+from underskin.recordings.readers import csv_file
+from underskin.recordings.readers.table import Table, plain_numbers
 
 NUMBERS = ("1", "-2.5", "+.5", "7.", "1e-3", "1E5", "nan", "-inf", "Infinity", "−4", "0.1234567890123456789", "1e999")
 OTHERS = ("", " ", "1 2", "1.2.3", "0x10", "1_0", "n/a", "nan(1)", "1e", "-", "1,5", "٣", "12:30", "#3", '"', "a;b")
@@ -22,46 +21,32 @@ CELLS = st.sampled_from([*NUMBERS, *OTHERS]) | st.floats().map(repr) | st.text('
 LINES = st.lists(st.lists(CELLS, max_size=4).map(",".join) | st.lists(CELLS, max_size=4).map(";".join), max_size=12)
 
 
-def by_line(lines: Sequence[str], style: RowStyle) -> dict[int, list[float]]:
-    """The numbers of the rows among some lines, read one by one."""
-    table = Table(0, style.separator, style.decimal, tuple(style.columns), style.width)
-    return {index: row for index, line in enumerate(lines) if (row := table.row(line)) is not None}
+MARKS = st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")])
 
 
-def at_once(lines: Sequence[str], style: RowStyle) -> dict[int, list[float]]:
-    """The same by blocks."""
-    rows = PlainRows(lines, style)
-    return {
-        line + row - start: [float(column[row]) for column in rows.numbers]
-        for line, start, end in rows.runs()
-        for row in range(start, end)
-    }
-
-
-@given(LINES, st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), (" ", "."), (" ", ",")]))
-@example(['"1","2"', '1,"2', '"1",2,"x,y"', "1,2,,,"], (",", "."))
-@example(["1, ", " ,2", "1,"], (",", "."))
-@example(["  1   2 ", "1 2 x", "1"], (" ", "."))
+@given(LINES, MARKS)
+@example(['"1","2"', '1,"2'], (",", "."))
+@example(["1,2", ",2"], (",", "."))
+@example(["1,", "2,3"], (",", "."))
+@example(["1,,2", "3"], (",", "."))
+@example(["1, ", "2,3"], (",", "."))
+@example(["1,-", "+,3"], (",", "."))
 def test_numbers_are_those_of_single_lines(lines: list[str], marks: tuple[str, str]) -> None:
-    style = RowStyle(*marks, (0, 1), 3)
-    if marks[0] in "\t ":
-        lines = [line.replace(",", marks[0]) if marks[1] == "." else line.replace(";", marks[0]) for line in lines]
-    single = by_line(lines, style)
-    for line, row in at_once(lines, style).items():
-        np.testing.assert_array_equal(row, single[line])
+    """Lines that are read at once hold the numbers that each of them has alone."""
+    separator, decimal = marks
+    lines = [line.replace(";", separator) if decimal == "," else line.replace(",", separator) for line in lines]
+    at_once = plain_numbers(lines, separator, decimal, 2)
+    single = [Table(0, separator, decimal, (0, 1), 2).row(line) for line in lines]
+    if at_once is not None:
+        assert None not in single
+        np.testing.assert_array_equal(at_once.reshape(-1, 2), np.array(single, float))
 
 
-def test_all_kinds_of_numbers_are_taken_at_once() -> None:
-    lines = [f"{one},{other}" for one in NUMBERS for other in NUMBERS]
-    assert len(at_once(lines, RowStyle(",", ".", (0, 1), 2))) == len(lines)
-
-
-@pytest.mark.parametrize("cells", [['"a,b"', '"c"'], ["x", '"y"'], ["", "z"]])
-def test_texts_beside_numbers_without_quotes(cells: list[str]) -> None:
-    """Texts beside numbers are without their quotes."""
-    lines = [f"{cell},1,2" for cell in cells]
-    rows = PlainRows(lines, RowStyle(",", ".", (1, 2), 3))
-    assert rows.texts(0, 0, 2) == [text.cells(line, ",")[0] for line in lines]
+@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ",")])
+def test_plain_numbers_are_taken_at_once(separator: str, decimal: str) -> None:
+    numbers = ["1", "-2.5", "+.5", "7.", "1e-3", "1E5", "0.1234567890123456789", "1e999"]
+    lines = [f"{one}{separator}{other}".replace(".", decimal) for one in numbers for other in numbers]
+    assert plain_numbers(lines, separator, decimal, 2) is not None
 
 
 def seconds(lines: list[str]) -> float:

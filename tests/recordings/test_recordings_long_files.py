@@ -13,8 +13,7 @@ from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_file, reading
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers import cells, csv_file
-from underskin.recordings.readers.cells import BlockText
+from underskin.recordings.readers import csv_file, text
 
 RANDOM = np.random.default_rng(20251224)
 VALUES = RANDOM.normal(size=(3, 900)).round(9)
@@ -23,7 +22,7 @@ VALUES = RANDOM.normal(size=(3, 900)).round(9)
 @pytest.fixture(autouse=True)
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A block is a few lines, so that a text of some thousand lines is a long one."""
-    monkeypatch.setattr(cells, "BLOCK_BYTES", 500)
+    monkeypatch.setattr(text, "BLOCK", 500)
     return iter(())
 
 
@@ -172,7 +171,9 @@ def test_column_text_long_table_left_out_told() -> None:
 
 def test_a_line_longer_than_a_block_is_whole() -> None:
     line = "x" * 5000
-    assert list(BlockText(io.BytesIO(f"a\r\n{line}\rb\n".encode()), "a").lines()) == ["a", line, "b", ""]
+    blocks = list(text.blocks(text.content(io.BytesIO(f"a\r\n{line}\rb\n".encode()), "a")))
+    assert [whole for _, lines in blocks for whole in lines] == ["a", line, "b", ""]
+    assert [first for first, _ in blocks] == [0, 2]
 
 
 def test_text_without_table_says_line_holds() -> None:

@@ -51,7 +51,7 @@ def _lines(content: bytes, name: str) -> tuple[list[Line], str]:
         raise errors.unreadable(_FIELD, name, f"must be a readable CSV file ({error.place}: {error.reason})") from None
     separator = next((sign for sign in ("\t", ";") if sign in document), ",")
     numbered = [(number, _cells(line, separator, number, name)) for number, line in enumerate(text.lines(document), 1)]
-    decimal = text.decimal_mark(lambda _: [cells for _, cells in numbered], separator)
+    decimal = text.decimal_mark((cells for _, cells in numbered), separator)
     return [(number, cells) for number, cells in numbered if any(cells)], decimal
 
 

@@ -113,7 +113,7 @@ def from_csv(data: bytes, field_names: Collection[str]) -> CsvColumns:
     result = CsvColumns({}, {}, {}, table.notes)
     columns = table.columns()
     values = [cells for heading, cells in zip(table.header, columns, strict=True) if not _is_named_label(heading)]
-    decimal = text.decimal_mark(lambda _: values, table.separator)
+    decimal = text.decimal_mark(values, table.separator)
     polar = (MAGNITUDE, PHASE) if REAL in field_names else ()
     parts: dict[str, CsvColumn] = {}
     meanings = template_columns.fields_of(table.header, field_names)

@@ -9,9 +9,11 @@
       force_n: {channel: Corrected_Force(N), sign: -1}
 
 `skin` and `recording` hold campaign fields common to all files; `{property: ...}` takes one from the properties that
-the file or the block states. `channels` maps each campaign field to a channel and its conversion, `curves` says how the
-curves of a file are separated, `estimator` how FRFs are estimated from time series (H1, H2 or Hv), `derived` defines
-channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each curve.
+the file or the block states. `channels` maps each campaign field to a channel and its conversion; a list of channels is
+one, one after the other. `recordings` lists the fields and channels of several recordings in the same rows (a column a
+sensor). `curves` says how the curves of a file are separated, `estimator` how FRFs are estimated from time series (H1,
+H2 or Hv), `derived` defines channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each
+curve.
 
 Also here: the values of properties, converted to the unit of their campaign field.
 """
@@ -44,7 +46,7 @@ from underskin.recordings.readers.expressions import Expression
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.validation import mapping, named, shown
-from underskin.several_errors import SeveralInvalid, all_of, noting
+from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
 from underskin.units import LAB
 
 _FULL_PERCENT = 100.0  # %
@@ -134,8 +136,8 @@ _TARED = ("force_n", "charge_pc", "displacement_mm")
 _OF_CURVES = ("displacement_mm", "force_n")
 CURVE_EXTENTS = ("file", "groups")  # what may make one curve, besides values of a channel
 _FIELDS = (
-    *("schema", "name", "kind", "skin", "recording", "derived", "channels", "curves", "trim", "estimator"),
-    "units_checked",
+    *("schema", "name", "kind", "units_checked", "skin", "recording", "recordings"),
+    *("derived", "channels", "curves", "trim", "estimator"),
 )
 _Model = TypeVar("_Model")
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
@@ -177,7 +179,8 @@ class Trim:
 class RigDescription:
     """A rig: the kind of its recordings, the fields common to them, the mapping of channels, and what makes one curve:
     `"file"`, `"groups"`, a channel that separates curves, or None (each block is one). `derived` holds formulas by the
-    names of the channels that they define, in their order. `document` is as given."""
+    names of the channels that they define, in their order; `joined` the channels that are joined to one, by its name.
+    `entries` are the descriptions of each of several recordings in the same rows. `document` is as given."""
 
     kind: str
     skin: Mapping[str, Any]
@@ -189,10 +192,13 @@ class RigDescription:
     estimator: Estimator | None = None
     derived: Mapping[str, Expression] = dataclasses.field(default_factory=dict)
     trim: Trim | None = None
+    joined: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
+    entries: "tuple[RigDescription, ...]" = ()
 
     def with_recording(self, values: Mapping[str, Any]) -> "RigDescription":
         """The rig description with some fields of the recordings set for one file; `document` is unchanged."""
-        return dataclasses.replace(self, recording={**self.recording, **values})
+        entries = tuple(entry.with_recording(values) for entry in self.entries)
+        return dataclasses.replace(self, recording={**self.recording, **values}, entries=entries)
 
 
 def parse(data: bytes, file: str) -> RigDescription:
@@ -214,16 +220,21 @@ def parse(data: bytes, file: str) -> RigDescription:
 def from_dict(document: Any) -> RigDescription:
     """The rig description of a document; raises SeveralInvalid with all invalid fields."""
     document = field.of_schema("rig description", document, SCHEMA, _FIELDS)
+    if "recordings" in document:
+        return _with_entries(document)
     kind, get = document.get("kind", "frf"), document.get
     if not isinstance(kind, str) or kind not in KINDS:
         raise not_one_of("kind", shown(kind), KINDS)
     of_skin = {model_field.name for model_field in fields(SkinDescription)}
     of_recording = {model_field.name for model_field in fields(KINDS[kind])} - {"kind", "estimator"}
+    given_channels, joined = _joined(get("channels"), kind)
     readings: dict[str, Callable[[], Any]] = {
         "name": lambda: field.name("name", get("name", SCHEMA), False),
-        "skin": lambda: _require_known_fields("skin", get("skin"), of_skin),
-        "recording": lambda: _recording(_require_known_fields("recording", get("recording", {}), of_recording)),
-        "channels": lambda: _channels(_require_known_fields("channels", get("channels"), channel_fields(kind))),
+        "skin": lambda: _stated_by_file("skin", _require_known_fields("skin", get("skin"), of_skin)),
+        "recording": lambda: _stated_by_file(
+            "recording", _require_known_fields("recording", get("recording", {}), of_recording)
+        ),
+        "channels": lambda: _channels(_require_known_fields("channels", given_channels, channel_fields(kind))),
         "units_checked": lambda: field.flag("units_checked", get("units_checked", False), False),
         "curves": lambda: _curves(get("curves")),
         "estimator": lambda: _estimator(get("estimator"), get("channels")),
@@ -232,9 +243,33 @@ def from_dict(document: Any) -> RigDescription:
     }
     values = all_of(readings)
     del values["name"]  # that of the document
-    rig = RigDescription(kind=kind, document=document, **values)
+    rig = RigDescription(kind=kind, document=document, joined=joined, **values)
     all_of({name: partial(_check_automatic_sign, rig, name) for name in rig.channels})
     return rig
+
+
+def _with_entries(document: Mapping[str, Any]) -> RigDescription:
+    """The rig description of several recordings in the same rows: the fields and channels of each entry of `recordings`
+    add to those common to all."""
+    given = document["recordings"]
+    if not isinstance(given, list) or not given:
+        raise too_few("recordings", shown(given), "must be a list of recordings, such as {sensor: s01, channels: {…}}")
+    common = {name: value for name, value in document.items() if name != "recordings"}
+
+    def merged(place: str, entry: Any) -> RigDescription:
+        fields_of_entry = dict(mapping(place, entry))
+        channels = mapping(f"{place}.channels", fields_of_entry.pop("channels", {}))
+        recording = {**mapping("recording", common.get("recording", {})), **fields_of_entry}
+        both = {**mapping("channels", common.get("channels", {})), **channels}
+        try:
+            return from_dict({**common, "recording": recording, "channels": both})
+        except InvalidInput as error:
+            raise SeveralInvalid([one.at(f"{place}: {one.field}") for one in errors_of(error)]) from None
+
+    places = [f"recordings[{index}]" for index in range(len(given))]
+    entries = all_of({place: partial(merged, place, entry) for place, entry in zip(places, given, strict=True)})
+    first = entries[places[0]]
+    return dataclasses.replace(first, document=document, entries=tuple(entries.values()))
 
 
 def channel_fields(kind: str) -> set[str]:
@@ -259,11 +294,35 @@ def _require_known_fields(prefix: str, document: Any, field_names: set[str]) -> 
     return mapping(prefix, document)
 
 
-def _recording(given: Mapping[str, Any]) -> Mapping[str, Any | Property]:
+def _joined(channels: Any, kind: str) -> tuple[Any, dict[str, tuple[str, ...]]]:
+    """The channels with one name in place of each list of channels, and these lists by their names."""
+    joined: dict[str, tuple[str, ...]] = {}
+
+    def named_once(value: Any, place: str) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        plain = {key: named_once(item, f"{place}.{key}") for key, item in value.items()}
+        parts = plain.get("channel")
+        if not isinstance(parts, list):
+            return plain
+        if kind == "frf":
+            raise conflicting(f"{place}.channel", shown(parts), "is for curves: an FRF has one channel for each field")
+        if len(parts) < 2:
+            raise too_few(f"{place}.channel", shown(parts), "must be a name, or a list of two or more")
+        names = tuple(field.name(f"{place}.channel[{index}]", part, False) for index, part in enumerate(parts))
+        name = " and ".join(names)[: field.LONGEST_NAME]
+        joined[name] = names
+        return {**plain, "channel": name}
+
+    return named_once(channels, "channels"), joined
+
+
+def _stated_by_file(prefix: str, given: Mapping[str, Any]) -> Mapping[str, Any | Property]:
+    """The fields, with a Property for each whose value the file states."""
     stated = {
-        name: partial(_built, Property, f"recording.{name}", value)
+        name: partial(_built, Property, f"{prefix}.{name}", value)
         for name, value in given.items()
-        if isinstance(value, Mapping)
+        if isinstance(value, Mapping) and name != "tolerances"
     }
     return {**given, **all_of(stated)}
 
@@ -428,7 +487,7 @@ def spring_constant(value: float | Property, stated: Stated, file: str) -> float
 
 def _number(given: str | float) -> float | None:
     """A number as written, with a decimal point or comma; None where a comma may separate thousands."""
-    return text.number(given, text.decimal_mark(lambda _: [[given]], "\t")) if isinstance(given, str) else given
+    return text.number(given, text.decimal_mark([[given]], "\t")) if isinstance(given, str) else given
 
 
 def _property_value(value: Property, stated: Stated, file: str) -> str | float:

@@ -1,15 +1,13 @@
 """From an instrument's channels to a campaign document, by a rig description.
 
-Channels that were started at different times are cut to their common samples (`aligned`); the blocks of a file are
-split into curves (`curve_parts`); `MappedBlock` converts the channels of one block to the fields of one recording, in
-the fields' units, and says in words what it used; `apply` does all of it for a file.
+The blocks of a file are split into curves (`curve_parts`); `MappedBlock` converts the channels of one block to the
+fields of one recording, in the fields' units, and says in words what it used; `apply` does all of it for a file.
 """
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
 from pathlib import PurePath
 from typing import Any
 
@@ -18,17 +16,26 @@ import numpy as np
 from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
+from underskin.recordings.common_samples import aligned, with_joined
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.channel_arithmetic import FIELD
 from underskin.recordings.readers.unit_labels import (
     DECIBEL,
     contradicts,
+    decibel_reference,
     exponents,
     field_unit,
     meanings,
     ratio_of,
     unit,
+)
+from underskin.recordings.regular_samples import (
+    complete_lines,
+    evenly_sampled,
+    longest_complete,
+    mean_step,
+    sorted_spectrum,
 )
 from underskin.recordings.rig_description import (
     AUTOMATIC,
@@ -65,23 +72,6 @@ def range_of(field: str, column: Floats) -> str:
     return readable(field, float(finite.min()), float(finite.max()))
 
 
-_JITTER = 0.01  # of a sample: more is not evenly sampled
-
-
-def mean_step(time: Floats) -> float:
-    """The mean step between samples, in the unit of `time`."""
-    with np.errstate(all="ignore"):
-        return float((time[-1] - time[0]) / max(len(time) - 1, 1))
-
-
-def even_rate(time: Floats) -> float | None:
-    """Samples per unit of `time`; None where it is not evenly spaced and rising."""
-    step = mean_step(time)
-    with np.errstate(all="ignore"):
-        jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
-    return 1 / step if step > 0 and jitter <= _JITTER * step else None
-
-
 _LEAST_TARED = 16  # samples needed for a level and its noise
 _NOISES = 8.0  # least rise, in standard deviations of a sample's noise
 _LEAST_RISE = 3e-3  # least rise, of the range of the whole curve
@@ -116,7 +106,7 @@ def rise_of(column: Floats, count: int) -> Rise | None:
 _PERCENT = 100.0
 _OF_UNIT = re.compile(r"unit|einheit|scale|skala|format|amplitude", re.IGNORECASE)
 _SAME_RATE = 1e-3  # relative
-_NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
+_NO_DECIBELS = "decibels are a logarithm: state their reference as the unit, such as dB re 1 pC/N, or the ratio itself"
 _LEAST_SAMPLES, _STILL = 16, 1e-9  # samples of a measured force; share of its largest value that is rounding
 
 
@@ -138,11 +128,12 @@ class MappedBlock:
         if COMPLEX_FRF in values:
             frf = values.pop(COMPLEX_FRF)
             values |= {"frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
-        values = self._with_parts(values)
         if any(np.iscomplexobj(column) for column in values.values()):
             only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
             raise self._error("", only)
+        values = self._with_parts(values)
         columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
+        columns = self._complete(columns)
         columns = {field: self._tared(field, column) for field, column in columns.items()}
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
@@ -153,6 +144,16 @@ class MappedBlock:
         if rate is not None and "time_s" not in columns:
             columns["time_s"] = np.arange(len(columns[next(iter(columns))])) / rate
         return columns
+
+    def _complete(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        """The columns without lines, or parts of a time series, that hold no number."""
+        is_series = self.rig.kind == "frf" and "frequency_hz" not in columns
+        try:
+            complete, note = (longest_complete if is_series else complete_lines)(columns)
+        except ValueError as error:
+            raise self._error("", str(error)) from None
+        self.warnings += [note] if note else []
+        return complete
 
     def _with_parts(self, values: Mapping[str, Values]) -> dict[str, Values]:
         """The columns with real and imaginary part instead of magnitude and phase."""
@@ -165,11 +166,16 @@ class MappedBlock:
             raise self._error("", Requirement(Mention(MAGNITUDE), f" is below 0, as no magnitude is: {_NO_DECIBELS}"))
         if len(magnitude) != len(phase):
             raise self._error("", Requirement(Mention(MAGNITUDE), " and ", Mention(PHASE), " differ in length"))
-        frf = magnitude * np.exp(1j * np.radians(phase))
+        with np.errstate(all="ignore"):
+            frf = magnitude * np.exp(1j * np.radians(phase))
         return {**rest, "frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
 
     def _refuse_stated_decibels(self) -> None:
         """Reject a magnitude where a property of the file, such as `Y-axis unit: dB`, states decibels."""
+        mapping = self.rig.channels[MAGNITUDE]
+        channel = self.block.headed(mapping.channel)
+        if decibel_reference(mapping.unit or (channel.label if channel else "")) is not None:
+            return
         for name, value in self.stated.items():
             stated_unit = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
             if stated_unit is not None and stated_unit.dimension == DECIBEL:
@@ -214,12 +220,26 @@ class MappedBlock:
             return channel.values / (_PERCENT if in_percent else 1.0), repr(channel.name)
         target = "frf_re_pc_per_n" if field in (COMPLEX_FRF, MAGNITUDE) else field
         label = self._true_unit(channel, mapping, "angle" if field == PHASE else field_unit(target).dimension)
-        scale = self._degrees(label, place) if field == PHASE else self._scale(target, label, mapping, place)
+        values = channel.values
+        reference = decibel_reference(label) if field == MAGNITUDE else None
+        if reference is not None:
+            values = self._ratio(channel, reference, place)
+        scale = (
+            self._degrees(label, place) if field == PHASE else self._scale(target, reference or label, mapping, place)
+        )
         through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
         sign = self._automatic_sign(mapping) if mapping.sign == AUTOMATIC else int(mapping.sign or 1)
         turned = ", turned round" if sign == -1 else ""
         with np.errstate(all="ignore"):
-            return channel.values * sign * scale, f"{channel.name!r} in {label}{through}{turned}"
+            return values * sign * scale, f"{channel.name!r} in {label}{through}{turned}"
+
+    def _ratio(self, channel: Channel, reference: str, place: str) -> Values:
+        """The ratio to the reference that decibels state; raises FileError where the label states another one."""
+        labelled = decibel_reference(channel.label)
+        if labelled is not None and unit(labelled) != unit(reference):
+            raise self._error(place, f"is labelled {channel.label!r}, not decibels re {reference}")
+        with np.errstate(all="ignore"):
+            return 10 ** (channel.values / 20)
 
     def _automatic_sign(self, mapping: SignalMapping) -> int:
         """-1 where a channel falls during loading: determined from the raw channels, so that travel and deflection are
@@ -369,6 +389,8 @@ class MappedBlock:
         """Without the line at 0 Hz; time series with their sample rate."""
         time = given.get("time_s")
         columns = {name: column for name, column in given.items() if name != "time_s"}
+        if "frequency_hz" in columns:
+            columns = self._sorted(columns)
         frequency = columns.get("frequency_hz")
         if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
             self.warnings.append("the line at 0 Hz is left out")
@@ -376,7 +398,8 @@ class MappedBlock:
         rate = self.block.sample_rate_hz if time is None else None
         stated = self.rig.recording.get("sample_rate_hz")
         if "force_n" in columns and stated is None:
-            rate = rate if time is None else self._rate(time)
+            if time is not None:
+                columns, rate = self._evenly_sampled(columns, time)
             columns |= {} if rate is None else {"sample_rate_hz": rate}
         elif (
             rate is not None and isinstance(stated, int | float) and not math.isclose(rate, stated, rel_tol=_SAME_RATE)
@@ -394,17 +417,28 @@ class MappedBlock:
             return {}
         position = np.linspace(-1.0, 1.0, len(force))
         shaken = force - force.mean() - position * (position @ force) / (position @ position)
-        amplitude = float(np.sqrt(2) * shaken.std())
-        if amplitude <= _STILL * float(np.abs(force).max()):
+        with np.errstate(all="ignore"):
+            amplitude = float(np.sqrt(2) * shaken.std())
+        if not _STILL * float(np.abs(force).max()) < amplitude < np.inf:
             return {}
         self.taken["dynamic_force_n"] = f"measured: √2 times the rms of the force about its drift, {amplitude:.4g} N"
         return {"dynamic_force_n": amplitude}
 
-    def _rate(self, time: Floats) -> float:
-        rate = even_rate(time)
-        if rate is None:
-            raise self._error("time_s", f"samples are not evenly spaced (step {shown(mean_step(time))} s)")
-        return rate
+    def _sorted(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        try:
+            spectrum, notes = sorted_spectrum(columns)
+        except ValueError as error:
+            raise self._error("frequency_hz", str(error)) from None
+        self.warnings += notes
+        return spectrum
+
+    def _evenly_sampled(self, columns: Mapping[str, Floats], time: Floats) -> tuple[dict[str, Floats], float]:
+        try:
+            even, rate, note = evenly_sampled(columns, time)
+        except ValueError as error:
+            raise self._error("time_s", f"{error} (step {shown(mean_step(time))} s)") from None
+        self.warnings += [note] if note else []
+        return even, rate
 
     def _error(self, place: str, reason: str | Requirement) -> FileError:
         return FileError(self.file, place, reason)
@@ -412,81 +446,6 @@ class MappedBlock:
 
 def _centred(column: Floats) -> Floats:
     return column - column.mean()
-
-
-_OFF_SAMPLE = 0.05  # of a step: at half the rate a phase of 9°, and Re FRF 1.2 % too small
-_LEAST_COMMON = 2  # samples in common
-
-
-def aligned(contents: Contents, names: Collection[str], file: str) -> Contents:
-    """The contents with the named channels cut to their common samples in every block, by the stated start times; with
-    a warning.
-
-    Raises FileError that names both channels where their rates differ, or their starts differ by fractions of a sample.
-    """
-    blocks, warnings = [], list(contents.warnings)
-    for block in contents.blocks:
-        used = {channel.name: channel for name in names if (channel := block.headed(name)) is not None}
-        rate = _common_rate(list(used.values()), file)
-        with_rate = block if rate is None else replace(block, sample_rate_hz=rate)
-        if len({channel.starts_s for channel in used.values()}) < 2:
-            blocks.append(with_rate)
-            continue
-        cut, cut_warnings = _cut_to_common(with_rate, used, file)
-        blocks.append(cut)
-        warnings += cut_warnings
-    return replace(contents, blocks=tuple(blocks), warnings=tuple(dict.fromkeys(warnings)))
-
-
-def _common_rate(used: list[Channel], file: str) -> float | None:
-    sampled = {channel.sample_rate_hz: channel for channel in used if channel.sample_rate_hz is not None}
-    if len(sampled) > 1:
-        (first, channel), (second, later), *_ = sampled.items()
-        reason = f"{channel.name!r} has {first:g} samples a second, {later.name!r} {second:g}: they must have one rate"
-        raise FileError(file, "", reason)
-    return next(iter(sampled), None)
-
-
-def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[Block, list[str]]:
-    """The block with the used channels cut, and a warning; unchanged where they start within one sample."""
-    first, last = min(used.values(), key=_starts_s), max(used.values(), key=_starts_s)
-    start_times = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
-    if block.sample_rate_hz is None:
-        raise FileError(file, "", f"{start_times}, and no sample rate is stated by which to align them")
-    late = {name: (last.starts_s - channel.starts_s) * block.sample_rate_hz for name, channel in used.items()}
-    skipped = {name: round(samples) for name, samples in late.items()}
-    odd = next((name for name in used if abs(late[name] - skipped[name]) > _OFF_SAMPLE), None)
-    if odd is not None:
-        reason = f"that is {late[odd]:.4g} samples: they can be aligned by whole samples alone"
-        raise FileError(file, "", f"{start_times}: {reason}; resample one of them, or correct the times")
-    if not any(skipped.values()):
-        return block, []
-    count = min(len(channel.values) - skipped[name] for name, channel in used.items())
-    if count < _LEAST_COMMON:
-        raise FileError(file, "", f"{start_times}: they have no samples in common")
-    channels = tuple(
-        replace(channel, values=channel.values[skipped[channel.name] : skipped[channel.name] + count])
-        if channel.name in used
-        else channel
-        for channel in block.channels
-    )
-    warning = f"{start_times}: they were aligned, with {count} samples in common"
-    return replace(block, channels=channels), [warning]
-
-
-def _starts_s(channel: Channel) -> float:
-    return channel.starts_s
-
-
-def _time(block: Block, channel: Channel) -> str:
-    """The start time of a channel, or its delay after the first where the file states no time."""
-    if block.recorded_at is None:
-        return f"{channel.starts_s:g} s"
-    try:
-        moment = datetime.fromisoformat(block.recorded_at) + timedelta(seconds=channel.starts_s)
-    except OverflowError:
-        return f"{channel.starts_s:g} s after {block.recorded_at}"
-    return moment.isoformat().replace("+00:00", "Z")
 
 
 _MOST_CURVES = 1000  # of a block
@@ -570,21 +529,37 @@ class MappedFile:
 
 
 def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
-    """The campaign document, one recording for each curve in a block that holds the rig's channels.
+    """The campaign document, one recording for each curve in a block that holds the rig's channels, and for each of the
+    rig's entries, called after its sensor or its number.
 
     Raises FileError that names the channel or property that is missing or whose unit does not fit.
     """
+    if not rig.entries:
+        return _applied(rig, contents, file)
+    mapped = [_applied(entry, contents, file) for entry in rig.entries]
+    sensors = [entry.recording.get("sensor") for entry in rig.entries]
+    are_distinct = all(isinstance(sensor, str) and sensors.count(sensor) == 1 for sensor in sensors)
+    names = [_printable(str(sensor if are_distinct else number)) for number, sensor in enumerate(sensors, start=1)]
+    recordings = [
+        recording if "id" in entry.recording else {**recording, "id": _label(recording["id"], name)}
+        for entry, name, of_entry in zip(rig.entries, names, mapped, strict=True)
+        for recording in of_entry.document["recordings"]
+    ]
+    warnings = dict.fromkeys(warning for of_entry in mapped for warning in of_entry.warnings)
+    return MappedFile({**mapped[0].document, "recordings": recordings}, list(warnings), mapped[0].taken)
+
+
+def _applied(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     in_formulas = [name for formula in rig.derived.values() for name in formula.names]
     contents = aligned(contents, dict.fromkeys([*_channel_names(rig), *in_formulas]), file)
-    contents = channel_arithmetic.with_derived(
-        contents, rig.derived, lambda part: _stated(contents, part, part.name), file
-    )
+    contents = _with_derived(rig, contents, file)
     blocks = _with_channels(rig, contents, file)
     warnings = [*contents.warnings, *doubts(contents, rig.curves)]
     if len(blocks) < len(contents.blocks):
         warnings.append(f"{len(contents.blocks) - len(blocks)} parts without the rig's channels are left out")
     stem = _printable(PurePath(file).stem)
     recordings = []
+    skins: list[dict[str, Any]] = []
     taken: dict[str, str] = {"": contents.layout} if contents.layout else {}
     curves = curve_parts(blocks, rig.curves, file)
     parts = [(_trimmed(block, rig.trim, file), block_name) for block, block_name in curves]
@@ -594,6 +569,7 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
         stated = _stated(contents, block, block_name)
         common = {name: common_value(name, value, stated, file) for name, value in rig.recording.items()}
+        skins.append({name: common_value(name, value, stated, file) for name, value in rig.skin.items()})
         recorded_at = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
         mapped = MappedBlock(rig, block, stated, file)
         estimated = {} if rig.estimator is None else {"estimator": rig.estimator}
@@ -601,19 +577,27 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         recordings.append({**identity, **mapped.spring(), **common, **mapped.fields()})
         warnings += mapped.warnings
         taken |= {name: how for name, how in mapped.taken.items() if name not in taken}
-    document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}
+    for name in (name for name in rig.skin if any(skin[name] != skins[0][name] for skin in skins)):
+        values = " and ".join(dict.fromkeys(str(shown(skin[name])) for skin in skins))
+        raise FileError(file, f"skin.{name}", f"parts of the file state {values}: all must be of one skin")
+    document = {"schema": SCHEMA, "name": stem, "skin": skins[0], "recordings": recordings}
     return MappedFile({**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings)), taken)
 
 
 def has_channels(rig: RigDescription, contents: Contents) -> bool:
     """Whether a part of a file holds every channel that the rig names, or can derive."""
     try:
-        derived = channel_arithmetic.with_derived(
-            contents, rig.derived, lambda block: _stated(contents, block, block.name), ""
-        )
-        return bool(_with_channels(rig, derived, ""))
+        return all(_with_channels(one, _with_derived(one, contents, ""), "") for one in rig.entries or (rig,))
     except FileError:
         return False
+
+
+def _with_derived(rig: RigDescription, contents: Contents, file: str) -> Contents:
+    """The contents with the channels that the rig joins or derives."""
+    contents = with_joined(contents, rig.joined, file)
+    return channel_arithmetic.with_derived(
+        contents, rig.derived, lambda block: _stated(contents, block, block.name), file
+    )
 
 
 def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[Block]:

@@ -14,7 +14,7 @@ from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, Recording, SkinDescription
 from underskin.recordings.channels import Channel, Contents
 from underskin.recordings.readers.unit_labels import unit
-from underskin.recordings.rig_mapping import even_rate
+from underskin.recordings.regular_samples import even_rate
 from underskin.units import to_lab
 
 MOST_LISTED = 60

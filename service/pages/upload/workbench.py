@@ -36,7 +36,7 @@ def sign_of(text: str) -> int | str | None:
 
 def rows(document: Mapping[str, Any]) -> list[tuple[str, Any, str]]:
     """Name, formula and field of each derived channel, and some empty rows."""
-    by_channel = {how.get("channel"): field for field, how in document.get("channels", {}).items()}
+    by_channel = {str(how.get("channel")): field for field, how in document.get("channels", {}).items()}
     derived = document.get(FIELD) or {}
     return [*((name, text, by_channel.get(name, "")) for name, text in derived.items()), *[("", "", "")] * _ROWS_FREE]
 
@@ -72,7 +72,7 @@ def with_derived(
     before = base.get("channels", {})
     if f"{FIELD}-formula-0" not in form:
         derived = base.get(FIELD) or {}
-        return {**channels, **{field: how for field, how in before.items() if how.get("channel") in derived}}
+        return {**channels, **{field: how for field, how in before.items() if str(how.get("channel")) in derived}}
     result = dict(channels)
     for number in _rows_in(form):
         field = form.get(f"{FIELD}-is-{number}", "")
@@ -136,7 +136,7 @@ def with_guesses(document: Mapping[str, Any], base: Mapping[str, Any], guess: Ma
     again = {
         field: guess["channels"][field]
         for field, how in base.get("channels", {}).items()
-        if how.get("channel") in cleared and field not in channels and field in guess["channels"]
+        if str(how.get("channel")) in cleared and field not in channels and field in guess["channels"]
     }
     return {**document, "channels": {**again, **channels}}
 

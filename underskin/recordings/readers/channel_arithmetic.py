@@ -200,7 +200,7 @@ class _Derivation:
             self._labels.append(label)
             return in_unit(channel.values, label)
         given = self.stated[name]
-        number = text.number(given, text.decimal_mark(lambda _: [[given]], "\t")) if isinstance(given, str) else given
+        number = text.number(given, text.decimal_mark([[given]], "\t")) if isinstance(given, str) else given
         if number is None:
             raise self._error(f"{name}: the file states {given!r:.{LONGEST_NAME}}, which is no number")
         return in_unit(number, self._unit(name, labelled_unit(name), stated_unit))

@@ -1,25 +1,25 @@
 """Tables that instruments write as text: lines about the measurement, a line of headings, rows of numbers.
 
-Rows and headings are found by cells.py and tables.py. Headings name the channels and, in brackets or after the last
-underscore, their units. Columns of text are left out with a warning. Lines above the headings and under the numbers
-with a name and a value become properties, unless the name has two values. Where the headings are repeated, a new block
-starts. A cell in quotes may hold the separator. See Also csv_template.py, the template of this package.
+Rows are found by table.py, names and units by headings.py. Columns of text are left out with a warning. Lines above the
+headings and under the numbers with a name and a value become properties, unless the name has two values. Where the
+headings are repeated, a new block starts. See Also csv_template.py, the template of this package.
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import BinaryIO
 
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
-from underskin.recordings.readers import cells as table_rows
-from underskin.recordings.readers import tables, text
-from underskin.recordings.readers.cells import BLANKS, BlockText, Table
-from underskin.recordings.readers.tables import Headings, Lines, Section, SectionReader
+from underskin.recordings.readers import headings, text
+from underskin.recordings.readers import table as tables
+from underskin.recordings.readers.headings import Headings
+from underskin.recordings.readers.table import BLANKS, Lines, RowReader, Section, Table
 from underskin.recordings.readers.unit_labels import unit
 
 _STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*)")
 _WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s\d].*)")
+_NAME_AND_UNIT = re.compile(r"(?P<name>[^,:=]+),\s*(?P<unit>[^,:=\s]+)\s*[:=]\s*(?P<value>[^\s:=].*)")  # X, um: 25
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
 _SHOWN = 30  # letters of a cell in a message
@@ -32,14 +32,18 @@ class NoTable(FileError):
 
 def read(stream: BinaryIO, file: str) -> Contents:
     """The channels of a text table; raises FileError that names the line, NoTable where there is no table."""
-    source = BlockText(stream, file)
-    head, table = _table(source, file)
-    headings = tables.find(head, table, file)
-    repeated = frozenset(head[line].strip() for line in headings.lines)
-    reader = SectionReader(table, repeated, file)
-    reader.take_all(source)
+    return of_text(text.content(stream, file), file)
+
+
+def of_text(written: str, file: str) -> Contents:
+    """The channels of a text table with line feeds as line ends; raises as `read`."""
+    head, table = _table(written, file)
+    found = headings.find(head, table, file)
+    repeated = frozenset(head[line].strip() for line in found.lines)
+    reader = RowReader(table, repeated, file)
+    reader.take_all(written)
     _refuse_other_rows(head[: table.start], reader.under, table, file)
-    column_warnings = _text_column_warnings(reader, table, headings, file)
+    column_warnings = [*_text_column_warnings(reader, table, found, file), *_overload_warnings(reader, found)]
     above, *between, under = (
         [line for line in lines if line.strip() not in repeated]
         for lines in (
@@ -52,25 +56,24 @@ def read(stream: BinaryIO, file: str) -> Contents:
     blocks = []
     for number, (section, section_lines) in enumerate(zip(reader.sections, [above, *between], strict=True), start=1):
         name = str(number) if len(reader.sections) > 1 else ""
-        blocks.append(Block(name, _channels(table, headings, section), group_starts=section.group_starts))
+        blocks.append(Block(name, _channels(table, found, section), group_starts=section.group_starts))
         if name:
             section_properties, _ = _properties(section_lines, table)
             properties |= {f"{name}.{name_in_section}": value for name_in_section, value in section_properties.items()}
-    return Contents(tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, headings, reader.sections))
+    return Contents(tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, found, reader.sections))
 
 
-def _table(source: BlockText, file: str) -> tuple[Sequence[str], Table]:
+def _table(written: str, file: str) -> tuple[Sequence[str], Table]:
     """The lines at the start, and the table whose rows start among them; the style of a long file follows from sampled
     lines."""
-    blocks = source.blocks()
-    head = next(blocks).split("\n")
-    sample = [line for block in blocks for line in block.split("\n", _SAMPLED)[:_SAMPLED]]
-    if sample:
-        head = head[:_HEAD]
-    table = table_rows.find([*head, *sample])
+    blocks = text.blocks(written)
+    _, first = next(blocks)
+    head = first[:_HEAD]
+    sample = [*first[_HEAD:][-_SAMPLED:], *(line for _, block in blocks for line in block[:_SAMPLED])]
+    table = tables.find([*head, *sample])
     if sample and (table is None or table.start >= len(head)):
-        head = list(source.lines())
-        table = table_rows.find(head)
+        head = written.split("\n")
+        table = tables.find(head)
     if table is None:
         raise NoTable(file, "", _no_table(head))
     return head, table
@@ -78,7 +81,7 @@ def _table(source: BlockText, file: str) -> tuple[Sequence[str], Table]:
 
 def _no_table(lines: Sequence[str]) -> str:
     """The message that there is no table, and what the text holds instead."""
-    most, index = table_rows.most_numbers(lines)
+    most, index = tables.most_numbers(lines)
     line = next(number for number, line in enumerate(lines) if line.strip() or number == len(lines) - 1)
     example = (
         f"line {index + 1} holds most, {most}: {lines[index][:_SHOWN]!r}"
@@ -88,9 +91,9 @@ def _no_table(lines: Sequence[str]) -> str:
     return f"holds no table, two rows of at least two numbers each: {example}; names go into the CSV template"
 
 
-def _channels(table: Table, headings: Headings, section: Section) -> tuple[Channel, ...]:
-    names = [headings.names[column] for column in table.columns]
-    columns = section.columns()
+def _channels(table: Table, found: Headings, section: Section) -> tuple[Channel, ...]:
+    names = [found.names[column] for column in table.columns]
+    columns = section.columns(table)
     return with_distinct_names([Channel(*name, column) for name, column in zip(names, columns, strict=True)])
 
 
@@ -99,33 +102,39 @@ def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: s
     for index, line in under:
         first = line.strip().partition(table.separator)[0].strip().strip('"')
         if text.number(first, table.decimal) is not None:
-            raise table_rows.no_row(index, line, table, file)
+            raise tables.no_row(index, line, table, file)
     for index, line in enumerate(above):
         cells = [cell.replace(",", "") if text.is_grouped(cell) else cell for cell in table.cells(line)]
-        if len(cells) == table.width and all(text.number(cell, table.decimal) is not None for cell in cells):
-            raise table_rows.no_row(index, line, table, file)
+        if len(cells) > max(table.columns) and all(text.number(cell, table.decimal) is not None for cell in cells):
+            raise tables.no_row(index, line, table, file)
 
 
-def _text_column_warnings(reader: SectionReader, table: Table, headings: Headings, file: str) -> list[str]:
+def _text_column_warnings(reader: RowReader, table: Table, found: Headings, file: str) -> Iterator[str]:
     """Messages on columns of text; raises FileError where one holds numbers in most rows."""
-    warnings = []
-    for column, text_column in reader.texts.items():
-        if text_column.first is not None and text_column.count < reader.count / 2:
-            raise table_rows.no_row(*text_column.first, table, file)
-        if text_column.example:
-            name = headings.names[column][0]
-            warnings.append(f"column {name!r} holds text, such as {text_column.example[:_SHOWN]!r}, and is left out")
-    return warnings
+    for column, seen in reader.texts.items():
+        if seen.first is not None and seen.count < reader.count / 2:
+            raise tables.no_row(*seen.first, table, file)
+        if seen.example:
+            name = found.names[column][0]
+            yield f"column {name!r} holds text, such as {seen.example[:_SHOWN]!r}, and is left out"
 
 
-def _layout(table: Table, headings: Headings, sections: Sequence[Section]) -> str:
+def _overload_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
+    """Messages on values that an instrument marked as beyond its range."""
+    for column, seen in reader.overloads.items():
+        assert seen.first is not None
+        cells = f"{seen.count} cells of column {found.names[column][0]!r} hold {seen.example[:_SHOWN]!r}"
+        yield f"{cells}, the first on line {seen.first[0] + 1}: overloads, which are no numbers and are left out"
+
+
+def _layout(table: Table, found: Headings, sections: Sequence[Section]) -> str:
     """How the file was read, in words."""
     first, last = sections[0].first + 1, sections[-1].last + 1
     numbers = f"rows of {len(table.columns)} numbers from line {first} to {last}"
     written = f"separated by {_SEPARATOR_WORDS[table.separator]}, with decimal {_DECIMAL_WORDS[table.decimal]}"
-    if not headings.lines:
+    if not found.lines:
         return f"{numbers}, {written}; no names above them"
-    names, *units = [line + 1 for line in headings.lines]
+    names, *units = [line + 1 for line in found.lines]
     return f"{numbers}, {written}; names from line {names}" + "".join(f", units from line {line}" for line in units)
 
 
@@ -133,7 +142,7 @@ def _properties(lines: Iterable[str], table: Table) -> tuple[dict[str, str | flo
     """The properties in lines that hold a name and a value, as written; and messages on names with two values."""
     values: dict[str, list[str]] = {}
     for line in lines:
-        stated = _stated(table_rows.uncommented(line).strip(), table)
+        stated = _stated(tables.uncommented(line).strip(), table)
         if stated is not None:
             values.setdefault(stated[0], []).append(stated[1])
     ambiguous = {
@@ -150,9 +159,13 @@ def _properties(lines: Iterable[str], table: Table) -> tuple[dict[str, str | flo
 
 def _stated(line: str, table: Table) -> tuple[str, str] | None:
     """The name and the value in a line, as cells or separated by a colon or =; a unit after the value is moved to the
-    name."""
-    for separator in dict.fromkeys([table.separator, "\t", ";", *([","] if table.decimal == "." else [])]):
-        cells = table_rows.split(line, separator) if separator != BLANKS else []
+    name. A comma may stand in a name before its unit: `Force constant, nN/nm: 1.0`."""
+    pair = _NAME_AND_UNIT.fullmatch(line)
+    if pair is not None and unit(pair["unit"]) is not None:
+        return f"{pair['name'].strip()}, {pair['unit']}", pair["value"].strip().strip('"')
+    separators = (table.separator, "\t", ";", *([","] if table.decimal == "." else []))
+    for separator in dict.fromkeys(separators):
+        cells = tables.split(line, separator) if separator != BLANKS else []
         match [cell for cell in cells if cell]:
             case [name, value] if cells[0] == name:
                 return _with_its_unit(name.rstrip(":= "), value)

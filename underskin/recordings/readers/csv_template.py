@@ -13,17 +13,18 @@ Separator, decimal mark and units are those of the file: `;` and `,` work, `prel
 `sep=;` and lines that begin with `#` are ignored; a line of words below a blank one under the table is a note. A cell
 in quotes may hold the separator. An empty cell of a quantity that a recording has once repeats the one above; an empty
 `id` continues the recording, and so does the same id in every row. A column `conditions.NAME` holds any further
-condition. Surplus cells, repeated fields and recordings that start twice are rejected. Long runs of rows of one id are
-read at once, others row by row.
+condition. Surplus cells, repeated fields and recordings that start twice are rejected.
 """
 
 import cmath
 import math
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from difflib import get_close_matches
-from itertools import groupby, islice, takewhile
-from typing import Any, BinaryIO, Protocol
+from itertools import islice, takewhile
+from operator import itemgetter
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -31,9 +32,7 @@ from underskin.errors import FileError
 from underskin.recordings.campaign import COLUMNS, KINDS, SCHEMA, SkinDescription, Tolerances
 from underskin.recordings.channels import Document
 from underskin.recordings.readers import template_columns, text
-from underskin.recordings.readers import template_columns as template_lines
 from underskin.recordings.readers.calendar_times import iso_time, of_two_cells, time_zone
-from underskin.recordings.readers.cells import BlockText, PlainRows, RowStyle
 from underskin.recordings.readers.template_columns import (
     CLOCK,
     DATE,
@@ -44,7 +43,6 @@ from underskin.recordings.readers.template_columns import (
     PHASE,
     Column,
     NoField,
-    TemplateLines,
 )
 from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
 from underskin.recordings.validation import CellText
@@ -52,254 +50,85 @@ from underskin.units import LAB, Floats, LabField
 
 POSITION = ("position_x_mm", "position_y_mm")
 _ID = "id"
-_LEAST = 8  # least number of rows that are read at once
-_Run = tuple[str, int, int]  # an id, the index of its first row and the index after its last
-
-
-class CellReader(Protocol):
-    """Reads single cells, and words errors about them."""
-
-    decimal: str
-
-    def value(self, field: str, cell: str, place: tuple[int, int], factor: float = 1.0) -> Any:
-        """The value of a field in the cell at a place (row and column, from 0)."""
-
-    def error(self, index: int, reason: str, column: int | None = None) -> FileError:
-        """The error of a row, or of its cell in a column (both from 0)."""
-
-
-class TemplateRecordings:
-    """Collects recordings from the lines under the headings; `columns`: those that hold fields, of `width` in all."""
-
-    def __init__(self, lines: TemplateLines, columns: Sequence[Column], width: int, reader: CellReader) -> None:
-        self._lines = lines
-        self._columns = columns
-        self._row_columns = [column for column in columns if column.field in (*COLUMNS, MAGNITUDE, PHASE)]
-        self._recording_columns = [column for column in columns if column not in self._row_columns]
-        indices = [column.index for column in self._row_columns]
-        self._style = RowStyle(lines.separator, reader.decimal, indices, width, is_template=True)
-        self._identity = next(column.index for column in columns if column.field == _ID)
-        self._width = width
-        self._reader = reader
-        self._recordings: list[_Recording] = []
-        self._first_rows: dict[str, int] = {}
-        self._current, self._continued = "", False  # the id, and whether rows without it have followed
-
-    def documents(self) -> list[dict[str, Any]]:
-        """The recordings as in a campaign document; raises FileError for an invalid date and time of day."""
-        for recording, index in zip(self._recordings, self._first_rows.values(), strict=True):
-            self._date(recording.constants, index)
-        return [recording.document() for recording in self._recordings]
-
-    def _date(self, constants: dict[str, Any], index: int) -> None:
-        """Replace a date and a time of day by `recorded_at`, for a recording that starts at row `index`."""
-        day, clock = constants.pop(DATE, None), constants.pop(CLOCK, None)
-        column = next((candidate for candidate in self._columns if candidate.field == DATE), None)
-        if column is None or day is clock is None:
-            return
-        if day is None:
-            raise self._reader.error(index, f"has a time of day, {clock!r}, and no {column.heading}", column.index)
-        constants["recorded_at"] = self._reader.value(
-            "recorded_at", of_two_cells(day, clock or ""), (index, column.index)
-        )
-
-    def take(self, first: int, lines: Sequence[str]) -> None:
-        """Read lines, the first of which has the index `first`; raises FileError."""
-        rows = PlainRows(lines, self._style)
-        taken = 0
-        for line, start, end in rows.runs():
-            self._take_rows(first + taken, lines[taken:line])
-            ids = [cell.strip() for cell in rows.texts(self._identity, start, end)]
-            for recording_id, run_start, run_end in _runs(ids, start):
-                taken = line + run_end - start
-                index = first + line + run_start - start
-                if run_end - run_start < _LEAST or not self._take_run(
-                    recording_id, index, rows, slice(run_start, run_end)
-                ):
-                    self._take_rows(index, lines[index - first : taken])
-        self._take_rows(first + taken, lines[taken:])
-
-    def _take_rows(self, first: int, lines: Sequence[str]) -> None:
-        """Read lines row by row, with errors that name the row."""
-        for index, line in enumerate(lines, start=first):
-            row = self._lines.cells(index, line)
-            if any(row):
-                self._take_row(index, row)
-
-    def _take_row(self, index: int, row: Sequence[str]) -> None:
-        recording_id = row[self._identity] if self._identity < len(row) else ""
-        if recording_id in self._first_rows and self._starts_recording(recording_id):
-            first_line = self._first_rows[recording_id] + 1
-            raise self._reader.error(
-                index, f"recording {recording_id!r} began on line {first_line} already", self._identity
-            )
-        if not recording_id and not self._current:
-            raise self._reader.error(index, "the first row of the table needs an id")
-        recording = self._recording(recording_id, index)
-        if len(row) > self._width:
-            raise self._reader.error(index, f"has {len(row)} cells under {self._width} headings", self._width)
-        if contradiction := recording.add(self._values(row, index)):
-            raise self._reader.error(index, contradiction)
-
-    def _starts_recording(self, recording_id: str) -> bool:
-        """Whether rows of this id start a recording."""
-        return bool(recording_id) and (recording_id != self._current or self._continued)
-
-    def _recording(self, recording_id: str, index: int) -> "_Recording":
-        """The recording that rows with this id, which may be empty, belong to."""
-        if self._starts_recording(recording_id):
-            self._current, self._first_rows[recording_id] = recording_id, index
-            self._recordings.append(_Recording())
-        self._continued = not recording_id
-        return self._recordings[-1]
-
-    def _values(self, row: Sequence[str], index: int) -> dict[str, Any]:
-        """The values of a row by field."""
-        cells = dict(enumerate(row))
-        values = {
-            column.field: self._reader.value(
-                column.field, cells.get(column.index, ""), (index, column.index), column.factor
-            )
-            for column in self._columns
-        }
-        return template_columns.with_parts(values)
-
-    def _take_run(self, recording_id: str, index: int, rows: PlainRows, run: slice) -> bool:
-        """Read rows of one id at once; False where they must be read one by one."""
-        starts = self._starts_recording(recording_id)
-        if (starts and recording_id in self._first_rows) or not (recording_id or self._current):
-            return False
-        constants: dict[str, Any] = {}
-        for column in self._recording_columns:
-            different = {cell.strip() for cell in set(rows.texts(column.index, run.start, run.stop))} - {""}
-            if len(different) > 1:
-                return False
-            for cell in different:
-                try:
-                    constants[column.field] = self._reader.value(
-                        column.field, cell, (index, column.index), column.factor
-                    )
-                except FileError:
-                    return False
-        lines: dict[str, Floats | None] = {}
-        for number, column in enumerate(self._row_columns):
-            filled = rows.filled[run, number]
-            if filled.any() and not filled.all():
-                return False
-            lines[column.field] = rows.numbers[number][run] * column.factor if filled.any() else None
-        columns = _with_parts(lines)
-        if columns is None or (not starts and self._recordings[-1].contradiction(constants)):
-            return False
-        self._recording(recording_id, index).add_lines(constants, columns, run.stop - run.start)
-        return True
-
-
-def _runs(ids: Sequence[str], start: int) -> Iterator[_Run]:
-    """The runs of rows of one id; the first row has the index `start`."""
-    for recording_id, run in groupby(ids):
-        end = start + sum(1 for _ in run)
-        yield recording_id, start, end
-        start = end
-
-
-def _with_parts(lines: dict[str, Floats | None]) -> dict[str, Floats | None] | None:
-    """Columns with real and imaginary part instead of magnitude and phase; None where one of these is missing."""
-    if MAGNITUDE not in lines:
-        return lines
-    others = {field: values for field, values in lines.items() if field not in (MAGNITUDE, PHASE)}
-    magnitude, phase = lines[MAGNITUDE], lines[PHASE]
-    if magnitude is None and phase is None:
-        return {**others, **dict.fromkeys(PARTS)}
-    if magnitude is None or phase is None:
-        return None
-    values = np.array(list(map(cmath.rect, magnitude.tolist(), phase.tolist())))
-    return {**others, PARTS[0]: values.real.copy(), PARTS[1]: values.imag.copy()}
-
-
-def _are_nan(*values: Any) -> bool:
-    """Whether all values are NaN, which is unequal to itself and rejected after the table is read."""
-    return all(isinstance(value, float) and math.isnan(value) for value in values)
 
 
 class _Recording:
-    """A recording being read: its `constants`, one value each, and its columns in parts."""
+    """A recording being read, which begins at row `index`: its `constants`, one value each, and the values of its row
+    columns, in their order, as written; `others` are those that are no numbers, by row and column."""
 
-    def __init__(self) -> None:
+    def __init__(self, index: int) -> None:
+        self.index = index
         self.constants: dict[str, Any] = {}
-        self.columns: dict[str, list[Floats | list[Any]]] = {}
+        self.numbers = array("d")
+        self.others: dict[tuple[int, int], Any] = {}
 
     def contradiction(self, constants: Mapping[str, Any]) -> str:
         """The first contradiction to the rows above, in words; empty without one."""
         for field, value in constants.items():
-            above = self.constants.get(field)
-            if value is not None and above is not None and above != value and not _are_nan(above, value):
+            above = self.constants.get(field, value)
+            if above != value and not (above != above and value != value):  # NaN, which is rejected later
                 return f"{field} = {value!r}, but {above!r} above it"
         return ""
 
-    def add(self, line: Mapping[str, Any]) -> str:
-        """Add the values of a row; returns a contradiction to the rows above, in words."""
-        line_values = {field: line[field] for field in COLUMNS if field in line}
-        if any(value is not None for value in line_values.values()):  # a single missing value is left to the checks
-            for field, value in line_values.items():
-                parts = self.columns.setdefault(field, [])
-                last = parts[-1] if parts else None
-                if isinstance(last, list):
-                    last.append(value)
-                else:
-                    parts.append([value])
-        constants = {field: value for field, value in line.items() if field not in COLUMNS and value is not None}
-        if contradiction := self.contradiction(constants):
-            return contradiction
-        self.constants |= constants
-        return ""
+    def add(self, values: Sequence[Any]) -> None:
+        """Add the values of a row, unless all are missing; a single missing one is left to the checks."""
+        if all(value is None for value in values):
+            return
+        row = len(self.numbers) // len(values)
+        for column, value in enumerate(values):
+            if not isinstance(value, float):
+                self.others[row, column] = value
+            self.numbers.append(value if isinstance(value, float) else math.nan)
 
-    def add_lines(self, constants: Mapping[str, Any], lines: Mapping[str, Floats | None], count: int) -> None:
-        """Add `count` rows by their columns, and constants without contradiction."""
-        self.constants |= constants
-        if any(values is not None for values in lines.values()):
-            for field in (name for name in COLUMNS if name in lines):
-                values = lines[field]
-                self.columns.setdefault(field, []).append([None] * count if values is None else values)
-
-    def document(self) -> dict[str, Any]:
-        """The recording as in a campaign document: one position, without empty columns, which belong to other kinds."""
-        columns = {name: _joined(parts) for name, parts in self.columns.items() if not all(map(_is_empty, parts))}
-        position = [self.constants.pop(name, None) for name in POSITION]
+    def document(self, row_columns: Sequence[Column]) -> dict[str, Any]:
+        """The recording as in a campaign document, with one position."""
+        single_values = {name: value for name, value in self.constants.items() if not name.startswith(FURTHER)}
+        position = [single_values.pop(name, None) for name in POSITION]
         conditions = {
             name.removeprefix(FURTHER): value for name, value in self.constants.items() if name.startswith(FURTHER)
         }
-        single_values = {name: value for name, value in self.constants.items() if not name.startswith(FURTHER)}
         return {
             **({} if position == [None, None] else {"position_mm": position}),
             **single_values,
             **({"conditions": conditions} if conditions else {}),
-            **columns,
+            **self._in_units(row_columns),
         }
 
+    def _in_units(self, row_columns: Sequence[Column]) -> dict[str, Floats | list[Any]]:
+        """The columns in the units of their fields, without empty ones, which belong to other kinds."""
+        numbers = np.frombuffer(self.numbers).reshape(-1, max(len(row_columns), 1))
+        factors = {column.field: column.factor for column in row_columns}
+        values = {field: numbers[:, index] * factor for index, (field, factor) in enumerate(factors.items())}
+        others: dict[str, dict[int, Any]] = {field: {} for field in values}
+        for (row, index), value in self.others.items():
+            others[row_columns[index].field][row] = value
+        if MAGNITUDE in values:
+            magnitude, phase = values.pop(MAGNITUDE), values.pop(PHASE)
+            frf = np.array(list(map(cmath.rect, magnitude.tolist(), phase.tolist())), complex)
+            values |= {PARTS[0]: frf.real.copy(), PARTS[1]: frf.imag.copy()}
+            wrong = others.pop(MAGNITUDE), others.pop(PHASE)
+            for part, given, stated in zip(PARTS, wrong, (magnitude, phase), strict=True):
+                rows = wrong[0].keys() | wrong[1].keys()
+                others[part] = {row: given.get(row, float(stated[row])) for row in rows}
+        columns = {field: _column(values[field], others[field]) for field in COLUMNS if field in values}
+        return {field: column for field, column in columns.items() if column is not None}
 
-def _is_empty(part: Floats | list[Any]) -> bool:
-    return isinstance(part, list) and all(value is None for value in part)
 
-
-def _joined(parts: Sequence[Floats | list[Any]]) -> Floats | list[Any]:
-    """The parts of a column as an array where some are arrays and the others hold only numbers; else as a list."""
-    if any(isinstance(part, np.ndarray) for part in parts) and not any(map(_is_other, parts)):
-        return np.concatenate(parts)
-    return _counted([value for part in parts for value in (part.tolist() if isinstance(part, np.ndarray) else part)])
-
-
-def _counted(values: list[Any]) -> list[Any]:
-    """The values of a column, with the count of invalid cells in the place of the first one."""
-    invalid = [index for index, value in enumerate(values) if isinstance(value, CellText)]
+def _column(numbers: Floats, others: Mapping[int, Any]) -> Floats | list[Any] | None:
+    """A column with the values that are no numbers, and the count of invalid cells in the place of the first one; None
+    where it is empty."""
+    if not others:
+        return numbers if len(numbers) else None
+    if len(others) == len(numbers) and all(value is None for value in others.values()):
+        return None
+    values: list[Any] = numbers.tolist()
+    for row, value in others.items():
+        values[row] = value
+    invalid = sorted(row for row, value in others.items() if isinstance(value, CellText))
     if len(invalid) > 1:
         first = values[invalid[0]]
         values[invalid[0]] = CellText(first, f"{first.place}, and {len(invalid) - 1} more in this column")
     return values
-
-
-def _is_other(part: Floats | list[Any]) -> bool:
-    """Whether a list holds anything but numbers."""
-    return isinstance(part, list) and not all(isinstance(value, float) for value in part)
 
 
 _SENSOR = ("id", "x_mm", "y_mm")
@@ -322,7 +151,7 @@ _FLAGS = {"true": True, "false": False}
 
 def is_template(content: str) -> bool:
     """Whether a text starts like the template."""
-    return template_lines.separator_of(content) is not None
+    return template_columns.separator_of(content) is not None
 
 
 def has_table(content: str) -> bool:
@@ -330,16 +159,20 @@ def has_table(content: str) -> bool:
     return any(_is_heading_row(line.split("\t")) for line in content.splitlines())
 
 
-def read(stream: BinaryIO, file: str, sheet: str = "") -> Document:
-    """The campaign document of a filled-in template; raises FileError that names the line.
+def read(stream: BinaryIO, file: str) -> Document:
+    """The campaign document of a filled-in template; raises FileError that names the line."""
+    return of_text(text.content(stream, file), file)
+
+
+def of_text(written: str, file: str, sheet: str = "") -> Document:
+    """The campaign document of a text with line feeds as line ends; raises as `read`.
 
     `sheet`: the place of the text in a workbook, in words, for errors.
     """
-    source = BlockText(stream, file)
-    separator = template_lines.separator_of(next(source.blocks()))
+    separator = template_columns.separator_of(written)
     if separator is None:
         raise FileError(file, "line 1", f"must be schema,{SCHEMA}")
-    template = _Template(file, TemplateLines(source, separator, file), sheet)
+    template = _Template(written, separator, file, sheet)
     return Document(template.document(), tuple(template.warnings))
 
 
@@ -350,21 +183,39 @@ def _is_heading_row(row: Sequence[str]) -> bool:
 
 
 class _Template:
-    def __init__(self, file: str, lines: TemplateLines, sheet: str) -> None:
+    def __init__(self, written: str, separator: str, file: str, sheet: str) -> None:
+        self.written = written
+        self.separator = separator
         self.file = file
         self.sheet = sheet
-        self.lines = lines
-        self.separator = lines.separator
-        self.decimal = text.decimal_mark(lines.holding, lines.separator)
+        self.decimal = text.decimal_mark((cells for _, cells in self._lines() if len(cells) > 1), separator)
         self.rows = self._rows_to_headings()
         self.stated: dict[str, int] = {}  # line indices of the fields above the table
         self.warnings: list[str] = []
         self.has_local_times = False
 
+    def _lines(self, start: int = 0) -> Iterator[tuple[int, list[str]]]:
+        """The index of each line from `start` on, and its cells; one empty cell of a blank line or comment."""
+        for first, lines in text.blocks(self.written):
+            for index, line in enumerate(lines[max(0, start - first) :], start=max(start, first)):
+                yield index, self.cells(index, line)
+
+    def cells(self, index: int, line: str) -> list[str]:
+        """The cells of the line at an index, from 0; raises FileError where its quotes do not close."""
+        try:
+            cells = text.cells(line, self.separator)
+        except ValueError as error:
+            if not template_columns.is_empty_line(line):
+                raise self.error(index, str(error)) from None
+            return [""]
+        # An id may start with #, like the number of a press: then numbers follow it.
+        is_empty = template_columns.is_empty_line(line) and not any(map(template_columns.is_number, cells[1:]))
+        return [""] if is_empty else cells
+
     def _rows_to_headings(self) -> list[list[str]]:
         """The rows above the table, and last the headings."""
         rows = []
-        for row in islice(self.lines, _MOST_LINES_ABOVE):
+        for _, row in islice(self._lines(), _MOST_LINES_ABOVE):
             rows.append(row)
             if _is_heading_row(row):
                 return rows
@@ -428,64 +279,33 @@ class _Template:
         raise self.error(index, f"{heading} = {cell}: {hint} (if not, units_checked,true)")
 
     def _recordings(self) -> list[dict[str, Any]]:
-        start, end = len(self.rows), self._end()
-        recordings = TemplateRecordings(self.lines, self._columns(start, end), len(self.rows[-1]), self)
-        for first, lines in self.lines.blocks(start, end):
-            recordings.take(first, lines)
-        return recordings.documents()
+        return _Rows(self, self._columns()).recordings()
 
-    def _end(self) -> int:
-        """The index after the last row of the table; rows of words below a blank line are notes."""
-        start = len(self.rows)
-        end = start
-        under: list[list[str]] = []  # the rows behind the last that has numbers
-        for first, lines in self.lines.blocks(start):
-            last = next(
-                (number for number in reversed(range(len(lines))) if self._is_full(first + number, lines[number])), None
-            )
-            if last is not None:
-                end, under = first + last + 1, []
-            rest = enumerate(lines[0 if last is None else last + 1 :], start=first if last is None else end)
-            under += [self.lines.cells(index, line) for index, line in rest]
-        cut = sum(1 for _ in takewhile(self._may_be_cut, under))
-        notes = [(index, row) for index, row in enumerate(under[cut:], start=end + cut) if row[0]]
-        self.warnings += [template_lines.note_message(index + 1, row) for index, row in notes]
-        return end + cut
-
-    def _is_full(self, index: int, line: str) -> bool:
-        """Whether a line holds more than words; one with unclosed quotes is rejected later."""
-        if self.separator not in line:
-            return False
-        try:
-            cells = self.lines.cells(index, line)
-        except FileError:
-            return True
-        return any(cells[1:]) and not template_lines.is_note(cells)
-
-    def _may_be_cut(self, row: Sequence[str]) -> bool:
-        """Whether words directly under the rows may start a recording whose numbers are missing: no cell names an
-        unknown sensor or kind."""
-        known_values = {"sensor": self._sensors(), "kind": set(KINDS)}
-        names = [(known_values.get(heading.lower()), cell) for heading, cell in zip(self.rows[-1], row, strict=False)]
-        return any(row) and all(not cell or not allowed or cell in allowed for allowed, cell in names)
-
-    def _sensors(self) -> set[str]:
-        return {row[1] for row in self.rows[:-1] if row[0].lower() == "sensor" and len(row) > 1}
-
-    def _columns(self, start: int, end: int) -> list[Column]:
+    def _columns(self) -> list[Column]:
         """The columns that hold fields, each field once."""
-        headings = self.rows[-1]
-
-        def under(places: Sequence[int]) -> Iterator[list[str]]:
-            return self.lines.under(places, len(headings), start, end)
-
+        headings, start = self.rows[-1], len(self.rows)
+        rows = (cells for _, cells in self._lines(start))
         try:
-            columns, notes = template_columns.columns(headings, under, _FIELDS, self.decimal)
+            columns, notes = template_columns.columns(headings, rows, _FIELDS, self.decimal)
         except NoField as error:
             raise self.error(start - 1, str(error), error.index) from None
         self.warnings += notes
         self.warnings += template_columns.halved(column.heading for column in columns)
         return columns
+
+    def without_notes(self, under: Sequence[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+        """The first of the lines under the last row with numbers that may start a recording; the others are notes."""
+        cut = list(takewhile(lambda line: self._may_be_cut(line[1]), under))
+        self.warnings += [template_columns.note_message(index + 1, row) for index, row in under[len(cut) :] if row[0]]
+        return cut
+
+    def _may_be_cut(self, row: Sequence[str]) -> bool:
+        """Whether words directly under the rows may start a recording whose numbers are missing: no cell names an
+        unknown sensor or kind."""
+        sensors = {row[1] for row in self.rows[:-1] if row[0].lower() == "sensor" and len(row) > 1}
+        known_values = {"sensor": sensors, "kind": set(KINDS)}
+        names = [(known_values.get(heading.lower()), cell) for heading, cell in zip(self.rows[-1], row, strict=False)]
+        return any(row) and all(not cell or not allowed or cell in allowed for allowed, cell in names)
 
     def _field(self, name: str, index: int) -> tuple[str, float]:
         """The field of the skin for a name above the table, and the factor to its unit."""
@@ -537,3 +357,100 @@ class _Template:
 def _likely(quantity: LabField, value: float) -> bool:
     assert quantity.likely is not None
     return quantity.likely[0] <= value <= quantity.likely[1]
+
+
+class _Rows:
+    """Reads the rows under the headings into recordings; `columns`: those that hold fields."""
+
+    def __init__(self, template: _Template, columns: Sequence[Column]) -> None:
+        self._template = template
+        self._row_columns = [column for column in columns if column.field in (*COLUMNS, MAGNITUDE, PHASE)]
+        self._recording_columns = [column for column in columns if column not in self._row_columns]
+        self._identity = next(column for column in columns if column.field == _ID)
+        self._date = next((column for column in columns if column.field == DATE), None)
+        self._width = len(template.rows[-1])
+        of_rows = [column.index for column in self._row_columns]
+        self._of_row = itemgetter(*of_rows) if len(of_rows) > 1 else None  # plain rows hold several numbers
+        self._others = [index for index in range(self._width) if index not in of_rows]
+        self._recordings: dict[str, _Recording] = {}
+        self._current, self._continued = "", False  # the id, and whether rows without it have followed
+
+    def recordings(self) -> list[dict[str, Any]]:
+        """The recordings as in a campaign document; raises FileError that names the line."""
+        template = self._template
+        under: list[tuple[int, list[str]]] = []  # the lines since the last row that holds more than words
+        for first, lines in text.blocks(template.written):
+            skipped = max(0, len(template.rows) - first)
+            for index, line in enumerate(lines[skipped:], start=first + skipped):
+                if not under and self._take_plain(line):
+                    continue
+                under.append((index, template.cells(index, line)))
+                if any(under[-1][1][1:]) and not template_columns.is_note(under[-1][1]):
+                    self._take(under)
+                    under = []
+        self._take(template.without_notes(under))
+        for recording in self._recordings.values():
+            self._join_date(recording.constants, recording.index)
+        return [recording.document(self._row_columns) for recording in self._recordings.values()]
+
+    def _take_plain(self, line: str) -> bool:
+        """Read a row that holds numbers in all columns of rows, and nothing else; False for others."""
+        if self._of_row is None or not self._current or self._template.decimal == ",":
+            return False
+        if '"' in line or "_" in line or not line.isascii():
+            return False
+        cells = line.split(self._template.separator)
+        if len(cells) != self._width or any(map(cells.__getitem__, self._others)):
+            return False
+        try:
+            self._recordings[self._current].numbers.extend(list(map(float, self._of_row(cells))))
+        except ValueError:
+            return False
+        self._continued = True
+        return True
+
+    def _take(self, rows: Sequence[tuple[int, list[str]]]) -> None:
+        for index, row in rows:
+            if any(row):
+                self._take_row(index, row)
+
+    def _take_row(self, index: int, row: Sequence[str]) -> None:
+        cells = [*row, *[""] * (self._width - len(row))]
+        recording_id = cells[self._identity.index]
+        if recording_id and (recording_id != self._current or self._continued):
+            if recording_id in self._recordings:
+                first_line = self._recordings[recording_id].index + 1
+                reason = f"recording {recording_id!r} began on line {first_line} already"
+                raise self._template.error(index, reason, self._identity.index)
+            self._current, self._recordings[recording_id] = recording_id, _Recording(index)
+        if not self._current:
+            raise self._template.error(index, "the first row of the table needs an id")
+        self._continued = not recording_id
+        if len(row) > self._width:
+            reason = f"has {len(row)} cells under {self._width} headings"
+            raise self._template.error(index, reason, self._width)
+        recording = self._recordings[self._current]
+        constants = {
+            column.field: self._value(column, cells[column.index], index, column.factor)
+            for column in self._recording_columns
+            if cells[column.index]
+        }
+        if contradiction := recording.contradiction(constants):
+            raise self._template.error(index, contradiction)
+        recording.add([self._value(column, cells[column.index], index) for column in self._row_columns])
+        recording.constants |= constants
+
+    def _value(self, column: Column, cell: str, index: int, factor: float = 1.0) -> Any:
+        return self._template.value(column.field, cell, (index, column.index), factor)
+
+    def _join_date(self, constants: dict[str, Any], index: int) -> None:
+        """Replace a date and a time of day by `recorded_at`, for a recording that starts at row `index`."""
+        day, clock = constants.pop(DATE, None), constants.pop(CLOCK, None)
+        if self._date is None or day is clock is None:
+            return
+        if day is None:
+            reason = f"has a time of day, {clock!r}, and no {self._date.heading}"
+            raise self._template.error(index, reason, self._date.index)
+        constants["recorded_at"] = self._template.value(
+            "recorded_at", of_two_cells(day, clock or ""), (index, self._date.index)
+        )

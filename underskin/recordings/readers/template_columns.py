@@ -5,18 +5,14 @@ part; a date and a time of day become `recorded_at`. A column without a heading 
 spreadsheets write it, or is empty, and a column of words that names no field, are left out.
 """
 
-import cmath
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any
 
-from underskin.errors import FileError
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.readers import text
-from underskin.recordings.readers.cells import BlockText, PlainRows, RowStyle
 from underskin.recordings.readers.unit_labels import in_brackets, lab_field, unit
 
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
@@ -76,20 +72,6 @@ def angle_by_values(heading: str, largest: float) -> float:
 def lacking(field: str) -> str:
     """The missing counterpart of magnitude or phase, in words."""
     return f"needs {_EITHER if field == MAGNITUDE else MAGNITUDE} beside it"
-
-
-def with_parts(line: dict[str, Any]) -> dict[str, Any]:
-    """The values of a row with real and imaginary part instead of magnitude and phase."""
-    if MAGNITUDE not in line:
-        return line
-    others = {field: value for field, value in line.items() if field not in (MAGNITUDE, PHASE)}
-    magnitude, phase = line[MAGNITUDE], line[PHASE]
-    if magnitude is None and phase is None:
-        return {**others, **dict.fromkeys(PARTS)}
-    if not isinstance(magnitude, float) or not isinstance(phase, float):
-        return {**others, PARTS[0]: magnitude, PARTS[1]: phase}  # for the campaign's checks to refuse
-    value = cmath.rect(magnitude, phase)
-    return {**others, PARTS[0]: value.real, PARTS[1]: value.imag}
 
 
 def _name_and_unit(heading: str) -> tuple[str, str]:
@@ -166,12 +148,9 @@ class _Nameless:
 
 
 def columns(
-    headings: Sequence[str],
-    under: Callable[[Sequence[int]], Iterable[Sequence[str]]],
-    field_names: Collection[str],
-    decimal: str,
+    headings: Sequence[str], rows: Iterable[Sequence[str]], field_names: Collection[str], decimal: str
 ) -> tuple[list[Column], list[str]]:
-    """The columns that hold fields, and messages on the others; `under` gives the cells at some columns row by row.
+    """The columns that hold fields, and messages on the others, by the cells of the `rows` under them.
 
     Raises NoField.
     """
@@ -182,10 +161,10 @@ def columns(
         meanings = _dated(headings, meanings)
     present = {meaning[0] for meaning in meanings if meaning is not None}
     others = {index: _Nameless() for index, meaning in enumerate(meanings) if meaning is None}
-    for row in under(list(others)) if others else ():
-        for cell, column in zip(row, others.values(), strict=True):
-            if cell:
-                column.see(cell, decimal)
+    for row in rows if others else ():
+        for index, column in others.items():
+            if index < len(row) and row[index]:
+                column.see(row[index], decimal)
     for index, (heading, meaning) in enumerate(zip(headings, meanings, strict=True)):
         if meaning is None and is_phase_without_unit(heading):
             try:
@@ -313,7 +292,7 @@ _SEPARATORS = ("\t", ";", ",")
 
 def separator_of(start: str) -> str | None:
     """The separator of a template with this start; None where it is no template."""
-    first = next((line for line in text.lines(start[:_FIRST_LINE]) if not _is_empty_line(line)), "")
+    first = next((line for line in text.lines(start[:_FIRST_LINE]) if not is_empty_line(line)), "")
     return next((mark for mark in _SEPARATORS if _first_cells(first, mark) == ["schema", SCHEMA]), None)
 
 
@@ -324,7 +303,7 @@ def _first_cells(line: str, separator: str) -> list[str]:
         return []
 
 
-def _is_empty_line(line: str) -> bool:
+def is_empty_line(line: str) -> bool:
     """Whether a line is blank, a comment, or states the separator for spreadsheets."""
     bare = line.strip().strip('"')
     return not bare or bare.startswith("#") or _TO_SPREADSHEETS.fullmatch(bare) is not None
@@ -332,7 +311,7 @@ def _is_empty_line(line: str) -> bool:
 
 def is_note(row: Sequence[str]) -> bool:
     """Whether a row may be a note: its first cell is not empty, and no cell holds a number."""
-    return bool(row[0]) and not any(text.is_grouped(cell) or _is_number(cell) for cell in row)
+    return bool(row[0]) and not any(text.is_grouped(cell) or is_number(cell) for cell in row)
 
 
 def note_message(number: int, row: Sequence[str]) -> str:
@@ -340,69 +319,6 @@ def note_message(number: int, row: Sequence[str]) -> str:
     return f"line {number} under the table, {', '.join(filter(None, row))!r}, is left out"
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a number, with either decimal mark."""
     return any(text.number(cell, mark) is not None for mark in ".,")
-
-
-class TemplateLines:
-    """The lines of the template as cells, any number of times; an empty line or comment has one empty cell."""
-
-    def __init__(self, source: BlockText, separator: str, file: str) -> None:
-        self._source = source
-        self.separator = separator
-        self._file = file
-
-    def __iter__(self) -> Iterator[list[str]]:
-        for index, line in enumerate(self._source.lines()):
-            yield self.cells(index, line)
-
-    def cells(self, index: int, line: str) -> list[str]:
-        """The cells of the line at an index, from 0; raises FileError where its quotes do not close."""
-        try:
-            cells = text.cells(line, self.separator)
-        except ValueError as error:
-            if not _is_empty_line(line):
-                raise FileError(self._file, f"line {index + 1}", str(error)) from None
-            cells = [""]
-        # An id may start with #, like the number of a press: then numbers follow it.
-        counts = any(map(_is_number, cells[1:]))
-        return cells if counts or not _is_empty_line(line) else [""]
-
-    def holding(self, mark: str) -> Iterator[list[str]]:
-        """The cells of the lines that contain a mark."""
-        first = 0
-        for block in self._source.blocks():
-            lines = block.split("\n")
-            if mark in block:
-                for index, line in enumerate(lines, start=first):
-                    if mark in line:
-                        yield self.cells(index, line)
-            first += len(lines)
-
-    def blocks(self, start: int, end: int | None = None) -> Iterator[tuple[int, list[str]]]:
-        """The lines from `start` to `end` in blocks, each with the index of its first line."""
-        first = 0
-        for block in self._source.blocks():
-            lines = block.split("\n")
-            selected = lines[max(0, start - first) : None if end is None else max(0, end - first)]
-            if selected:
-                yield max(start, first), selected
-            first += len(lines)
-
-    def under(self, indices: Sequence[int], width: int, start: int, end: int) -> Iterator[list[str]]:
-        """The cells at some of `width` columns of each line from `start` to `end`."""
-        style = RowStyle(self.separator, ".", (), width, is_template=True)
-        for first, lines in self.blocks(start, end):
-            rows = PlainRows(lines, style)
-            taken = 0
-            for line, row, end_row in rows.runs():
-                yield from self._under(indices, first + taken, lines[taken:line])
-                columns = [[cell.strip() for cell in rows.texts(index, row, end_row)] for index in indices]
-                yield from map(list, zip(*columns, strict=True))
-                taken = line + end_row - row
-            yield from self._under(indices, first + taken, lines[taken:])
-
-    def _under(self, indices: Sequence[int], first: int, lines: Sequence[str]) -> Iterator[list[str]]:
-        for index, line in enumerate(lines, start=first):
-            cells = self.cells(index, line)
-            yield [cells[column] if column < len(cells) else "" for column in indices]

@@ -2,23 +2,37 @@
 
 import csv
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from typing import BinaryIO
 
 from underskin.errors import FileError
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_NUMBER = re.compile(r"[+-]?(\d+([.]\d*)?|[.]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _LOOKED_AT, _MOSTLY = 4096, 0.8  # bytes of a text without a mark, and how many of a half must be zero
+BLOCK = 1 << 20
 MINUS = "\N{MINUS SIGN}"
 _BOMS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
 def content(stream: BinaryIO, file: str) -> str:
-    """The text of an open file."""
+    """The text of an open file, with line feeds as line ends."""
     stream.seek(0)
-    return decode(stream.read(), file)
+    written = decode(stream.read(), file)
+    return written.replace("\r\n", "\n").replace("\r", "\n") if "\r" in written else written
+
+
+def blocks(written: str) -> Iterator[tuple[int, list[str]]]:
+    """The lines of a text, some BLOCK characters at a time, each time with the number of lines before them."""
+    start = first = 0
+    while start <= len(written):
+        end = written.find("\n", start + BLOCK)
+        end = len(written) if end < 0 else end
+        block = written[start:end].split("\n")
+        yield first, block
+        first += len(block)
+        start = end + 1
 
 
 def decode(data: bytes, file: str) -> str:
@@ -27,13 +41,13 @@ def decode(data: bytes, file: str) -> str:
 
     Raises FileError where the bytes are no text.
     """
-    marked = marked_encoding(data)
-    if marked is not None:
-        encoding, start = marked
+    mark = next((mark for mark in _BOMS if data.startswith(mark)), b"")
+    encoding = _BOMS.get(mark, _unmarked(data) if data.find(0) in (0, 1) else "")
+    if encoding:
         try:
-            return data[start:].decode(encoding)
+            return str(memoryview(data)[len(mark) :], encoding)
         except UnicodeDecodeError as error:
-            raise no_text(file, error.start, encoding, error.reason) from None
+            raise FileError(file, f"byte {error.start}", f"is no {encoding.upper()} text: {error.reason}") from None
     zero = data.find(0)
     if zero >= 0:
         raise FileError(file, f"byte {zero}", "is no text: it holds a zero byte")
@@ -41,15 +55,6 @@ def decode(data: bytes, file: str) -> str:
         return data.decode("utf-8")
     except UnicodeDecodeError:
         return data.decode("latin-1")
-
-
-def marked_encoding(head: bytes) -> tuple[str, int] | None:
-    """The encoding given by the first bytes of a text, and the offset of the text after the mark; None without one."""
-    for mark, encoding in _BOMS.items():
-        if head.startswith(mark):
-            return encoding, len(mark)
-    unmarked = _unmarked(head) if head.find(0) in (0, 1) else ""
-    return (unmarked, 0) if unmarked else None
 
 
 def _unmarked(data: bytes) -> str:
@@ -60,11 +65,6 @@ def _unmarked(data: bytes) -> str:
     if max(first, second) < _MOSTLY * half or min(first, second):
         return ""
     return "utf-16-be" if first > second else "utf-16-le"
-
-
-def no_text(file: str, place: int, encoding: str, reason: str) -> FileError:
-    """The error for invalid text at a byte, counted from after its mark."""
-    return FileError(file, f"byte {place}", f"is no {encoding.upper()} text: {reason}")
 
 
 def lines(text: str) -> list[str]:
@@ -93,25 +93,22 @@ def _quoted(line: str, separator: str) -> list[str]:
         ) from None
 
 
-def decimal_mark(holding: Callable[[str], Iterable[Sequence[str]]], separator: str) -> str:
-    """The decimal mark of a table, by its cells; `holding` gives the rows in which a mark may be.
+def decimal_mark(rows: Iterable[Sequence[str]], separator: str) -> str:
+    """The decimal mark of a table, by its cells.
 
     A comma where a cell is a number only that way, and not possibly one with separated thousands. With semicolons, used
     where commas are decimal marks, any such cell suffices; with commas as separators none does where others have
     points.
     """
-    if separator == "," and _has_number(holding("."), "."):
-        return "."
-    return "," if _has_number(holding(","), ",", grouped=separator == ";") else "."
-
-
-def _has_number(rows: Iterable[Sequence[str]], decimal: str, *, grouped: bool = False) -> bool:
-    """Whether a cell is a number with this decimal mark; `grouped`: even if it may separate thousands instead."""
-    return any(
-        decimal in cell and number(cell, decimal) is not None and (grouped or not is_grouped(cell))
-        for row in rows
-        for cell in row
-    )
+    has_comma = False
+    for cell in chain.from_iterable(rows):
+        if separator == "," and "." in cell and number(cell, ".") is not None:
+            return "."
+        if "," in cell and not has_comma:
+            has_comma = number(cell, ",") is not None and (separator == ";" or not is_grouped(cell))
+            if has_comma and separator != ",":
+                return ","
+    return "," if has_comma else "."
 
 
 def is_grouped(cell: str) -> bool:
@@ -126,14 +123,18 @@ def ungrouped(cell: str) -> str:
 
 def number(cell: str, decimal: str) -> float | None:
     """The number in a cell, or None where it holds something else."""
-    cell = cell.strip().replace(MINUS, "-")
     if decimal == ",":
         if "." in cell:
             return None
         cell = cell.replace(",", ".")
-    if not cell.isascii() or not _NUMBER.fullmatch(cell):
+    if not cell.isascii():
+        cell = cell.strip().replace(MINUS, "-")
+    if not cell.isascii() or "_" in cell:  # digits of other scripts, and 1_000
         return None
-    return float(cell)
+    try:
+        return float(cell)
+    except ValueError:
+        return None
 
 
 _END = 1 << 16  # bytes at the end

@@ -164,6 +164,7 @@ _DECIBEL = re.compile(
     r"(dB|db|DB) ?((?i:V|mV|uV|µV|m|u|N|C|g|A|FS|SPL|rms|mag)|[\s(/,].*)?|(?i:decibels?)|20 ?\*? ?log.*"
 )
 _SAYS_DECIBEL = re.compile(r"(?<![A-Za-z])(dB|DB)(?![A-Za-z])|(?i:decibel)|20 ?\*? ?log")
+_REFERENCE = re.compile(r"(?i:dB)\s*(?:\(|(?i:re|rel|ref)\.?)\s*(?:1(?:\.0*)?\s*)?(?P<unit>[^\s()\d][^()]*?)\s*\)?")
 _LEAD = re.compile(r"(?i:in|units?|einheit)(\s*[:=]\s*|\s+)(?=\S)")
 _AMPLITUDE = re.compile(r"[\s,_]*(?i:rms|peak|pk|pk-pk|p-?p|eff)\.?$")
 _OVER = re.compile(r"\s+(?i:per|pro|par|por)\s+")
@@ -220,6 +221,12 @@ def _meanings(label: str) -> tuple[Unit, ...]:
     if without and without != label:
         return meanings(without)
     return _in_other_letters(label)
+
+
+def decibel_reference(label: str) -> str | None:
+    """The unit that decibels are relative to: pC/N of `dB re 1 pC/N`; None where the label states none."""
+    stated = _REFERENCE.fullmatch(unicodedata.normalize("NFKC", label).strip())
+    return stated["unit"] if stated is not None and unit(stated["unit"]) is not None else None
 
 
 def _single(label: str) -> Unit | None:

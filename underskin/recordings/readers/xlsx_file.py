@@ -12,7 +12,6 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import date, datetime, time
-from io import BytesIO
 from typing import Any, BinaryIO
 
 import openpyxl
@@ -95,8 +94,10 @@ class WorkbookSheets:
             ):
                 warnings.simplefilter("ignore")
                 sheets = [book.worksheets[index] for book in self._books]
-                lines = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
-            while lines and not lines[-1]:
+                rows = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
+            width = max((row.count(SEPARATOR) for row in rows), default=0)
+            lines = [row + SEPARATOR * (width - row.count(SEPARATOR)) for row in rows]
+            while lines and not lines[-1].strip():
                 lines.pop()
             if lines:
                 yield sheet.title, "\n".join(lines)
@@ -191,7 +192,7 @@ def _with_table(name: str, sheets: dict[str, str]) -> tuple[str, str]:
 
 def _campaign(place: str, text: str, file: str) -> Document:
     try:
-        return csv_template.read(BytesIO(text.encode()), file, place)
+        return csv_template.of_text(text, file, place)
     except FileError as error:
         raise _at(place, error) from None
 
@@ -210,7 +211,7 @@ def _tables(sheets: dict[str, str], file: str) -> Contents:
     errors: list[FileError] = []
     for name, sheet in sheets.items():
         try:
-            tables[name] = csv_file.read(BytesIO(sheet.encode()), file)
+            tables[name] = csv_file.of_text(sheet, file)
         except csv_file.NoTable as error:
             errors.append(_on_sheet(name, error))
         except FileError as error:

@@ -1,0 +1,244 @@
+"""A table with known numbers, written in the layouts of instruments, is read right or refused, and never wrong."""
+
+import cmath
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import event, given
+from hypothesis import strategies as st
+
+from tests.recordings.contents_of_files import contents
+from underskin.errors import FileError
+from underskin.recordings.channels import Contents
+from underskin.recordings.readers.unit_labels import unit
+
+NAMES = ("Time", "Force", "Charge", "Depth", "CH1", "x-axis", "F", "h", "Kraft", "Load cell", "|H|", "Gap")
+UNITS = ("s", "N", "mN", "pC", "mm", "µm", "V", "(pC)/N", "Hz")
+ABOVE = (
+    "Model{0}MDO3024",
+    "Gating{0}0.0% to 100.0%{0}",
+    "Vertical Units{0}V{0}V",
+    "Horizontal Units{0}s{0}",
+    "Compliance{0}[µm/N]{0}1.9",
+    "Force Constant, nN/nm:\t1.5",
+    "Date: 2025-05-12",
+    "Operator: mb",
+    "k=3 N/m",
+    "[Header]",
+    "Sample rate [Hz]{0}1000",
+    "# exported on Monday",
+    "Probe{0}10{0}10",
+    "",
+)
+MARKERS = ("", "eoh", "***End_of_Header***", "-----")
+OVERLOADS = ("∞", "-∞", "OVERLOAD", "OL", "Over range")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A table as it is written: what is in it, and how."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: np.ndarray  # (rows, columns); NaN for an overload
+    overload: str
+    separator: str
+    decimal: str
+    units_in: str  # "brackets", "a line", "a line in brackets", "nowhere"
+    above: tuple[str, ...]
+    marker: str
+    end: str
+    encoding: str
+    digits: int
+    quoted: bool
+    trailing: bool
+
+    def cell(self, value: float) -> str:
+        written = self.overload if math.isnan(value) else f"{value:.{self.digits}f}".replace(".", self.decimal)
+        return f'"{written}"' if self.quoted else written
+
+    def headings(self) -> list[str]:
+        if self.units_in == "brackets":
+            return [
+                self.separator.join(f"{name} [{label}]" for name, label in zip(self.names, self.units, strict=True))
+            ]
+        lines = [self.separator.join(self.names)]
+        if self.units_in == "a line":
+            lines.append(self.separator.join(self.units))
+        elif self.units_in == "a line in brackets":
+            lines.append(self.separator.join(f"({label})" for label in self.units))
+        return lines
+
+    def text(self) -> bytes:
+        ending = self.separator if self.trailing else ""
+        above = [line.format(self.separator) for line in self.above]
+        rows = [self.separator.join(map(self.cell, row)) + ending for row in self.values.tolist()]
+        lines = [*above, *self.headings(), *([self.marker] if self.marker else []), *rows]
+        return (self.end.join(lines) + self.end).encode(self.encoding, "replace")
+
+    def labels(self) -> list[str]:
+        return [""] * len(self.units) if self.units_in == "nowhere" else list(self.units)
+
+
+@st.composite
+def layouts(draw: st.DrawFn) -> Layout:
+    columns = draw(st.integers(2, 4))
+    rows = draw(st.integers(5, 12))
+    random = np.random.default_rng(draw(st.integers(0, 2**32)))
+    digits = draw(st.integers(1, 6))
+    values = random.normal(size=(rows, columns)).round(digits) * 10.0 ** random.integers(-1, 3, size=columns)
+    overload = draw(st.sampled_from(OVERLOADS))
+    if draw(st.integers(0, 3)) == 0:
+        values[rows // 2, columns - 1] = math.nan
+    separator, decimal = draw(st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]))
+    return Layout(
+        names=tuple(draw(st.lists(st.sampled_from(NAMES), min_size=columns, max_size=columns, unique=True))),
+        units=tuple(draw(st.lists(st.sampled_from(UNITS), min_size=columns, max_size=columns))),
+        values=values,
+        overload=overload,
+        separator=separator,
+        decimal=decimal,
+        units_in=draw(st.sampled_from(["brackets", "a line", "a line in brackets", "nowhere"])),
+        above=tuple(draw(st.lists(st.sampled_from(ABOVE), max_size=4))),
+        marker=draw(st.sampled_from(MARKERS)),
+        end=draw(st.sampled_from(["\n", "\r\n", "\r"])),
+        encoding=draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"])),
+        digits=digits,
+        quoted=draw(st.booleans()),
+        trailing=draw(st.booleans()),
+    )
+
+
+def same_unit(label: str, meant: str) -> bool:
+    return label == meant or (unit(label) is not None and unit(label) == unit(meant))
+
+
+def wrong(layout: Layout, found: Contents) -> list[str]:
+    """What is read wrong: a number, or a name or unit that are of another column or line."""
+    (block,) = found.blocks
+    if len(block.channels) != len(layout.names):
+        return [f"{len(block.channels)} channels"]
+    departures = []
+    for channel, name, label, column in zip(
+        block.channels, layout.names, layout.labels(), layout.values.T, strict=True
+    ):
+        written = [float(f"{value:.{layout.digits}f}") for value in column.tolist()]
+        if not np.array_equal(channel.values, np.array(written), equal_nan=True):
+            departures.append(f"values of {name}")
+        if channel.name not in (name, f"{name} [{label}]"):
+            departures.append(f"{channel.name!r} for {name!r}")
+        if channel.label and not same_unit(channel.label, label):
+            departures.append(f"{channel.label!r} for the unit {label!r} of {name}")
+    return departures
+
+
+@given(layouts())
+def test_layouts_of_instruments(layout: Layout) -> None:
+    """Names, units and numbers are those of the table, or it is refused."""
+    try:
+        found = contents(layout.text(), "run.csv")
+    except FileError:
+        event("refused")
+        return
+    event("read")
+    assert wrong(layout, found) == []
+
+
+COMPLEX = {
+    "i": "{re}{im:+}i",
+    "python": "({re}{im:+}j)",
+    "pair": "({re},{im})",
+    "blanks": "{re} {sign} {size}i",
+    "polar": "{r!r}∠{degrees!r}°",
+    "polar in rad": "{r!r} ∠ {angle!r} rad",
+}
+NUMBER = st.floats(-1e6, 1e6).map(lambda number: round(number, 4))
+
+
+@given(
+    st.lists(st.builds(complex, NUMBER, NUMBER), min_size=3, max_size=8),
+    st.sampled_from(sorted(COMPLEX)),
+    st.sampled_from([",", ";", "\t"]),
+)
+def test_complex_numbers_in_a_cell(values: list[complex], form: str, separator: str) -> None:
+    cells = [
+        COMPLEX[form].format(
+            re=value.real,
+            im=value.imag,
+            sign="-" if math.copysign(1, value.imag) < 0 else "+",
+            size=abs(value.imag),
+            r=abs(value),
+            angle=cmath.phase(value),
+            degrees=math.degrees(cmath.phase(value)),
+        )
+        for value in values
+    ]
+    if separator == "," and form == "pair":
+        cells = [f'"{cell}"' for cell in cells]
+    rows = [f"{10 * number}{separator}{cell}" for number, cell in enumerate(cells, start=1)]
+    text = "\n".join([f"Frequency [Hz]{separator}FRF [pC/N]", *rows])
+    (block,) = contents(text.encode(), "frf.csv").blocks
+    frequency, frf = block.channels
+    assert frequency.values.tolist() == [10.0 * number for number in range(1, len(values) + 1)]
+    assert frf.values == pytest.approx(np.array(values), rel=1e-12, abs=1e-9)
+
+
+@pytest.mark.parametrize("cell", ["1.2-3.4i extra", "(1.2,)", "1.2∠-30", "i", "1.2+i3", "1,2+3.4i", "1.2+3.4k"])
+def test_no_complex_number_is_refused(cell: str) -> None:
+    rows = "".join(f"{number};1.5-0.5i\n" for number in range(1, 6))
+    with pytest.raises(FileError, match="line 4: must be a row of 2 numbers"):
+        contents(f"f;H\n1;1+1i\n2;1+2i\n3;{cell}\n{rows}".encode(), "frf.csv")
+
+
+@given(st.integers(4, 30), st.integers(1, 28), st.sampled_from([",", ";", "\t"]))
+def test_shorter_columns_end_where_they_do(rows: int, helper: int, separator: str) -> None:
+    """Columns beside the table that end before it have the numbers that they have."""
+    helper = min(helper, rows - 2)
+    lines = [separator.join([str(row), str(row / 8), str(row * 10) if row < helper else ""]) for row in range(rows)]
+    text = "\n".join([separator.join(["Time [s]", "Force [N]", "sum"]), *lines])
+    if helper == 1:
+        lines[0] = lines[0].rpartition(separator)[0] + separator
+    (block,) = contents(text.encode(), "run.csv").blocks
+    by_name = {channel.name: channel.values.tolist() for channel in block.channels}
+    assert by_name["Time [s]"] == [float(row) for row in range(rows)]
+    assert by_name["Force [N]"] == [row / 8 for row in range(rows)]
+    assert by_name.get("sum", []) == [10.0 * row for row in range(helper)][: len(by_name.get("sum", []))]
+
+
+@pytest.mark.parametrize("rows", [["0,1,2", "1,2,3", "2,,4", "3,4,5"], ["0,1,2", "1,2,3", "2,,4"]])
+def test_an_empty_cell_among_the_rows_is_refused(rows: list[str]) -> None:
+    """A number below an empty cell is refused by the line of that cell, and so is an empty cell in the last row."""
+    with pytest.raises(FileError, match=r"line 4: must be a row of 3 numbers"):
+        contents("\n".join(["a,b,c", *rows]).encode(), "run.csv")
+
+
+@given(st.lists(st.integers(2, 6), min_size=2, max_size=4), st.sampled_from([",", ";", "\t"]), st.booleans())
+def test_several_tables_in_a_file(lengths: list[int], separator: str, blank: bool) -> None:
+    lines: list[str] = []
+    for number, length in enumerate(lengths):
+        lines += [f"Curve{separator}{number}", f"Depth [mm]{separator}Force [N]"]
+        lines += [f"{row}{separator}{100 * number + row}" for row in range(length)]
+        lines += [""] if blank else []
+    found = contents("\n".join(lines).encode(), "curves.csv")
+    assert [block.channels[1].values.tolist() for block in found.blocks] == [
+        [100.0 * number + row for row in range(length)] for number, length in enumerate(lengths)
+    ]
+    assert [found.properties[f"{number}.Curve"] for number in range(1, len(lengths) + 1)] == [
+        str(number) for number in range(len(lengths))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "value"),
+    [
+        ("Force Constant, nN/nm:\t1.5", "Force Constant, nN/nm", "1.5"),
+        ("X, um: 25.0", "X, um", "25.0"),
+        ("Preload, N = 1.5", "Preload, N", "1.5"),
+        ('Operator,"Smith, J."', "Operator", "Smith, J."),
+    ],
+)
+def test_a_comma_in_the_name_of_a_property(line: str, name: str, value: str) -> None:
+    found = contents(f"{line}\n\nDepth [mm],Force [N]\n0,1\n1,2\n2,3\n".encode(), "run.csv")
+    assert found.properties[name] == value
