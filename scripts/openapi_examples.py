@@ -1,11 +1,10 @@
 """Write `service/routes/examples.json`: what a server was asked and answered, for the OpenAPI document.
 
-`python -m scripts.openapi_examples` starts a server over an empty folder, and asks it for every operation in turn.
-Ids are numbered and times of today replaced, so that another run changes only what has changed.
+`python -m scripts.openapi_examples` starts a server over an empty folder, and asks it for every operation in turn; make
+and the Dockerfile do.
 """
 
 import os
-import re
 import socket
 import subprocess
 import sys
@@ -27,9 +26,6 @@ from service.routes import campaigns, design, mechanisms, pressed_skin, sigma, s
 from service.routes import field as stress_field
 
 FILE = Path(__file__).parents[1] / "service" / "routes" / "examples.json"
-_ID = re.compile(r"\b([cdm])-[0-9a-f]{16}\b")
-_TODAY = re.compile(time.strftime(r"%Y-%m-%dT[0-9:.]+(Z|\+00:00)", time.gmtime()))
-_REQUEST = re.compile(r"\b[0-9a-f]{12}-[0-9]+\b")
 _EXPERIMENT: dict[str, Any] = {
     "schema": "experiment/1",
     "name": "second day",
@@ -47,6 +43,7 @@ _EXPERIMENT: dict[str, Any] = {
     "noise": {"gain": 0.01, "line": 0.005},
     "effects": {"contact_resonance": {"tip_mass_g": 6, "damping": 0.04}},
 }
+_UNDER_WAY = ("queued", "running")
 
 
 @dataclass
@@ -95,7 +92,7 @@ def walk(http: httpx.Client) -> dict[str, dict[str, Any]]:
     _umbridge(walked)
     _campaigns(walked)
     _diagnoses(walked)
-    return {name: _stable(example) for name, example in sorted(walked.examples.items())}
+    return walked.examples
 
 
 def _calculations(walked: Walk) -> None:
@@ -188,9 +185,9 @@ def _diagnoses(walked: Walk) -> None:
         "diagnose_campaign", "POST", "/v1/campaigns/{campaign_id}/diagnosis", {"without": []}, campaign_id=sent[0]["id"]
     )
     diagnosed = walked.examples["diagnose_campaign"]["answer"]["id"]
-    while walked.ask("diagnosis", "GET", "/v1/diagnoses/{diagnosis_id}", diagnosis_id=diagnosed)["state"] != "done":
-        time.sleep(0.1)
     of_diagnosis = {"diagnosis_id": diagnosed}
+    while walked.ask("diagnosis", "GET", "/v1/diagnoses/{diagnosis_id}", **of_diagnosis)["state"] in _UNDER_WAY:
+        time.sleep(0.1)
     walked.ask("adopt_model", "POST", "/v1/skins/{skin_id}/model", of_diagnosis, skin_id=skins[0])
     walked.ask("skin_model", "GET", "/v1/skins/{skin_id}/model", skin_id=skins[0])
     reason = {"reason": "the tip was changed"}
@@ -209,29 +206,19 @@ def _diagnoses(walked: Walk) -> None:
     walked.ask("diagnoses", "GET", "/v1/diagnoses", params={"state": "done"})
 
 
-def _stable(example: dict[str, Any]) -> dict[str, Any]:
-    """With ids and times that are the same in every run."""
-    numbers: dict[str, str] = {}
-
-    def numbered(match: re.Match[str]) -> str:
-        return numbers.setdefault(match[0], f"{match[1]}-{len(numbers) + 1:016x}")
-
-    text = _TODAY.sub("2026-01-05T09:00:00Z", _ID.sub(numbered, orjson.dumps(example).decode()))
-    stable: dict[str, Any] = orjson.loads(_REQUEST.sub("000000000000-1", text))
-    return stable
-
-
 @contextmanager
 def _server(folder: Path) -> Iterator[httpx.Client]:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-    settings = {"UNDERSKIN_DATA": str(folder), "UNDERSKIN_MECHANISMS": str(folder / "mechanisms")}
-    settings["UNDERSKIN_DIAGNOSIS_WORKERS"] = "1"
+    # Without the settings of this machine, such as a database.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("UNDERSKIN_")}
+    environment |= {"UNDERSKIN_DATA": str(folder), "UNDERSKIN_MECHANISMS": str(folder / "mechanisms")}
+    environment["UNDERSKIN_DIAGNOSIS_WORKERS"] = "1"
     command = [sys.executable, "-m", "underskin", "serve", "--port", str(port)]
-    process = subprocess.Popen(command, env={**os.environ, **settings}, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
     try:
         with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60) as http:
-            while True:
+            while process.poll() is None:
                 try:
                     http.get("/ready").raise_for_status()
                     break

@@ -17,13 +17,21 @@ from uuid import uuid4
 
 import orjson
 
-from underskin.client.documents.campaign_d33 import D33
-from underskin.client.documents.campaigns import CampaignDetail, CampaignEntry, CampaignResult
-from underskin.client.documents.changes import Change
-from underskin.client.documents.diagnoses import Asked, ModelEntry, ModelVersion
-from underskin.client.documents.document import Document
-from underskin.client.documents.skin_imports import Imported
-from underskin.client.documents.skins import History, SkinDetail, SkinEntry
+from underskin.client.document import Document
+from underskin.client.documents import (
+    D33,
+    Asked,
+    CampaignDetail,
+    CampaignEntry,
+    CampaignResult,
+    Change,
+    History,
+    Imported,
+    ModelEntry,
+    ModelVersion,
+    SkinDetail,
+    SkinEntry,
+)
 from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable, too_few
 from underskin.recordings.campaign import Campaign, parse, to_dict

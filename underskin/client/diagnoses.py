@@ -15,8 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 from underskin.client.campaigns import pages
-from underskin.client.documents.diagnoses import Asked, Diagnosis, DiagnosisEntry
-from underskin.client.documents.mechanisms import MechanismEntry
+from underskin.client.documents import Asked, Diagnosis, DiagnosisEntry, MechanismEntry
 from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable
 

@@ -24,9 +24,7 @@ from numpy.typing import ArrayLike
 from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses, Fleets, Mechanisms
-from underskin.client.documents.changes import Change
-from underskin.client.documents.design import DesignAnswer
-from underskin.client.documents.field import FieldAnswer
+from underskin.client.documents import Change, DesignAnswer, FieldAnswer
 from underskin.client.http_session import Session, path_of
 from underskin.surrogate.contact_model import ContactName
 from underskin.units import Floats
