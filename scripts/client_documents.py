@@ -17,7 +17,7 @@ FILE = ROOT / "underskin" / "client" / "documents.py"
 ANSWERS = (
     *("CampaignResult", "CampaignEntry", "CampaignDetail", "D33", "SkinEntry", "SkinDetail", "History", "Change"),
     *("Imported", "Asked", "DiagnosisEntry", "Diagnosis", "ModelEntry", "ModelVersion", "MechanismEntry"),
-    *("DesignAnswer", "FieldAnswer"),
+    *("DesignAnswer", "FieldAnswer", "TableEntry"),
 )
 _HEAD = '''"""What the service answers, as typed documents; scripts/client_documents.py writes this module."""
 
