@@ -51,7 +51,7 @@ class Session:
     def answered(
         self, method: str, path: str, params: Mapping[str, Any] | None = None, **options: Any
     ) -> tuple[dict[str, Any], httpx.Headers]:
-        """The JSON object of the answer, and its headers; parameters of None are not sent, `options` as httpx has them."""
+        """The JSON object of the answer, and its headers; `options` as httpx has them, parameters of None not sent."""
         query = {name: value for name, value in (params or {}).items() if value is not None}
         with self._reaching():
             response = self.http.request(method, path, params=query, **options)

@@ -29,7 +29,7 @@ from underskin.recordings.reading import read_contents
 
 _PATIENCE = 12  # times as long as a file must be unchanged, before one that no reader opens is taken as it is
 _RETRIES = 5  # of a file whose refusal may pass
-_LONGER = 4  # times as long is the wait before each retry as before the one that went before
+_LONGER = 4  # times the last wait is the next one
 _TEMPORARY = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".lock", "~")
 _INDEX_FILES = (".tdms_index",)  # LabVIEW's index of a file, without data
 
