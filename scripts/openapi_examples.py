@@ -54,23 +54,23 @@ class Walk:
     examples: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def ask(
-        self, operation: str, method: str, path: str, body: Any = None, *, kept: bool = True, **options: Any
+        self,
+        operation: str | None,
+        method: str,
+        path: str,
+        body: Any = None,
+        params: dict[str, Any] | None = None,
+        **names: str,
     ) -> Any:
-        """The answer to a request; `options`: names in the path, and `params`. Both are examples where `kept`."""
-        params = options.pop("params", {})
-        answer = self.http.request(method, path.format(**options), json=body, params=params)
+        """The answer to a request, which both become the example of `operation`; `names`: those in the path."""
+        answer = self.http.request(method, path.format(**names), json=body, params=params)
         if not answer.is_success:
             raise RuntimeError(f"{method} {path}: {answer.status_code} {answer.text}")
-        answer_document = answer.json() if answer.headers["content-type"] == "application/json" else None
-        if kept:
+        document = answer.json() if answer.headers["content-type"] == "application/json" else None
+        if operation is not None:
             request = {} if body is None else {"request": body}
-            parameters = {**options, **params}
-            self.examples[operation] = {
-                **({"given": parameters} if parameters else {}),
-                **request,
-                "answer": answer_document,
-            }
-        return answer_document
+            self.examples[operation] = {"given": {**names, **(params or {})}, **request, "answer": document}
+        return document
 
     def columns(self, operation: str, path: str, body: dict[str, Any]) -> None:
         """As `ask`, with the same answer as CSV."""
@@ -141,7 +141,7 @@ def _campaigns(walked: Walk) -> None:
     of_campaign = "/v1/campaigns/{campaign_id}"
     sent = walked.ask("post_campaigns", "POST", "/v1/campaigns", campaigns.EXAMPLE)
     second = walked.ask(
-        "", "POST", "/v1/campaigns", {**campaigns.EXAMPLE, "name": "another"}, kept=False, params={"skin": "palm-3b"}
+        None, "POST", "/v1/campaigns", {**campaigns.EXAMPLE, "name": "another"}, params={"skin": "palm-3b"}
     )
     walked.ask("campaigns", "GET", "/v1/campaigns", params={"skin": sent["skin_id"]})
     walked.ask("campaign_document", "GET", f"{of_campaign}/document", campaign_id=sent["id"])
@@ -166,7 +166,7 @@ def _annotated(walked: Walk, campaign_id: str, skin_id: str) -> None:
     skin = {"title": "left palm", "remark": None, "tags": ["silicone"]}
     walked.ask("annotate_skin", "PATCH", of_skin, skin, skin_id=skin_id)
     trial = {**campaigns.EXAMPLE, "name": "a trial"}
-    tried = walked.ask("", "POST", "/v1/campaigns", trial, kept=False, params={"skin": "trial"})
+    tried = walked.ask(None, "POST", "/v1/campaigns", trial, params={"skin": "trial"})
     reason = {"reason": "a trial"}
     walked.ask("discard_campaign", "POST", f"{of_campaign}/discard", reason, campaign_id=tried["id"])
     walked.ask("discard_skin", "POST", f"{of_skin}/discard", reason, skin_id="trial")
@@ -178,9 +178,9 @@ def _annotated(walked: Walk, campaign_id: str, skin_id: str) -> None:
 def _diagnoses(walked: Walk) -> None:
     recorded = campaign_of(record_lines(experiment(_EXPERIMENT)))
     skins = [f"palm-{number}" for number in (4, 5, 6)]
-    sent = [walked.ask("", "POST", "/v1/campaigns", recorded, kept=False, params={"skin": skin}) for skin in skins]
+    sent = [walked.ask(None, "POST", "/v1/campaigns", recorded, params={"skin": skin}) for skin in skins]
     again = {**recorded, "name": "third day", "recordings": recorded["recordings"][::-1]}
-    walked.ask("", "POST", "/v1/campaigns", again, kept=False, params={"skin": skins[0]})
+    walked.ask(None, "POST", "/v1/campaigns", again, params={"skin": skins[0]})
     walked.ask(
         "diagnose_campaign", "POST", "/v1/campaigns/{campaign_id}/diagnosis", {"without": []}, campaign_id=sent[0]["id"]
     )
