@@ -334,13 +334,7 @@ class Watcher:
             self._folder.postpone(path)
 
     def _send(self, path: Path, name: str, target: Target, sha256: str) -> None:
-        terms: dict[str, Any] = {
-            "skin": self._skin,
-            "rig": self._rig,
-            "estimator": self._estimator,
-            "all_or_nothing": False,
-            "together": None,
-        }
+        terms: dict[str, Any] = {"skin": self._skin, "rig": self._rig, "estimator": self._estimator}
         key = content_key([path], terms)
         if not self._folder.is_unchanged(path):  # since it was listed, others were sent and this one was read
             return
