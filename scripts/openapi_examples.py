@@ -215,9 +215,10 @@ def _server(folder: Path) -> Iterator[httpx.Client]:
     environment |= {"UNDERSKIN_DATA": str(folder), "UNDERSKIN_MECHANISMS": str(folder / "mechanisms")}
     environment["UNDERSKIN_DIAGNOSIS_WORKERS"] = "1"
     command = [sys.executable, "-m", "underskin", "serve", "--port", str(port)]
-    process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60) as http:
+        # Without a proxy that the environment names.
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60, trust_env=False) as http:
             while process.poll() is None:
                 try:
                     http.get("/ready").raise_for_status()
