@@ -11,10 +11,12 @@ COPY tablegen /app/tablegen
 COPY rig /app/rig
 COPY tables /app/tables
 COPY docs/glossary.md /app/docs/glossary.md
+COPY scripts/client_documents.py scripts/openapi_examples.py /app/scripts/
 RUN /opt/venv/bin/pip install --quiet --no-index --no-build-isolation -e '/app[server,fem]'
-# The root is read-only later, so byte code and machine code are written now; the packages' own test suites and pip are
-# not needed any more.
+# The root is read-only later, so byte code, machine code and the examples of the OpenAPI document are written now; the
+# packages' own test suites and pip are not needed any more.
 RUN python3 -m compileall -q /app && /opt/venv/bin/python -m underskin.compiled && \
+    cd /app && /opt/venv/bin/python -m scripts.openapi_examples && \
     find /opt/venv -type d -name tests -prune -exec rm -rf {} + && \
     /opt/venv/bin/pip uninstall --quiet --yes hatchling editables pip
 

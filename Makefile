@@ -12,6 +12,10 @@ TEST_PACKAGES = nginx openssl octave curl postgresql chromium iproute2
 PEERS = tesseract nanite
 GENERATOR = openapi-client
 
+# Written from the service's models, and by a server that is asked for each operation; git ignores both.
+DOCUMENTS = underskin/client/documents.py
+EXAMPLES = service/routes/examples.json
+
 # Two processes more than two cores, since tests of servers and pages also wait; tests/conftest.py says which tests stay
 # together in one of them, and in which order they come.
 PYTEST = $(PYTHON) -m pytest --numprocesses 4 --dist loadfile --no-loadscope-reorder
@@ -27,12 +31,12 @@ PIP_INSTALL = $(PYTHON) $(PIP)
 
 # Parts of the set-up that do not wait for each other run side by side.
 MAKEFLAGS += --jobs=2
-.PHONY: help serve unit test check docs tables paper tour openapi mechanisms ledger house proof bench soak lock clean
+.PHONY: help serve unit test check docs tables paper tour mechanisms ledger house proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
+serve: $(VENV)/.runtime $(EXAMPLES) ## serve on http://127.0.0.1:8000 (PORT=...)
 	@$(VENV)/bin/underskin serve --port $(PORT)
 
 # Two processes, since nothing waits and each has to collect; the service's own tests take half of that.
@@ -49,7 +53,7 @@ soak: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at full coun
 	UNDERSKIN_SOAK=1 $(PYTHON) -m pytest -m alone $(TESTS); \
 	UNDERSKIN_SOAK=1 $(PYTEST) $(TESTS); status=$$?; $(PYTHON) -m bench soak && exit $$status
 
-check: $(VENV)/.dev-packages ## format, lint, strict types, import direction
+check: $(VENV)/.dev-packages $(DOCUMENTS) ## format, lint, strict types, import direction
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m mypy
@@ -72,10 +76,6 @@ tour: $(VENV)/.dev ## regenerate docs/tour.md, its screenshots and the picture o
 	$(PYTHON) -m docs.tour
 	$(PYTHON) -m docs.reading
 
-openapi: $(VENV)/.dev ## regenerate the examples of the OpenAPI document and the client's typed answers
-	$(PYTHON) -m scripts.openapi_examples
-	$(PYTHON) -m scripts.client_documents
-
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
 
@@ -96,7 +96,7 @@ lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files
 	scripts/lock.sh $(PYTHON)
 
 clean: ## remove the environment and all caches
-	rm -rf $(VENV) $(PEERS:%=$(VENV)-%) $(VENV)-$(GENERATOR) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(PEERS:%=$(VENV)-%) $(VENV)-$(GENERATOR) build dist $(DOCUMENTS) $(EXAMPLES) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(VENV)/.created: scripts/make-venv.sh
@@ -110,17 +110,25 @@ $(VENV)/.packages: $(VENV)/.created requirements.lock pyproject.toml
 	@$(PIP_INSTALL) --no-index --no-build-isolation -e '.[server,fem]'
 	@touch $@
 
-$(VENV)/.runtime: $(VENV)/.packages
+$(DOCUMENTS): scripts/client_documents.py $(wildcard service/schemas/*.py) | $(VENV)/.packages
+	@$(PYTHON) -m scripts.client_documents
+	@touch $@
+
+$(VENV)/.runtime: $(VENV)/.packages | $(DOCUMENTS)
 	@echo "Compiling functions (half a minute) ..."
 	@$(PYTHON) -m underskin.compiled
 	@touch $@
+
+$(EXAMPLES): scripts/openapi_examples.py $(wildcard service/routes/*.py service/schemas/*.py) | $(VENV)/.runtime
+	@echo "Asking a server for the examples of the OpenAPI document ..."
+	@$(PYTHON) -m scripts.openapi_examples
 
 $(VENV)/.dev-packages: $(VENV)/.packages requirements-dev.lock
 	@echo "Installing the locked development packages into $(VENV) ..."
 	@$(PIP_INSTALL) --require-hashes -r requirements-dev.lock
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.runtime $(VENV)/.dev-packages
+$(VENV)/.dev: $(VENV)/.runtime $(VENV)/.dev-packages | $(EXAMPLES)
 	@touch $@
 
 $(VENV)-%/.installed: requirements-%.lock

@@ -87,9 +87,11 @@ def measure(revision: str) -> list[Figure]:
 
 @contextmanager
 def worktree(root: Path, revision: str, folder: Path) -> Iterator[Path]:
-    """Another revision's files, for as long as it is used."""
+    """Another revision's files, with what git does not hold of its library, for as long as it is used."""
     subprocess.run(["git", "-C", root, "worktree", "add", "--quiet", "--detach", folder, revision], check=True)
     try:
+        if (folder / "scripts" / "client_documents.py").exists():
+            subprocess.run([sys.executable, "-m", "scripts.client_documents"], cwd=folder, check=True)
         yield folder
     finally:
         subprocess.run(["git", "-C", root, "worktree", "remove", "--force", folder], check=True)

@@ -1,11 +1,10 @@
 """Write `service/routes/examples.json`: what a server was asked and answered, for the OpenAPI document.
 
-`python -m scripts.openapi_examples` starts a server over an empty folder, and asks it for every operation in turn.
-Ids are numbered and times of today replaced, so that another run changes only what has changed.
+`python -m scripts.openapi_examples` starts a server over an empty folder, and asks it for every operation in turn; make
+and the Dockerfile do.
 """
 
 import os
-import re
 import socket
 import subprocess
 import sys
@@ -27,9 +26,6 @@ from service.routes import campaigns, design, mechanisms, pressed_skin, sigma, s
 from service.routes import field as stress_field
 
 FILE = Path(__file__).parents[1] / "service" / "routes" / "examples.json"
-_ID = re.compile(r"\b([cdm])-[0-9a-f]{16}\b")
-_TODAY = re.compile(time.strftime(r"%Y-%m-%dT[0-9:.]+(Z|\+00:00)", time.gmtime()))
-_REQUEST = re.compile(r"\b[0-9a-f]{12}-[0-9]+\b")
 _EXPERIMENT: dict[str, Any] = {
     "schema": "experiment/1",
     "name": "second day",
@@ -47,6 +43,7 @@ _EXPERIMENT: dict[str, Any] = {
     "noise": {"gain": 0.01, "line": 0.005},
     "effects": {"contact_resonance": {"tip_mass_g": 6, "damping": 0.04}},
 }
+_UNDER_WAY = ("queued", "running")
 
 
 @dataclass
@@ -57,23 +54,23 @@ class Walk:
     examples: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def ask(
-        self, operation: str, method: str, path: str, body: Any = None, *, kept: bool = True, **options: Any
+        self,
+        operation: str | None,
+        method: str,
+        path: str,
+        body: Any = None,
+        params: dict[str, Any] | None = None,
+        **names: str,
     ) -> Any:
-        """The answer to a request; `options`: names in the path, and `params`. Both are examples where `kept`."""
-        params = options.pop("params", {})
-        answer = self.http.request(method, path.format(**options), json=body, params=params)
+        """The answer to a request, which both become the example of `operation`; `names`: those in the path."""
+        answer = self.http.request(method, path.format(**names), json=body, params=params)
         if not answer.is_success:
             raise RuntimeError(f"{method} {path}: {answer.status_code} {answer.text}")
-        answer_document = answer.json() if answer.headers["content-type"] == "application/json" else None
-        if kept:
+        document = answer.json() if answer.headers["content-type"] == "application/json" else None
+        if operation is not None:
             request = {} if body is None else {"request": body}
-            parameters = {**options, **params}
-            self.examples[operation] = {
-                **({"given": parameters} if parameters else {}),
-                **request,
-                "answer": answer_document,
-            }
-        return answer_document
+            self.examples[operation] = {"given": {**names, **(params or {})}, **request, "answer": document}
+        return document
 
     def columns(self, operation: str, path: str, body: dict[str, Any]) -> None:
         """As `ask`, with the same answer as CSV."""
@@ -95,7 +92,7 @@ def walk(http: httpx.Client) -> dict[str, dict[str, Any]]:
     _umbridge(walked)
     _campaigns(walked)
     _diagnoses(walked)
-    return {name: _stable(example) for name, example in sorted(walked.examples.items())}
+    return walked.examples
 
 
 def _calculations(walked: Walk) -> None:
@@ -144,7 +141,7 @@ def _campaigns(walked: Walk) -> None:
     of_campaign = "/v1/campaigns/{campaign_id}"
     sent = walked.ask("post_campaigns", "POST", "/v1/campaigns", campaigns.EXAMPLE)
     second = walked.ask(
-        "", "POST", "/v1/campaigns", {**campaigns.EXAMPLE, "name": "another"}, kept=False, params={"skin": "palm-3b"}
+        None, "POST", "/v1/campaigns", {**campaigns.EXAMPLE, "name": "another"}, params={"skin": "palm-3b"}
     )
     walked.ask("campaigns", "GET", "/v1/campaigns", params={"skin": sent["skin_id"]})
     walked.ask("campaign_document", "GET", f"{of_campaign}/document", campaign_id=sent["id"])
@@ -169,7 +166,7 @@ def _annotated(walked: Walk, campaign_id: str, skin_id: str) -> None:
     skin = {"title": "left palm", "remark": None, "tags": ["silicone"]}
     walked.ask("annotate_skin", "PATCH", of_skin, skin, skin_id=skin_id)
     trial = {**campaigns.EXAMPLE, "name": "a trial"}
-    tried = walked.ask("", "POST", "/v1/campaigns", trial, kept=False, params={"skin": "trial"})
+    tried = walked.ask(None, "POST", "/v1/campaigns", trial, params={"skin": "trial"})
     reason = {"reason": "a trial"}
     walked.ask("discard_campaign", "POST", f"{of_campaign}/discard", reason, campaign_id=tried["id"])
     walked.ask("discard_skin", "POST", f"{of_skin}/discard", reason, skin_id="trial")
@@ -181,16 +178,16 @@ def _annotated(walked: Walk, campaign_id: str, skin_id: str) -> None:
 def _diagnoses(walked: Walk) -> None:
     recorded = campaign_of(record_lines(experiment(_EXPERIMENT)))
     skins = [f"palm-{number}" for number in (4, 5, 6)]
-    sent = [walked.ask("", "POST", "/v1/campaigns", recorded, kept=False, params={"skin": skin}) for skin in skins]
+    sent = [walked.ask(None, "POST", "/v1/campaigns", recorded, params={"skin": skin}) for skin in skins]
     again = {**recorded, "name": "third day", "recordings": recorded["recordings"][::-1]}
-    walked.ask("", "POST", "/v1/campaigns", again, kept=False, params={"skin": skins[0]})
+    walked.ask(None, "POST", "/v1/campaigns", again, params={"skin": skins[0]})
     walked.ask(
         "diagnose_campaign", "POST", "/v1/campaigns/{campaign_id}/diagnosis", {"without": []}, campaign_id=sent[0]["id"]
     )
     diagnosed = walked.examples["diagnose_campaign"]["answer"]["id"]
-    while walked.ask("diagnosis", "GET", "/v1/diagnoses/{diagnosis_id}", diagnosis_id=diagnosed)["state"] != "done":
-        time.sleep(0.1)
     of_diagnosis = {"diagnosis_id": diagnosed}
+    while walked.ask("diagnosis", "GET", "/v1/diagnoses/{diagnosis_id}", **of_diagnosis)["state"] in _UNDER_WAY:
+        time.sleep(0.1)
     walked.ask("adopt_model", "POST", "/v1/skins/{skin_id}/model", of_diagnosis, skin_id=skins[0])
     walked.ask("skin_model", "GET", "/v1/skins/{skin_id}/model", skin_id=skins[0])
     reason = {"reason": "the tip was changed"}
@@ -209,29 +206,20 @@ def _diagnoses(walked: Walk) -> None:
     walked.ask("diagnoses", "GET", "/v1/diagnoses", params={"state": "done"})
 
 
-def _stable(example: dict[str, Any]) -> dict[str, Any]:
-    """With ids and times that are the same in every run."""
-    numbers: dict[str, str] = {}
-
-    def numbered(match: re.Match[str]) -> str:
-        return numbers.setdefault(match[0], f"{match[1]}-{len(numbers) + 1:016x}")
-
-    text = _TODAY.sub("2026-01-05T09:00:00Z", _ID.sub(numbered, orjson.dumps(example).decode()))
-    stable: dict[str, Any] = orjson.loads(_REQUEST.sub("000000000000-1", text))
-    return stable
-
-
 @contextmanager
 def _server(folder: Path) -> Iterator[httpx.Client]:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-    settings = {"UNDERSKIN_DATA": str(folder), "UNDERSKIN_MECHANISMS": str(folder / "mechanisms")}
-    settings["UNDERSKIN_DIAGNOSIS_WORKERS"] = "1"
+    # Without the settings of this machine, such as a database.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("UNDERSKIN_")}
+    environment |= {"UNDERSKIN_DATA": str(folder), "UNDERSKIN_MECHANISMS": str(folder / "mechanisms")}
+    environment["UNDERSKIN_DIAGNOSIS_WORKERS"] = "1"
     command = [sys.executable, "-m", "underskin", "serve", "--port", str(port)]
-    process = subprocess.Popen(command, env={**os.environ, **settings}, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60) as http:
-            while True:
+        # Without a proxy that the environment names.
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60, trust_env=False) as http:
+            while process.poll() is None:
                 try:
                     http.get("/ready").raise_for_status()
                     break

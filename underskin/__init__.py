@@ -15,7 +15,7 @@ from underskin.errors import (
 )
 
 if TYPE_CHECKING:
-    from underskin.client.documents.report import Report
+    from underskin.client.documents import Report
     from underskin.client.service_client import Client
     from underskin.diagnosis.diagnose import diagnose, diagnose_fleet, diagnose_together
     from underskin.diagnosis.planning.rig_limits import RigLimits
@@ -75,7 +75,7 @@ _MODULES = {
     "Inversion": "inversion.invert",
     "Predicted": "prediction.forward_model",
     "Reading": "recordings.reading",
-    "Report": "client.documents.report",
+    "Report": "client.documents",
     "RigLimits": "diagnosis.planning.rig_limits",
     "Sigma": "physics.charge_response",
     "SigmaTable": "surrogate.sigma_table",

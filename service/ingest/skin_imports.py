@@ -6,23 +6,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import ValidationError
 
 from service.ingest.uploads import Upload
+from service.schemas.skins import Imported
 from service.store import Conflict, Database, diagnosis_export, export, import_checks
 from underskin.errors import FileError, InvalidInput, unreadable
 from underskin.recordings.skin_export import ExportedCampaign, Overview, read_campaigns, read_overview
 
 _AT_A_TIME = 8  # campaigns in memory
 one_at_a_time = asyncio.Semaphore(1)  # export that is looked at or brought in at a time
-
-
-class Imported(BaseModel):
-    """What an import brought."""
-
-    skin_id: str = Field(description="The skin.")
-    kept: int = Field(description="How many campaigns are new here.")
-    present: int = Field(description="How many were here already, the same.")
 
 
 @dataclass(frozen=True)

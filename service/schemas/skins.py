@@ -180,3 +180,11 @@ class History(BaseModel):
         description="Those with recordings that count in another campaign, of campaigns that are used."
     )
     left_out_recordings: list[LeftOutRecording] = Field(description="Excluded from campaigns that are used.")
+
+
+class Imported(BaseModel):
+    """What an import brought."""
+
+    skin_id: str = Field(description="The skin.")
+    kept: int = Field(description="How many campaigns are new here.")
+    present: int = Field(description="How many were here already, the same.")

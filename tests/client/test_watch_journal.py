@@ -1,6 +1,5 @@
 """The journal of a watched folder: what is in it after an end of any kind."""
 
-import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -54,17 +53,6 @@ def test_line_power_cut_left_unfinished_ignored(tmp_path: Path) -> None:
         with opened(tmp_path) as journal:
             journal.add(TARGET, "c", "file.csv", ["c-2"])
         assert known(tmp_path, "a", "b", "c") == [True, False, True]
-
-
-def test_journal_first_schema_read_gone(tmp_path: Path) -> None:
-    """A journal of the first schema is read and gone on with."""
-    entry = {"sha256": "a", "file": "file.csv", "url": "http://bench", "skin": "palm", "terms": "terms"}
-    first = {"schema": "watch/1", "entries": [{**entry, "campaigns": ["c-1"], "at": "2026-01-01T00:00:00+00:00"}]}
-    (tmp_path / NAME).write_text(json.dumps(first, indent=1))
-    with opened(tmp_path) as journal:
-        assert journal.find(TARGET, "a") is not None
-        journal.add(TARGET, "b", "other.csv", ["c-2"])
-    assert known(tmp_path, "a", "b") == [True, True]
 
 
 def test_journal_deleted_meanwhile_written(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 import underskin
 from tests.support.lean_reports import beside
 from tests.support.shaken_series import D33, delayed, high_pass, low_pass, shaken
-from underskin.client.documents.report import Report
+from underskin.client.documents import Report
 from underskin.mechanisms import CATALOGUE
 from underskin.surrogate.sigma_table import SigmaTable
 

@@ -1,6 +1,5 @@
 """Answers of the service in columns, and the model that a request may name."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,24 +111,3 @@ class Adopted:
     def fields(self) -> dict[str, Any]:
         """The fields of the request."""
         return {"model": "adopted", **vars(self)}
-
-
-@dataclass(frozen=True)
-class TableAxis:
-    """One axis of a table: limits (included) and the number of nodes."""
-
-    name: str
-    low: float
-    high: float
-    nodes: int
-
-
-@dataclass(frozen=True)
-class TableEntry:
-    """A table in use: its quantity, format, hash, axes, and how it was made."""
-
-    name: str
-    table_schema: str
-    table_sha256: str
-    axes: tuple[TableAxis, ...]
-    about: Mapping[str, Any]

@@ -17,14 +17,21 @@ from uuid import uuid4
 
 import orjson
 
-from underskin.client.documents.campaign_d33 import D33
-from underskin.client.documents.campaigns import CampaignDetail, CampaignEntry, CampaignResult
-from underskin.client.documents.changes import Change
-from underskin.client.documents.diagnoses import Asked, ModelEntry, ModelVersion
-from underskin.client.documents.document import Document
-from underskin.client.documents.skin_imports import Imported
-from underskin.client.documents.skins import History, SkinDetail, SkinEntry
-from underskin.client.http_session import Session, path_of
+from underskin.client.documents import (
+    D33,
+    Asked,
+    CampaignDetail,
+    CampaignEntry,
+    CampaignResult,
+    Change,
+    History,
+    Imported,
+    ModelEntry,
+    ModelVersion,
+    SkinDetail,
+    SkinEntry,
+)
+from underskin.client.http_session import Resource, path_of
 from underskin.errors import Unreachable, too_few
 from underskin.recordings.campaign import Campaign, parse, to_dict
 from underskin.recordings.frf.estimators import Estimator
@@ -83,7 +90,6 @@ Progress = Callable[[int], object]  # of bytes
 _TRIES = 3
 _path, _skin = partial(path_of, "campaigns"), partial(path_of, "skins")
 _Answer = TypeVar("_Answer")
-_Item = TypeVar("_Item", bound=Document)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,11 +104,8 @@ def _uncounted(_: int) -> None:
     pass
 
 
-class Campaigns:
+class Campaigns(Resource):
     """Campaigns: send, read, withdraw, correct; exclude recordings; d33."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
 
     def post(
         self,
@@ -125,11 +128,11 @@ class Campaigns:
         document = to_dict(campaign) if isinstance(campaign, Campaign) else dict(campaign)
         content = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
         options = {"corrects": corrects, "reason": reason, "estimator": estimator}
-        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **options)
+        query = {"skin": skin, "all_or_nothing": all_or_nothing, **options}
         headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency_key or uuid4().hex}
 
         def send() -> CampaignResult:
-            answer = self._session.json("POST", "/v1/campaigns", **query, headers=headers, content=content)
+            answer = self._session.json("POST", "/v1/campaigns", query, headers=headers, content=content)
             return CampaignResult.of(answer)
 
         return _with_retries(send)
@@ -158,7 +161,7 @@ class Campaigns:
             raise too_few("files", [], "must name at least one file")
         headers = {"Idempotency-Key": idempotency_key or uuid4().hex}
         options = {"corrects": corrects, "reason": reason, "together": together, "estimator": estimator}
-        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **options)
+        query = {"skin": skin, "all_or_nothing": all_or_nothing, **options}
 
         def send() -> list[SentFile]:
             with ExitStack() as opened:
@@ -168,9 +171,7 @@ class Campaigns:
                     (name, (label_of(path), opened.enter_context(CountedFile(path, on_read))))
                     for name, path, on_read in sources
                 ]
-                answer, received = self._session.answered(
-                    "POST", "/v1/campaigns", **query, headers=headers, files=parts
-                )
+                answer, received = self._session.answered("POST", "/v1/campaigns", query, headers=headers, files=parts)
             repeated = "Idempotency-Replayed" in received
             return [SentFile.of({**result, "repeated": repeated}) for result in answer["campaigns"]]
 
@@ -188,7 +189,7 @@ class Campaigns:
         """Campaigns, the latest arrival first, without their recordings."""
         filters = {"skin": skin, "name_contains": name_contains, "state": state}
         moments = {"recorded_from": recorded_from, "recorded_to": recorded_to}
-        yield from pages(CampaignEntry, self._session, "/v1/campaigns", "campaigns", **filters, **moments)
+        return self._session.pages(CampaignEntry, "campaigns", **filters, **moments)
 
     def get(self, campaign_id: str) -> CampaignDetail:
         """A campaign and its recordings, without their arrays."""
@@ -201,8 +202,8 @@ class Campaigns:
     def d33(self, campaign_id: str, band_hz: tuple[float, float] | None = None, *, model: ModelName = "paper") -> D33:
         """d33 by sensor, indenter and preload, over the flat zone or a given band, and what is left out."""
         low, high = (None, None) if band_hz is None else band_hz
-        query = query_of(band_low_hz=low, band_high_hz=high, model=model)
-        return D33.of(self._session.json("GET", _path(campaign_id, "d33"), **query))
+        query = {"band_low_hz": low, "band_high_hz": high, "model": model}
+        return D33.of(self._session.json("GET", _path(campaign_id, "d33"), query))
 
     def withdraw(self, campaign_id: str, reason: str) -> CampaignDetail:
         """Exclude a campaign from all results; it can still be read."""
@@ -226,15 +227,12 @@ class Campaigns:
         return list(map(Change.of, self._session.json("GET", _path(campaign_id, "changes"))["changes"]))
 
 
-class Skins:
+class Skins(Resource):
     """Skins: list, join, d33 over time, campaigns diagnosed together, adopted models, export."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
 
     def all(self, *, id_contains: str | None = None) -> Iterator[SkinEntry]:
         """Skins by id."""
-        yield from pages(SkinEntry, self._session, "/v1/skins", "skins", id_contains=id_contains)
+        return self._session.pages(SkinEntry, "skins", id_contains=id_contains)
 
     def get(self, skin_id: str) -> SkinDetail:
         """A skin, and the skins that were joined to it."""
@@ -259,7 +257,7 @@ class Skins:
 
     def history(self, skin_id: str, *, model: ModelName = "paper") -> History:
         """d33 of each sensor over time, its trend, and what is left out."""
-        return History.of(self._session.json("GET", _skin(skin_id, "history"), **query_of(model=model)))
+        return History.of(self._session.json("GET", _skin(skin_id, "history"), {"model": model}))
 
     def diagnose(
         self,
@@ -284,7 +282,7 @@ class Skins:
 
     def withdraw_model(self, skin_id: str, reason: str) -> ModelVersion:
         """Withdraw the adopted model; its version stays on record with date and reason."""
-        return ModelVersion.of(self._session.json("DELETE", _skin(skin_id, "model"), **query_of(reason=reason)))
+        return ModelVersion.of(self._session.json("DELETE", _skin(skin_id, "model"), {"reason": reason}))
 
     def model(self, skin_id: str) -> ModelEntry:
         """The model in force, with the campaign and the evidence that it comes from."""
@@ -314,11 +312,6 @@ class Skins:
             return Imported.of(self._session.json("POST", "/v1/skins/import", headers=headers, content=source))
 
 
-def query_of(**values: Any) -> dict[str, dict[str, Any]]:
-    """The values that are not None as the query of an httpx request."""
-    return {"params": {name: value for name, value in values.items() if value is not None}}
-
-
 def _with_retries(send: Callable[[], _Answer]) -> _Answer:
     """Repeat a request, under its one Idempotency-Key, until an answer comes; three times at most."""
     for _ in range(_TRIES - 1):
@@ -327,14 +320,3 @@ def _with_retries(send: Callable[[], _Answer]) -> _Answer:
         except Unreachable:
             continue
     return send()
-
-
-def pages(kind: type[_Item], session: Session, path: str, noun: str, /, **filters: str | None) -> Iterator[_Item]:
-    """The items of a list, page after page."""
-    cursor: str | None = None
-    while True:
-        page = session.json("GET", path, **query_of(limit=200, cursor=cursor, **filters))
-        yield from map(kind.of, page[noun])
-        cursor = page["next"]
-        if cursor is None:
-            return

@@ -14,21 +14,16 @@ Answers are the documents of the HTTP interface (docs/store.md, /openapi.json); 
 import time
 from collections.abc import Callable, Iterator, Sequence
 
-from underskin.client.campaigns import pages
-from underskin.client.documents.diagnoses import Asked, Diagnosis, DiagnosisEntry
-from underskin.client.documents.mechanisms import MechanismEntry
-from underskin.client.http_session import Session, path_of
+from underskin.client.documents import Asked, Diagnosis, DiagnosisEntry, MechanismEntry
+from underskin.client.http_session import Resource, path_of
 from underskin.errors import Unreachable
 
 _POLL_S = 0.5
 _ANSWER_TIMEOUT_S = 60.0
 
 
-class Diagnoses:
+class Diagnoses(Resource):
     """Diagnoses of stored campaigns: start, wait, read, cancel."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
 
     def start(self, campaign_id: str, *, without: Sequence[str] = ()) -> Asked:
         """Start a diagnosis; its `id` and `state`. A campaign that was diagnosed as it is now is `done` at once.
@@ -52,7 +47,7 @@ class Diagnoses:
     ) -> Iterator[DiagnosisEntry]:
         """Diagnoses, the latest first, without their reports; `kind`: `campaign`, `skin` or `fleet`."""
         filters = {"campaign": campaign, "skin": skin, "state": state, "kind": kind}
-        yield from pages(DiagnosisEntry, self._session, "/v1/diagnoses", "diagnoses", **filters)
+        return self._session.pages(DiagnosisEntry, "diagnoses", **filters)
 
     def wait(
         self, diagnosis_id: str, *, progress: Callable[[float], object] = lambda _: None, timeout: float | None = None
@@ -82,11 +77,8 @@ class Diagnoses:
         return DiagnosisEntry.of(self._session.json("DELETE", path_of("diagnoses", diagnosis_id)))
 
 
-class Fleets:
+class Fleets(Resource):
     """Skins of one batch, diagnosed together."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
 
     def diagnose(self, skins: Sequence[str], name: str, *, without: Sequence[str] = ()) -> Asked:
         """Start one diagnosis of all campaigns of three or more skins; its `id` and `state`.
@@ -98,11 +90,8 @@ class Fleets:
         return Asked.of(self._session.json("POST", "/v1/fleets/diagnosis", json=body))
 
 
-class Mechanisms:
+class Mechanisms(Resource):
     """The catalogue of mechanisms; the lab's own can be kept and discarded."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
 
     def all(self) -> list[MechanismEntry]:
         """Every mechanism, in the order in which a model composes them."""

@@ -4,15 +4,18 @@ import io
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import quote
 
 import httpx
 import numpy as np
 import orjson
 
+from underskin.client.document import Document
 from underskin.errors import InvalidInput, ServiceError, Unreachable
 from underskin.units import Array
+
+Item = TypeVar("Item", bound=Document)
 
 _NPZ = "application/x-npz"
 _PROBLEM = "application/problem+json"
@@ -41,18 +44,31 @@ class Session:
         except httpx.InvalidURL as error:
             raise InvalidInput("url", base_url, f"must be an address: {error}") from None
 
-    def json(self, method: str, path: str, **options: Any) -> dict[str, Any]:
-        """The JSON object of the answer; `options` as httpx has them."""
-        return self.answered(method, path, **options)[0]
+    def json(self, method: str, path: str, params: Mapping[str, Any] | None = None, **options: Any) -> dict[str, Any]:
+        """The JSON object of the answer; `options` as `answered` has them."""
+        return self.answered(method, path, params, **options)[0]
 
-    def answered(self, method: str, path: str, **options: Any) -> tuple[dict[str, Any], httpx.Headers]:
-        """The JSON object of the answer, and its headers."""
+    def answered(
+        self, method: str, path: str, params: Mapping[str, Any] | None = None, **options: Any
+    ) -> tuple[dict[str, Any], httpx.Headers]:
+        """The JSON object of the answer, and its headers; `options` as httpx has them, parameters of None not sent."""
+        query = {name: value for name, value in (params or {}).items() if value is not None}
         with self._reaching():
-            response = self.http.request(method, path, **options)
+            response = self.http.request(method, path, params=query, **options)
         document = _document(response)
         if document is None or not response.is_success:
             raise ServiceError(response.status_code, _problem(response))
         return document, response.headers
+
+    def pages(self, kind: type[Item], noun: str, **filters: str | None) -> Iterator[Item]:
+        """The items of a list, page after page."""
+        cursor: str | None = None
+        while True:
+            page = self.json("GET", f"/v1/{noun}", {"limit": 200, "cursor": cursor, **filters})
+            yield from map(kind.of, page[noun])
+            cursor = page["next"]
+            if cursor is None:
+                return
 
     def arrays(self, path: str, sent: Mapping[str, Any]) -> dict[str, Array]:
         """The arrays of an answer to arrays, texts and booleans that are posted, both ways as NumPy's .npz."""
@@ -82,6 +98,13 @@ class Session:
         except httpx.TransportError as error:
             reason = "no answer in time" if isinstance(error, httpx.TimeoutException) else error
             raise Unreachable(f"the service at {self.http.base_url} cannot be reached: {reason}{_ELSEWHERE}") from error
+
+
+class Resource:
+    """What the client offers of one noun of the service."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
 
 
 def path_of(noun: str, identity: str, *more: str) -> str:

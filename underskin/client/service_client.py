@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from dataclasses import fields
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
-from urllib.parse import urlencode
 
 import numpy as np
 import orjson
@@ -24,9 +23,7 @@ from numpy.typing import ArrayLike
 from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses, Fleets, Mechanisms
-from underskin.client.documents.changes import Change
-from underskin.client.documents.design import DesignAnswer
-from underskin.client.documents.field import FieldAnswer
+from underskin.client.documents import Change, DesignAnswer, FieldAnswer, TableEntry
 from underskin.client.http_session import Session, path_of
 from underskin.surrogate.contact_model import ContactName
 from underskin.units import Floats
@@ -138,15 +135,11 @@ class Client:
 
     def field(self, **fields: float | str) -> FieldAnswer:
         """The stress in a section through the layer under a sphere; `fields` as `GET /v1/field` takes them."""
-        return FieldAnswer.of(self._request("GET", f"/v1/field?{urlencode(fields)}"))
+        return FieldAnswer.of(self._session.json("GET", "/v1/field", fields))
 
-    def tables(self) -> tuple[answers.TableEntry, ...]:
+    def tables(self) -> tuple[TableEntry, ...]:
         """The tables of the service that answers are computed from: σ, influence and contact."""
-        document = self._request("GET", "/v1/tables")
-        return tuple(
-            answers.TableEntry(**{**table, "axes": tuple(answers.TableAxis(**axis) for axis in table["axes"])})
-            for table in document["tables"]
-        )
+        return tuple(map(TableEntry.of, self._request("GET", "/v1/tables")["tables"]))
 
     def undo(self, change_id: str) -> Change:
         """Take a change back that `client.campaigns.changes` or `client.skins.changes` lists, unless something builds

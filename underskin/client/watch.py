@@ -28,21 +28,18 @@ from underskin.recordings.readers.parsing_limits import MEMORY_MB, SECONDS
 from underskin.recordings.reading import read_contents
 
 _PATIENCE = 12  # times as long as a file must be unchanged, before one that no reader opens is taken as it is
-_RETRIES, _LONGER = (
-    5,
-    4,
-)  # of a file whose refusal may pass, and how many times as long the wait is from one to the next
+_RETRIES = 5  # of a file whose refusal may pass
+_LONGER = 4  # times the last wait is the next one
 _TEMPORARY = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".lock", "~")
 _INDEX_FILES = (".tdms_index",)  # LabVIEW's index of a file, without data
 
 
 @dataclass
 class _FileState:
-    """The last observed state of a file: size, time of change, since when (monotonic, s), whether a reader opens it,
-    how often it was postponed, and until when."""
+    """The last observed version of a file (time of change and size), since when (monotonic, s), whether a reader opens
+    it, how often it was postponed, and until when."""
 
-    size: int
-    changed_ns: int
+    version: tuple[int, int]
     since: float
     opens: bool | None = None
     retries: int = 0
@@ -70,8 +67,8 @@ class WatchedFolder:
         self.unreadable = {}
         for path, status in self._files():
             state = self._states.get(path)
-            if state is None or (state.size, state.changed_ns) != (status.st_size, status.st_mtime_ns):
-                state = _FileState(status.st_size, status.st_mtime_ns, now)
+            if state is None or state.version != _version(status):
+                state = _FileState(_version(status), now)
             states[path] = state
         self._states = states
         settled = [
@@ -79,7 +76,7 @@ class WatchedFolder:
             for path, state in states.items()
             if not state.done and now - state.since >= self._settle_s and now >= state.not_before
         ]
-        return sorted(settled, key=lambda path: states[path].changed_ns)
+        return sorted(settled, key=lambda path: states[path].version)
 
     def is_complete(self, path: Path) -> bool:
         """Whether a settled file is complete."""
@@ -91,11 +88,9 @@ class WatchedFolder:
     def is_unchanged(self, path: Path) -> bool:
         """Whether a file is as it was when it settled."""
         try:
-            status = path.stat()
+            return _version(path.stat()) == self._states[path].version
         except OSError:
             return False
-        state = self._states[path]
-        return (status.st_size, status.st_mtime_ns) == (state.size, state.changed_ns)
 
     def done(self, path: Path) -> None:
         """Ignore a file until it changes."""
@@ -142,6 +137,10 @@ class WatchedFolder:
             self.unreadable[path] = error
 
 
+def _version(status: os.stat_result) -> tuple[int, int]:
+    return status.st_mtime_ns, status.st_size
+
+
 def _opens(path: Path) -> bool:
     try:
         read_contents(path, path.name)
@@ -153,7 +152,6 @@ def _opens(path: Path) -> bool:
 NAME = ".underskin-watch.json"
 _LOCK = ".underskin-watch.lock"
 _SCHEMA = "watch/2"
-_FIRST_SCHEMA = "watch/1"  # one JSON document with all entries
 _HEADING = json.dumps({"schema": _SCHEMA}) + "\n"
 
 
@@ -169,11 +167,6 @@ class JournalEntry:
     terms: str
     campaigns: Sequence[str]
     at: str
-
-    @property
-    def is_sent(self) -> bool:
-        """Whether the service stores it."""
-        return bool(self.campaigns)
 
 
 @dataclass(frozen=True)
@@ -209,7 +202,7 @@ class Journal:
         """The entry of a content: sent for this skin, or refused on these terms; None without one."""
         for record in reversed(self._entries):
             same = (record.sha256, record.url, record.skin) == (sha256, target.url, target.skin)
-            if same and (record.is_sent or record.terms == target.terms):
+            if same and (record.campaigns or record.terms == target.terms):
                 return record
         return None
 
@@ -242,17 +235,14 @@ class Journal:
     def _read(self) -> list[JournalEntry]:
         try:
             text = self._path.read_text(encoding="utf-8")
-            if text.startswith(_HEADING):
-                *lines, unfinished = text.removeprefix(_HEADING).split("\n")
-                self._has_whole_lines = not unfinished
-                return [JournalEntry(**json.loads(line)) for line in lines]
-            document: Any = json.loads(text)
-            if document["schema"] != _FIRST_SCHEMA:
-                raise ValueError(f"it is {document['schema']}, not {_SCHEMA}")
-            return [JournalEntry(**record) for record in document["entries"]]
+            if not text.startswith(_HEADING):
+                raise ValueError(f"it is no {_SCHEMA}")
+            *lines, unfinished = text.removeprefix(_HEADING).split("\n")
+            self._has_whole_lines = not unfinished
+            return [JournalEntry(**json.loads(line)) for line in lines]
         except FileNotFoundError:
             return []
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, TypeError) as error:
             self.close()
             advice = "move it away; what was sent is sent again then, and kept once"
             raise UnderskinError(f"the journal {self._path} cannot be read: {error}; {advice}") from error
@@ -344,13 +334,7 @@ class Watcher:
             self._folder.postpone(path)
 
     def _send(self, path: Path, name: str, target: Target, sha256: str) -> None:
-        terms: dict[str, Any] = {
-            "skin": self._skin,
-            "rig": self._rig,
-            "estimator": self._estimator,
-            "all_or_nothing": False,
-            "together": None,
-        }
+        terms: dict[str, Any] = {"skin": self._skin, "rig": self._rig, "estimator": self._estimator}
         key = content_key([path], terms)
         if not self._folder.is_unchanged(path):  # since it was listed, others were sent and this one was read
             return

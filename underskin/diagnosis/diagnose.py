@@ -8,7 +8,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 
-from underskin.client.documents.report import Report
+from underskin.client.documents import Report
 from underskin.diagnosis import pipeline
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import report as report_document

@@ -14,7 +14,7 @@ from tests.support.diagnosis_campaigns import campaign as made_campaign
 from tests.support.lean_reports import beside
 from tests.support.store_server import Server
 from underskin import Client, ServiceError
-from underskin.client.documents.diagnoses import Diagnosis
+from underskin.client.documents import Diagnosis
 from underskin.recordings.campaign import FrfRecording, to_dict
 from underskin.surrogate.sigma_table import load_table
 

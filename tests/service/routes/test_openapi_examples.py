@@ -1,7 +1,6 @@
 """Every request and every answer of the OpenAPI document has an example: valid, and what a real server answers."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -9,22 +8,11 @@ import jsonschema_rs
 import orjson
 import pytest
 
-from scripts.openapi_examples import FILE, walk
+from scripts.openapi_examples import FILE
 from service.schemas.report import Report
 from tests.support.document_schemas import closed
-from tests.support.server import running
 
 STORED = orjson.loads(FILE.read_bytes())
-CALCULATIONS = (
-    "sigma_one",
-    "sigma_columns",
-    "frf_columns",
-    "d33_columns",
-    "stress",
-    "field",
-    "design",
-    "umbridge_gradient",
-)
 # Without an example: arrays and files, and answers that are the document itself or never come.
 WORKBOOKS = (
     "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
@@ -38,16 +26,6 @@ NO_ANSWER = ("openapi", "umbridge_apply_hessian")
 def document(http: httpx.Client) -> dict[str, Any]:
     described: dict[str, Any] = http.get("/openapi.json").json()
     return described
-
-
-@pytest.fixture(scope="module")
-def walked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What a server over an empty store answers now."""
-    folder = tmp_path_factory.mktemp("walked")
-    settings = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1", "UNDERSKIN_DIAGNOSIS_READY": "true"}
-    settings["UNDERSKIN_MECHANISMS"] = str(folder / "mechanisms")
-    with running(folder, settings) as server, httpx.Client(base_url=server.url, timeout=60) as http:
-        return walk(http)
 
 
 def operations(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -103,23 +81,10 @@ def test_every_property_every_schema_described(document: dict[str, Any]) -> None
     assert described > 500
 
 
-def test_a_server_answers_as_the_examples_say(walked: dict[str, Any]) -> None:
-    """Field by field of the same types; rerun scripts/openapi_examples.py where they have changed."""
-    assert set(walked) == set(STORED)
-    for name, stored in STORED.items():
-        report = walked[name]["answer"].pop("report", None) if name == "diagnosis" else None
-        if report is not None:
-            jsonschema_rs.Draft202012Validator(closed(Report.model_json_schema())).validate(report)
-            stored["answer"].pop("report")
-        assert shape(walked[name]) == shape(stored), name
-
-
-def test_server_calculates_examples_say(walked: dict[str, Any]) -> None:
-    """A server calculates what the examples say."""
-    for name in CALCULATIONS:
-        numbers, expected = list(leaves(walked[name]["answer"])), list(leaves(STORED[name]["answer"]))
-        assert numbers == pytest.approx(expected, rel=1e-6, abs=1e-9), name
-        assert numbers, name
+def test_example_report_valid() -> None:
+    """The report of the example is a `report/1`, without further fields."""
+    report = STORED["diagnosis"]["answer"]["report"]
+    jsonschema_rs.Draft202012Validator(closed(Report.model_json_schema())).validate(report)
 
 
 def test_the_example_of_a_form_is_accepted(http: httpx.Client, document: dict[str, Any]) -> None:
@@ -131,31 +96,3 @@ def test_the_example_of_a_form_is_accepted(http: httpx.Client, document: dict[st
     (sent,) = answer.json()["campaigns"]
     assert sent["status"] == "ok"
     assert http.get(f"/v1/campaigns/{sent['id']}").json()["name"] == fields["together"]
-
-
-def shape(document: Any) -> Any:
-    """The names of fields, and the types of values; of a list its first entry, of an open mapping nothing."""
-    if isinstance(document, dict):
-        opened = {"about", "region", "provenance", "fit", "mechanisms", "scalars"} & set(document)
-        return {name: None if name in opened else shape(value) for name, value in document.items()}
-    if isinstance(document, list):
-        return [shape(entry) for entry in document[:1]]
-    return "number" if isinstance(document, int | float) else type(document).__name__
-
-
-def leaves(document: Any) -> Iterator[float]:
-    """All numbers, in order."""
-    if isinstance(document, dict):
-        document = list(document.values())
-    if isinstance(document, list):
-        for entry in document:
-            yield from leaves(entry)
-    elif isinstance(document, float):
-        yield document
-
-
-def test_the_examples_are_of_one_run() -> None:
-    """Ids are numbered and times are replaced, so that a rerun does not change them."""
-    text = Path(FILE).read_text()
-    assert "c-0000000000000001" in text
-    assert "2026-01-05T09:00:00Z" in text

@@ -14,7 +14,7 @@ from tests.support.cases import first
 from tests.support.diagnosed import finished, sent
 from tests.support.store_server import Server, campaign
 from underskin import Client
-from underskin.client.documents.diagnoses import Diagnosis
+from underskin.client.documents import Diagnosis
 
 BACKEND = "sqlite"
 Rows = list[dict[str, Any]]

@@ -93,6 +93,8 @@ def _code_of(commit: str) -> Iterator[Path]:
         subprocess.run(["tar", "--extract", "--directory", folder], input=archive, check=True)
         code = Path(folder)
         _install(code)
+        if (code / "scripts/client_documents.py").exists():
+            subprocess.run([sys.executable, "-m", "scripts.client_documents"], cwd=code, check=True)
         if (code / "underskin/compiled.py").exists():
             compiling = os.environ | {"PYTHONPATH": folder}
             subprocess.run([sys.executable, "-m", "underskin.compiled"], cwd=code, env=compiling, check=True)

@@ -34,6 +34,55 @@ class Document(Mapping[str, Any]):
         return len(self.document)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sensor(Document):
+    """A sensor of the array."""
+
+    id: str
+    """Its name, one of its own."""
+
+    x_mm: float
+    """Its centre along the skin's length [mm]."""
+
+    y_mm: float
+    """Its centre along the skin's width [mm]."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Skin(Document):
+    """The skin as a campaign declares it (`campaign/1`); None where it does not say."""
+
+    poisson_ratio: float
+    """Poisson's ratio ν of the elastomer, 0 to 0.5 [-]."""
+
+    id: str | None
+    """Its name, one of its own."""
+
+    thickness_mm: float | None
+    """Thickness h of the layer over the sensors [mm]."""
+
+    youngs_modulus_mpa: float | None
+    """Young's modulus E of the layer [MPa]."""
+
+    sensor_radius_mm: float | None
+    """Radius rT of a sensor [mm]."""
+
+    d33_pc_per_n: float | None
+    """Piezoelectric coefficient d33 [pC/N]."""
+
+    width_mm: float | None
+    """Extent of the skin along y [mm]."""
+
+    length_mm: float | None
+    """Extent of the skin along x [mm]."""
+
+    tolerances: Mapping[str, float] | None
+    """Standard deviations of the declared thickness, sensor radius and modulus [%]."""
+
+    sensors: tuple[Sensor, ...] | None
+    """The sensors of the array."""
+
+
 @cache
 def _hints(kind: type[Document]) -> dict[str, Any]:
     """The type of each field."""

@@ -1,1 +1,0 @@
-"""What the service answers, as typed documents; `python -m scripts.client_documents` writes all but `document`."""
