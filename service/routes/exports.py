@@ -10,10 +10,10 @@ from starlette.concurrency import run_in_threadpool
 from service.dependencies import WRITE, SkinId, Store
 from service.ingest import skin_imports
 from service.ingest.form_fields import split
-from service.ingest.skin_imports import Imported
 from service.ingest.uploads import UploadFolder, received
 from service.problems import Refusal
 from service.routes.temporary_files import MadeFile, made_file
+from service.schemas.skins import Imported
 from service.store import Database, skins
 from service.store.export import export
 
