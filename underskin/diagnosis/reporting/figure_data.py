@@ -10,7 +10,7 @@
   its explanation depends on the line. Values are means weighted with 1/variance.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,9 +21,10 @@ from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
 from underskin.diagnosis.inference.residuals import row_prediction
 from underskin.diagnosis.localisation import axis_values
+from underskin.diagnosis.reporting.facts import DiagnosisResult
+from underskin.diagnosis.reporting.kinds import KINDS
 from underskin.diagnosis.reporting.numbers import parameter_index
-from underskin.diagnosis.reporting.report import DiagnosisResult
-from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, frf_recordings
+from underskin.recordings.campaign import Campaign, CurveRecording, frf_recordings
 from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
@@ -41,21 +42,12 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class CurvePrediction:
-    """One explanation's prediction of one curve: force (rows,), its standard deviation (rows,) from noise and from
-    errors that neighbouring samples share, and the contact point."""
-
-    force_n: Floats
-    deviation_n: Floats
-    contact: Mark
-
-
-@dataclass(frozen=True)
 class ShownCurve:
     """One recording: the drawn samples (shown,) of its `count`, and the means that were fitted (rows,).
 
-    `snap_in` is the first sample in contact after the jump, `pull_off` the last one before its jump; None where there
-    is no jump.
+    `predicted_n` and `contacts`: force and contact point by the explanations `before` and `after`; `deviation_n`: of
+    the force about the latter, from noise and from errors that neighbouring samples share. `snap_in` is the first
+    sample in contact after the jump, `pull_off` the last one before its jump; None where there is no jump.
     """
 
     name: str
@@ -64,8 +56,9 @@ class ShownCurve:
     sample_n: Floats  # (shown,)
     displacement_mm: Floats  # (rows,)
     force_n: Floats  # (rows,)
-    before: CurvePrediction
-    after: CurvePrediction
+    predicted_n: Mapping[str, Floats]  # each (rows,)
+    contacts: Mapping[str, Mark]
+    deviation_n: Floats  # (rows,)
     snap_in: Mark | None
     pull_off: Mark | None
 
@@ -73,25 +66,50 @@ class ShownCurve:
     def misfit_percent(self) -> float:
         """100 √(Σ|y − m|²/Σ|y|²) under the explanation after."""
         size = float(np.linalg.norm(self.force_n))
-        return 100 * float(np.linalg.norm(self.force_n - self.after.force_n)) / size if size else 0.0
+        return 100 * float(np.linalg.norm(self.force_n - self.predicted_n["after"])) / size if size else 0.0
 
 
 def shown_curves(
     problem: FittingProblem, recorded: Campaign, before: Explanation, after: Explanation
 ) -> list[ShownCurve]:
     """All fitted curves, the worst explained first; `recorded` holds them with every sample."""
-    raw = {
-        recording.id: recording
-        for recording in recorded.recordings
-        if isinstance(recording, CurveRecording) and recording.kind == problem.kind
-    }
     lines = problem.lines
-    predicted = zip(_predictions(problem, before), _predictions(problem, after), strict=True)
+    raw = {recording.id: recording for recording in _curves(recorded)}
+    _, before_curves = _predictions(problem, before)
+    cell, after_curves = _predictions(problem, after)
+    deviation = _deviation(problem, after, cell)
     curves = []
-    for recording, span, predictions in zip(lines.campaign.recordings, lines.spans, predicted, strict=True):
-        assert isinstance(recording, CurveRecording)
-        curves.append(_shown(raw[recording.id], recording.displacement_mm, lines.value.real[span], *predictions))
+    for index, (recording, span) in enumerate(zip(_curves(lines.campaign), lines.spans, strict=True)):
+        sample_mm, measured, *times = finite_samples(raw[recording.id])
+        landmarks = curve_landmarks(sample_mm, measured, *times)
+        jumps: list[int | None] = [None, None]
+        if recording.kind == "indentation":
+            measured = measured - landmarks.zero
+            jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
+        snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
+        along = path_fractions(sample_mm, measured, landmarks.noise)
+        shown = _thinned(along, [landmarks.turn, *(at for at in jumps if at is not None)])
+        predicted = {"before": before_curves[index], "after": after_curves[index]}
+        curves.append(
+            ShownCurve(
+                name=recording.id,
+                count=len(measured),
+                sample_mm=sample_mm[shown],
+                sample_n=measured[shown],
+                displacement_mm=recording.displacement_mm,
+                force_n=lines.value.real[span],
+                predicted_n={role: force for role, (force, _) in predicted.items()},
+                contacts={role: contact for role, (_, contact) in predicted.items()},
+                deviation_n=deviation[span],
+                snap_in=snap_in,
+                pull_off=pull_off,
+            )
+        )
     return sorted(curves, key=lambda curve: -curve.misfit_percent)
+
+
+def _curves(campaign: Campaign) -> list[CurveRecording]:
+    return [recording for recording in campaign.recordings if isinstance(recording, CurveRecording)]
 
 
 def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Floats) -> tuple[Floats, Floats] | None:
@@ -108,25 +126,21 @@ def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Fl
     return (fit, plain) if misfit > _MORE * least_misfit else None
 
 
-def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
-    """The prediction of each curve."""
+def _predictions(problem: FittingProblem, explanation: Explanation) -> tuple[CellResponse, list[tuple[Floats, Mark]]]:
+    """The cells' response under an explanation; of each curve the force (rows,) [N] and the contact point."""
     lines, fit = problem.lines, explanation.point.fit
     force = explanation.model.predict(fit).value.real
     cell = cell_response(lines, explanation.best.levels, force)
     reading = cell.reading(lines, force)
-    plain = plain_reading(problem, explanation, reading)
-    if plain is not None:
-        fit, reading = plain
-    deviation = _deviation(problem, explanation, cell)
+    fit, reading = plain_reading(problem, explanation, reading) or (fit, reading)
     predicted = []
-    for recording, span in zip(lines.campaign.recordings, lines.spans, strict=True):
-        assert isinstance(recording, CurveRecording)
+    for recording, span in zip(_curves(lines.campaign), lines.spans, strict=True):
         contact = float(fit[parameter_index(explanation, f"contact_point {recording.id}")])
         # The cell's reading in the air just before contact, including any drift
         in_air = np.flatnonzero(recording.displacement_mm[: int(recording.displacement_mm.argmax()) + 1] <= contact)
         shown = reading[span][in_air[-1]] if len(in_air) else cell.offset[span][0]
-        predicted.append(CurvePrediction(reading[span], deviation[span], Mark(contact, float(shown))))
-    return predicted
+        predicted.append((reading[span], Mark(contact, float(shown))))
+    return cell, predicted
 
 
 def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResponse) -> Floats:
@@ -139,33 +153,6 @@ def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResp
     ]
     variance = (levels.level * lines.deviation) ** 2 + np.concatenate(shared) - cell.variance
     return np.sqrt(np.maximum(variance, 0.0))
-
-
-def _shown(
-    raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
-) -> ShownCurve:
-    sample_mm, measured, *times = finite_samples(raw)
-    landmarks = curve_landmarks(sample_mm, measured, *times)
-    jumps: list[int | None] = [None, None]
-    if raw.kind == "indentation":
-        measured = measured - landmarks.zero
-        jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
-    snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
-    shown = _thinned(
-        path_fractions(sample_mm, measured, landmarks.noise), [landmarks.turn, *(at for at in jumps if at is not None)]
-    )
-    return ShownCurve(
-        name=raw.id,
-        count=len(measured),
-        sample_mm=sample_mm[shown],
-        sample_n=measured[shown],
-        displacement_mm=displacement,
-        force_n=force,
-        before=before,
-        after=after,
-        snap_in=snap_in,
-        pull_off=pull_off,
-    )
 
 
 def _thinned(way: Floats, corners: list[int]) -> Indices:
@@ -211,23 +198,16 @@ class ShownFrf:
 def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation) -> list[ShownFrf]:
     """The fitted recordings, the one with the largest misfit after first; at most `MOST_RECORDINGS`, those with the
     largest misfit, equally many of each sensor."""
-    lines = problem.lines
-    measured, predicted_before, predicted_after = (
-        _PC_PER_C * rows
-        for rows in (lines.value, *(_predicted(problem, explanation) for explanation in (before, after)))
-    )
-    deviation = _PC_PER_C * _frf_deviation(problem, after)
-    misfits = [
-        [_misfit_percent(measured[span], rows[span]) for span in lines.spans]
-        for rows in (predicted_before, predicted_after)
-    ]
-    chosen = _worst([recording.sensor for recording in frf_recordings(lines.campaign)], misfits[1])
+    lines, recordings = problem.lines, frf_recordings(problem.lines.campaign)
+    predicted = [_predicted(problem, explanation) for explanation in (before, after)]
+    misfits = [[_misfit_percent(lines.value[span], rows[span]) for span in lines.spans] for rows in predicted]
+    deviation = _frf_deviation(problem, after, predicted[1])
+    chosen = _worst([recording.sensor for recording in recordings], misfits[1])
     most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, _MOST_LINES))
     shown = []
     for index in chosen:
-        recording, span = lines.campaign.recordings[index], lines.spans[index]
-        assert isinstance(recording, FrfRecording)
-        shown_rows = span.start + _thinned_lines(lines.frequency[span], most)
+        recording, span = recordings[index], lines.spans[index]
+        rows = span.start + _thinned_lines(lines.frequency[span], most)
         shown.append(
             ShownFrf(
                 name=recording.id,
@@ -235,11 +215,11 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
                 indenter_radius_mm=recording.indenter_radius_mm,
                 preload_n=recording.preload_n,
                 count=span.stop - span.start,
-                frequency_hz=lines.frequency[shown_rows],
-                measured=measured[shown_rows],
-                before=predicted_before[shown_rows],
-                after=predicted_after[shown_rows],
-                deviation=deviation[:, shown_rows],
+                frequency_hz=lines.frequency[rows],
+                measured=_PC_PER_C * lines.value[rows],
+                before=_PC_PER_C * predicted[0][rows],
+                after=_PC_PER_C * predicted[1][rows],
+                deviation=_PC_PER_C * deviation[:, rows],
                 misfit_before=misfits[0][index],
                 misfit_after=misfits[1][index],
             )
@@ -255,19 +235,20 @@ def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
     return predicted
 
 
-def _frf_deviation(problem: FittingProblem, explanation: Explanation) -> Floats:
+def _frf_deviation(problem: FittingProblem, explanation: Explanation, predicted: Complexes) -> Floats:
     """Standard deviation of real and imaginary part about the prediction (2, rows) [C/N]: noise of the lines, mains
     pick-up, gain and position of the recording."""
     lines, best = problem.lines, explanation.best
-    levels, predicted = best.levels, _predicted(problem, explanation)
-    pickup = best.pickup_variance
-    of_line = (levels.level * lines.deviation) ** 2 + (
-        pickup if len(pickup) == len(lines.value) else pickup[lines.recording]
-    )
+    levels = best.levels
+    of_line = (levels.level * lines.deviation) ** 2 + _of_rows(lines, best.pickup_variance)
     position_variance = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
     relative = levels.gain**2 + position_variance + 0.5 * levels.position**4 * problem.curvature.square
-    parts = np.array([predicted.real, predicted.imag])
-    return np.sqrt(of_line + relative[lines.recording] * parts**2)
+    return np.sqrt(of_line + relative[lines.recording] * np.array([predicted.real, predicted.imag]) ** 2)
+
+
+def _of_rows(lines: Lines, column: Floats) -> Floats:
+    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
+    return column if len(column) == len(lines.value) else column[lines.recording]
 
 
 def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
@@ -308,7 +289,7 @@ _MOST_OF_TRAVEL = 12  # of the displacement, whose labels are long
 _DIGITS, _DECIMALS = range(3, 10), range(7)  # tried for labels, until all differ
 _ALMOST_ALL = 0.9  # share of the gaps between neighbouring lines that are no wider than a step
 _SLACK = 1e-9  # of a step, for lines on its edge
-_SMALLEST = 0.05  # of the largest response: the least scale of a residual
+SMALLEST = 0.05  # of the largest response: the least scale of a residual
 
 
 @dataclass(frozen=True)
@@ -324,8 +305,7 @@ class Points:
     @property
     def residual_percent(self) -> Complexes:
         """Measured minus predicted over |predicted|, or over 5 % of the largest where that is more."""
-        size = np.abs(self.predicted)
-        residual: Complexes = 100 * (self.measured - self.predicted) / np.maximum(size, _SMALLEST * size.max())
+        residual: Complexes = 100 * (self.measured - self.predicted) / self._scale
         return residual
 
     def times(self, factor: float) -> "Points":
@@ -340,9 +320,13 @@ class Points:
     @property
     def noise_percent(self) -> Floats:
         """Standard deviation of the noise over the same scale."""
-        size = np.abs(self.predicted)
-        noise: Floats = 100 * np.hypot(self.deviation, self.gain * size) / np.maximum(size, _SMALLEST * size.max())
+        noise: Floats = 100 * np.hypot(self.deviation, self.gain * np.abs(self.predicted)) / self._scale
         return noise
+
+    @property
+    def _scale(self) -> Floats:
+        size = np.abs(self.predicted)
+        return np.maximum(size, SMALLEST * size.max())
 
 
 @dataclass(frozen=True)
@@ -386,7 +370,7 @@ class Thinned:
         if plain is not None:
             predicted = plain[1].astype(complex)
         variance = (levels.level**2 / self._total) + self._mean(self._row_variance(explanation))
-        unit = 1.0 if lines.curves else 1e12
+        unit = KINDS[lines.kind].per_si
         return Points(
             recording=self.recording,
             measured=unit * self._complex_mean(lines.value),
@@ -435,8 +419,7 @@ class Thinned:
             explanation.best.hypothesis.lines.recording
         ]
         variance += levels.position**2 * squared_slopes * np.abs(prediction.value) ** 2
-        variance += explanation.best.pickup_variance
-        return variance if len(variance) == len(self.lines.value) else variance[self.lines.recording]
+        return _of_rows(self.lines, variance + explanation.best.pickup_variance)
 
     def _mean(self, column: Floats) -> Floats:
         return np.bincount(self._point, self._weight * column) / self._total

@@ -17,8 +17,8 @@ from plotly.offline import get_plotlyjs
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.figures import explanations, several_figures
-from underskin.diagnosis.reporting.law_statement import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.page_styles import SCHEME
+from underskin.diagnosis.reporting.statement import first_and_rest, lacking_part
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed

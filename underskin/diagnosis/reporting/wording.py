@@ -9,8 +9,8 @@ from typing import Any
 from underskin.diagnosis.data.dataset import WORDS
 from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.figure_data import AXES
-from underskin.diagnosis.reporting.law_statement import capital
 from underskin.diagnosis.reporting.page_styles import FIELD_OF, with_minus, without_powers
+from underskin.findings.formatting import capital
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import AXES as FOLLOWED
 from underskin.mechanisms.unlisted.vocabulary import followed

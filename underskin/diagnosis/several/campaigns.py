@@ -15,7 +15,8 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.report import DiagnosisResult, reported
+from underskin.diagnosis.reporting.facts import DiagnosisResult
+from underskin.diagnosis.reporting.report import reported
 from underskin.diagnosis.several.course import Shared, values
 from underskin.diagnosis.several.sensors import (
     CampaignDates,

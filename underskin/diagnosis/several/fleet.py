@@ -18,9 +18,9 @@ from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.law_statement import of_clauses
+from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.numbers import rounded
-from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report, reported
+from underskin.diagnosis.reporting.report import SCHEMA, report, reported
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE
 from underskin.diagnosis.selection.priors import SHOWS, log_prior
 from underskin.diagnosis.several import together_report
@@ -44,7 +44,7 @@ from underskin.diagnosis.several.population import (
 from underskin.diagnosis.several.sensors import CampaignDates, date_of, in_order
 from underskin.diagnosis.several.together_report import of_kinds
 from underskin.errors import InvalidInput
-from underskin.findings.formatting import in_percent
+from underskin.findings.formatting import in_percent, of_clauses
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats

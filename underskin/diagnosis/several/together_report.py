@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
-from underskin.diagnosis.reporting.law_statement import of_clauses
+from underskin.diagnosis.reporting.d33 import StatedD33
+from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
-from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, Reported
-from underskin.diagnosis.reporting.statements import StatedD33, listed
+from underskin.diagnosis.reporting.report import SCHEMA, Reported
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE
 from underskin.diagnosis.several.course import (
     Candidate,
@@ -46,7 +46,7 @@ from underskin.diagnosis.several.sensors import (
 )
 from underskin.diagnosis.several.sensors import findings as exchanges
 from underskin.findings.codes import FindingCode
-from underskin.findings.formatting import in_percent
+from underskin.findings.formatting import in_percent, listed, of_clauses
 from underskin.inversion.array_course import FEWEST_DATES
 from underskin.inversion.array_history import TWO_DATES, array_change_in_words
 from underskin.recordings.campaign import Campaign, FrfRecording
