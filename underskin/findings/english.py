@@ -10,7 +10,7 @@ from typing import Any
 
 from underskin.findings import sentences
 from underskin.findings.codes import Reason
-from underskin.findings.formatting import in_digits
+from underskin.findings.formatting import in_digits, significant
 from underskin.findings.lacking import Lack, Lacking
 
 Words = str | Callable[..., str]
@@ -20,9 +20,10 @@ OPTIONAL: Mapping[str, Any] = {"left_out": False, "example": "", "frequency_hz":
 class _Template(string.Formatter):
     """Python's format specifications, and some for words.
 
-    `{value:yes|no}` is one text if the value is true, else the other; either may hold fields. `{value:digits 2}` never
-    is a power of ten. Of a list `{ids:count}` is its length, `{ids:listed recordings}` and `{ids:sensors}` name its
-    first ids, `{more:more recording}` is a number of further cases in brackets. None is empty.
+    `{value:yes|no}` is the first text, which may hold fields, if the value is true, else the second. `{value:digits 2}`
+    never is a power of ten, `{value:significant 2}` no positive one. `{texts:or}` joins a list, `{ids:count}` is its
+    length, `{ids:listed recordings}` and `{ids:sensors}` name its first ids, and `{more:more recording}` is a number of
+    further cases in brackets. None is empty.
     """
 
     def format_field(self, value: Any, format_spec: str) -> str:
@@ -40,6 +41,8 @@ class _Template(string.Formatter):
 
 _WORDS: Mapping[str, Callable[[Any, str], str]] = {
     "digits": lambda value, digits: in_digits(value, int(digits)),
+    "significant": lambda value, digits: significant(value, int(digits)),
+    "or": lambda texts, _: ", or ".join(texts),
     "count": lambda ids, _: str(len(ids)),
     "listed": sentences.listed,
     "sensors": lambda ids, _: sentences.listed_sensors(ids),
@@ -76,6 +79,10 @@ _OF_ARRAY = "{percent:.0f} % of the array's d33"
 _MORE_ROWS = "{more: ({more} more rows like it)|}"
 _UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
 _RESPONSE = "1000 × too {too_large:large: pC taken for nC, or N for mN?|small: nC taken for pC?}"
+_NEEDED = (
+    "force and displacement would need a modulus of about {modulus_mpa:.2g} MPa: "
+    "{slips:{slips:or}?|are force, displacement and size in the units that were said?}"
+)
 _THOUSANDFOLD = "{too_small:a thousandfold|divided by 1000}"
 _ALL_AS_IN, _LEFT_OUT = "{example:in all recordings, as in {example}: |}", "{left_out: Left out|}"  # of time series
 DEFECT = "{channel}: {samples} samples from sample {first_sample} {kind}"
@@ -141,8 +148,8 @@ ENGLISH: Mapping[Reason, Words] = {
     "slip of units? Left out",
     Reason.TWO_MODULI: "the two curves' apparent moduli of {first_mpa:.2g} and {second_mpa:.2g} MPa contradict each "
     "other: is force or displacement of one of them off by 1000?",
-    Reason.MODULUS_BESIDE_DECLARED: sentences.needed_modulus("{declared_mpa:g} MPa is declared"),
-    Reason.MODULUS_BESIDE_RUBBER: sentences.needed_modulus("Rubber has {low_mpa:g} to {high_mpa:g} MPa"),
+    Reason.MODULUS_BESIDE_DECLARED: f"{_NEEDED} {{declared_mpa:g}} MPa is declared",
+    Reason.MODULUS_BESIDE_RUBBER: f"{_NEEDED} Rubber has {{low_mpa:g}} to {{high_mpa:g}} MPa",
     Reason.MODULUS_OF_NO_ELASTOMER: sentences.elastomer,
     Reason.DECLARED_UNUSUAL: _UNUSUAL,
     Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
@@ -253,7 +260,9 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
     "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "
     "percent; a drive that repeats itself at least four times gives them all",
-    Reason.MAINS_IN_CHARGE: sentences.mains_in_charge,
+    Reason.MAINS_IN_CHARGE: "in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a "
+    "multiple of it by about {charge_pc:significant 2} pC, and the force does not: mains pickup? The lines there "
+    "are left out",
     Reason.NOISE_IN_FRF: sentences.noise_in_frf,
     Reason.BEHIND_FILTER: sentences.behind_filter,
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",

@@ -4,11 +4,11 @@ Also the types of arguments that are more than a number or a name.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from underskin.findings.formatting import in_digits, significant
+from underskin.findings.formatting import in_digits
 
 
 @dataclass(frozen=True)
@@ -131,31 +131,12 @@ def elastomer(modulus_mpa: float, low_mpa: float, high_mpa: float, guess: UnitGu
     return f"{modulus_mpa:g} MPa is {word} than elastomers are {usual}: {guess}"
 
 
-def needed_modulus(against: str) -> Callable[..., str]:
-    """Words for curves whose apparent modulus is far from `against`."""
-
-    def words(modulus_mpa: float, slips: Sequence[str], **bounds: float) -> str:
-        guess = f"{', or '.join(slips)}?" if slips else "are force, displacement and size in the units that were said?"
-        needed = f"force and displacement would need a modulus of about {modulus_mpa:.2g} MPa"
-        return f"{needed}: {guess} {against.format(**bounds)}"
-
-    return words
-
-
 def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> str:
     """Lines where the force has little power."""
     of = "one recording" if recordings == 1 else f"{recordings} recordings"
     beyond = f"; so are {beside} whose noise the next line shares" if beside else ""
     why = "the force has little power there, or the charge does not follow it"
     return f"{faint} of {measured} lines of {of} are left out: {why}{beyond}"
-
-
-def mains_in_charge(affected: int, recordings: int, mains_hz: float, charge_pc: float) -> str:
-    """Mains on the charge."""
-    return (
-        f"in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a multiple of it by "
-        f"about {significant(charge_pc, 2)} pC, and the force does not: mains pickup? The lines there are left out"
-    )
 
 
 def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
