@@ -160,11 +160,10 @@ def _thinned(way: Floats, corners: list[int]) -> Indices:
     count = len(way)
     if count <= MOST_SAMPLES:
         return np.arange(count)
-    even = np.minimum(np.searchsorted(way, np.linspace(0.0, 1.0, MOST_SAMPLES)), count - 1)
     near_corners = [
         np.arange(max(at - _SAMPLES_NEAR_CORNER, 0), min(at + _SAMPLES_NEAR_CORNER + 1, count)) for at in corners
     ]
-    return np.unique(np.concatenate([even, *near_corners]))
+    return np.unique(np.concatenate([_even(way, MOST_SAMPLES), *near_corners]))
 
 
 MOST_RECORDINGS = 120
@@ -275,8 +274,13 @@ def _thinned_lines(frequency: Floats, most: int) -> Indices:
     if count <= most:
         return np.arange(count)
     log_frequency = np.log(np.maximum(frequency, np.min(frequency[frequency > 0], initial=np.inf)))
-    targets = np.linspace(log_frequency[0], log_frequency[-1], most)
-    return np.unique(np.minimum(np.searchsorted(log_frequency, targets), count - 1))
+    return _even(log_frequency, most)
+
+
+def _even(along: Floats, most: int) -> Indices:
+    """Indices that are about even in a rising coordinate."""
+    targets = np.linspace(along[0], along[-1], most)
+    return np.unique(np.minimum(np.searchsorted(along, targets), len(along) - 1))
 
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}

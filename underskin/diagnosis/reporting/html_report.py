@@ -50,7 +50,7 @@ plot.parentElement.style.height = "auto"; // its box has the height of the figur
 """  # replaces a figure's own menu, which the keyboard cannot open
 
 _FILTERS = (
-    *(wording.as_stated, wording.axis, wording.columns, wording.error, wording.finding, wording.group),
+    *(wording.axis, wording.columns, wording.error, wording.finding, wording.group),
     *(wording.in_its_unit, wording.interval, wording.law_range, wording.not_quoted, wording.number, wording.plain),
     *(wording.quantity, wording.readable, wording.unit, wording.words),
     *(acted_on, followed, first_and_rest, in_percent, lacking_part),

@@ -7,6 +7,7 @@ from typing import Any
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.reporting.numbers import (
     ENDS,
+    in_sentence,
     parameter_index,
     parameter_with_interval,
     parameters_of,
@@ -104,7 +105,7 @@ def _modulus_of_first_kind(joined: KindsTogether) -> list[dict[str, Any]]:
 def moduli_clause(joined: KindsTogether, rows: Sequence[Mapping[str, Any]]) -> str:
     """A clause on E by kind; empty where there is one kind."""
     text = ", ".join(
-        f"E from {KINDS[row['kind']].recordings}: {row['value']:.3g} MPa (95 %: {row['low']:.3g} to {row['high']:.3g})"
+        f"E from {KINDS[row['kind']].recordings}: {in_sentence(row)}"
         for row in rows
         if row["parameter"] == "youngs_modulus"
     )

@@ -49,6 +49,12 @@ def scaled(parameter: Mapping[str, Any], factor: float) -> dict[str, float | Non
     return with_ends(*(factor * parameter[key] for key in ENDS))
 
 
+def in_sentence(parameter: Mapping[str, Any]) -> str:
+    """A parameter's value and interval in a sentence: "2.04 MPa (95 %: 1.9 to 2.2)"."""
+    value, low, high = (f"{parameter[key]:.3g}" for key in ENDS)
+    return f"{value} {parameter['unit']} (95 %: {low} to {high})"
+
+
 def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Floats) -> float:
     """A quantile of a mixture of normal distributions (parts,), whose `shares` sum to 1."""
 

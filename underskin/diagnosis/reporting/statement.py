@@ -66,8 +66,7 @@ def statement(facts: Facts) -> str:
     if facts.leading is not None and facts.law is not None:
         first = f"no known mechanism describes this (probability {in_percent(facts.leader.probability)})"
         second, further = _law_clauses(facts, facts.leading, facts.law)
-        names = [mechanism["name"] for mechanism in facts.mechanisms]
-        last = [*further, misfit_clause(fit, model, names) if of_curves else "", *quoted]
+        last = [*further, _misfit_clause(fit, model, "this law") if of_curves else "", *quoted]
     else:
         first, *second = answer_clauses(
             facts.search.answers,
@@ -85,7 +84,7 @@ def statement(facts: Facts) -> str:
         if verdict == "unexplained":
             # The shape of the residual is not stated where a mechanism that may explain it was not tried
             second += ["" if facts.untried else shape_clause(facts.diagnosis.shape)]
-            second += [misfit_clause(fit, model)] if of_curves else []
+            second += [_misfit_clause(fit, model)] if of_curves else []
         elif of_curves:
             settled = verdict != "ambiguous"
             how = "under this answer" if settled else f"with {in_words(fit['mechanisms'])}, which is not settled"
@@ -243,25 +242,20 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     if modulus.get("at_bound"):
         bound = f"{modulus['value']:.3g} {modulus['unit']}"
         return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
-    interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
-    return f"Young's modulus {how}: {modulus['value']:.3g} {modulus['unit']} ({interval})"
+    return f"Young's modulus {how}: {numbers.in_sentence(modulus)}"
 
 
-def misfit_clause(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
-    """A clause on the residual of curves under the base model, and under the best set of mechanisms.
-
-    With `law`, the latter is an unlisted law together with these mechanisms.
-    """
-    before, after, names = fit["before"], fit["after"], fit["mechanisms"]
+def _misfit_clause(fit: Mapping[str, Any], model: str, *law: str) -> str:
+    """A clause on the residual of curves under the base model, and under the best set of mechanisms, with `law` an
+    unlisted law among them."""
+    before, after, added = fit["before"], fit["after"], in_words([*law, *fit["mechanisms"]])
     modulus = before.get("least_squares_modulus_mpa")
     base_words = f"{model} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
-    sentence = f"{base_words} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
-    added = in_words(names) if names else ""
-    if law is not None:
-        added = f"this law and {in_words(law)}" if law else "this law"
-    addition = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
-    modulus = _modulus_clause(after, f"with {added}") if added and "youngs_modulus" in after else ""
-    return f"{sentence}{addition}" + (f"; {modulus}" if modulus else "")
+    text = f"{base_words} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
+    if not added:
+        return text
+    left = in_digits(after["rmse_percent"], 2)
+    return f"{text}, with {added} {left} %; {_modulus_clause(after, f'with {added}')}"
 
 
 def _power_clause(power: Sequence[Power], kind: Kind) -> str:

@@ -101,14 +101,9 @@ def group(name: str) -> str:
     return f"{axis(field)}: {value}" if field in {*AXES, *WORDS, *FOLLOWED} else name
 
 
-def number(value: float | None) -> str:
-    """A number to four digits."""
-    return "–" if value is None else with_minus(f"{value:.4g}")
-
-
-def as_stated(value: float | None) -> str:
-    """A number to three digits, as in the statement next to it."""
-    return "–" if value is None else with_minus(f"{value:.3g}")
+def number(value: float | None, digits: int = 4) -> str:
+    """A number to four digits, or to three as in the statement next to it."""
+    return "–" if value is None else with_minus(f"{value:.{digits}g}")
 
 
 def error(value: float | None) -> str:
