@@ -28,7 +28,7 @@ from underskin.recordings.campaign import Campaign, CurveRecording, frf_recordin
 from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
-MOST_SAMPLES = 600  # drawn of a curve
+_MOST_POINTS = 600  # samples drawn of a curve, or points of a map
 _MORE = 1.1  # times the residual of plain least squares
 _SAMPLES_NEAR_CORNER = 12  # on either side of a jump or of the deepest sample, all drawn
 
@@ -158,12 +158,12 @@ def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResp
 def _thinned(way: Floats, corners: list[int]) -> Indices:
     """Indices of the samples drawn: even in the arc length `way` (0 to 1), and all near the corners."""
     count = len(way)
-    if count <= MOST_SAMPLES:
+    if count <= _MOST_POINTS:
         return np.arange(count)
     near_corners = [
         np.arange(max(at - _SAMPLES_NEAR_CORNER, 0), min(at + _SAMPLES_NEAR_CORNER + 1, count)) for at in corners
     ]
-    return np.unique(np.concatenate([_even(way, MOST_SAMPLES), *near_corners]))
+    return np.unique(np.concatenate([_even(way, _MOST_POINTS), *near_corners]))
 
 
 MOST_RECORDINGS = 120
@@ -286,7 +286,6 @@ def _even(along: Floats, most: int) -> Indices:
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
 _TRAVEL = "displacement_mm"
 
-_MOST_POINTS = 600
 _LEAST_BINS = 8  # of the lines, so that a shape over them is visible in campaigns of any size
 _MOST_LEVELS = 24  # of an axis
 _MOST_OF_TRAVEL = 12  # of the displacement, whose labels are long
@@ -355,7 +354,7 @@ class Thinned:
         along = any(axis in diagnosis.region for axis in lines.row_axes)
         by_line = lines.curves or along or any(lines.mechanisms[name].needs_lines for name in shown.names)
         most = max(_MOST_POINTS // lines.recordings, _LEAST_BINS) if by_line else 1
-        step = _steps_of_samples(lines.frequency, most) if lines.curves else _steps_of_lines(lines, most)
+        step = _in_steps(np.round(lines.frequency, 6), most)[2] if lines.curves else _steps_of_lines(lines, most)
         bins = int(step.max()) + 1
         self.by_line = by_line
         self._used, self._point = np.unique(lines.recording * bins + step, return_inverse=True)
@@ -398,11 +397,10 @@ class Thinned:
 
     def _of_lines(self, frequency: Floats) -> Levels | None:
         """The steps common to all recordings, neighbours merged where there are too many."""
-        distinct, step = np.unique(self._bin, return_inverse=True)
-        steps = min(len(distinct), _MOST_LEVELS)
+        _, of_distinct, step = _in_steps(self._bin, _MOST_LEVELS)
+        steps = int(of_distinct[-1]) + 1
         if steps < 2:
             return None
-        step = step.reshape(-1) * steps // len(distinct)
         of_row = step[self._point]
         low, high = np.full(steps, np.inf), np.zeros(steps)
         np.minimum.at(low, of_row, frequency)
@@ -432,11 +430,12 @@ class Thinned:
         return self._mean(column.real) + 1j * self._mean(column.imag)
 
 
-def _steps_of_samples(coordinate: Floats, most: int) -> Indices:
-    """The step of each sample (rows,), with about equal numbers of distinct values of `coordinate`."""
-    distinct, index = np.unique(np.round(coordinate, 6), return_inverse=True)
-    steps: Indices = index.reshape(-1) * min(len(distinct), most) // len(distinct)
-    return steps
+def _in_steps(values: Array, most: int) -> tuple[Array, Indices, Indices]:
+    """The distinct values, and the step of each of them and of each value: steps of about equal numbers of distinct
+    values."""
+    distinct, index = np.unique(values, return_inverse=True)
+    of_distinct = np.arange(len(distinct)) * min(len(distinct), most) // len(distinct)
+    return distinct, of_distinct, of_distinct[index.reshape(-1)]
 
 
 def _steps_of_lines(lines: Lines, most: int) -> Indices:
@@ -454,12 +453,11 @@ def _steps_of_lines(lines: Lines, most: int) -> Indices:
 
 def _stepped(column: Floats, axis: str) -> Levels:
     """The distinct values of a column as steps, or steps of about equal counts; displacements in a readable unit."""
-    distinct, index = np.unique(np.round(column, 6), return_inverse=True)
-    steps = min(len(distinct), _MOST_OF_TRAVEL if axis == _TRAVEL else _MOST_LEVELS)
-    of_value = np.arange(len(distinct)) * steps // len(distinct)
-    starts = np.searchsorted(of_value, np.arange(steps))
+    most = _MOST_OF_TRAVEL if axis == _TRAVEL else _MOST_LEVELS
+    distinct, of_distinct, step = _in_steps(np.round(column, 6), most)
+    starts = np.flatnonzero(np.diff(of_distinct, prepend=-1))
     low, high = distinct[starts], distinct[np.append(starts[1:], len(distinct)) - 1]
-    step, middle = of_value[index.reshape(-1)], (low + high) / 2
+    middle = (low + high) / 2
     if axis != _TRAVEL:
         return Levels(step, _distinct(middle, _DIGITS, fractional=False), low, high, AXES[axis])
     unit, scale = readable_unit(axis, float(np.abs(distinct).max()))

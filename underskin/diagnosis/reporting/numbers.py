@@ -31,7 +31,6 @@ from underskin.units import Floats
 
 SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard deviations
 ENDS = ("value", "low", "high")
-_LEVELS_OF_ENDS = (0.5, 0.025, 0.975)
 
 
 def rounded(value: float, digits: int = 4) -> float | None:
@@ -67,7 +66,7 @@ def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Fl
 
 def of_logarithms(shares: Floats, means: Floats, deviations: Floats) -> dict[str, float | None]:
     """The median and the 95 % interval of a quantity whose logarithm is a mixture of normal distributions (parts,)."""
-    return with_ends(*(np.exp(mixture_quantile(level, shares, means, deviations)) for level in _LEVELS_OF_ENDS))
+    return with_ends(*(np.exp(mixture_quantile(level, shares, means, deviations)) for level in (0.5, 0.025, 0.975)))
 
 
 def with_hidden(

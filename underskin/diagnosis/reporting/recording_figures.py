@@ -23,6 +23,7 @@ from underskin.diagnosis.reporting.figure_data import SMALLEST, Mark, ShownCurve
 from underskin.diagnosis.reporting.kinds import KindTraits
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, multiple_of, spans
 from underskin.diagnosis.reporting.page_styles import (
+    LEAST_PHASE,
     PAPER,
     PLAIN,
     SHOWN,
@@ -49,22 +50,24 @@ def styled(figure: go.Figure) -> go.Figure:
 
 
 class Model(NamedTuple):
-    """Name and style of a model; `role` is before or after, `words` the name in a legend."""
+    """Name and style of a model; `role` is before or after, `words` the name in a legend, `mark` the size of its contact
+    points [pixels]."""
 
     role: str
     words: str
     colour: str
     dash: str
     symbol: str
+    mark: int
 
 
 def models_of(before: str, after: str) -> list[Model]:
     """The models by their names; `before` is empty where there is one."""
     if not before:
-        return [Model("after", after, AFTER, SHOWN, "circle")]
+        return [Model("after", after, AFTER, SHOWN, "circle", 8)]
     return [
-        Model("before", f"before: {before}", BEFORE, PAPER, "square-open"),
-        Model("after", f"after: {after}", AFTER, SHOWN, "circle"),
+        Model("before", f"before: {before}", BEFORE, PAPER, "square-open", 13),
+        Model("after", f"after: {after}", AFTER, SHOWN, "circle", 8),
     ]
 
 
@@ -84,7 +87,6 @@ _CURVE_ROOM = 0.4, 0.05  # of the initial view: additional range in the air, if 
 _ALONG = 40  # points along an edge of the band
 _CURVE_HEIGHT, _PANEL = 460, 150  # pixels
 _PANEL_TITLE = 12  # smaller than others, so that those of two panels do not touch
-_MARKER_SIZES = {"before": 13, "after": 8}  # of contact points
 
 
 def curve_figure(curves: Sequence[ShownCurve], traits: KindTraits, before: str, after: str) -> go.Figure:
@@ -177,7 +179,7 @@ class _Curve:
         marks = []
         for model in self._models:
             name = "contact point" if len(self._models) == 1 else f"contact point {model.role}"
-            marker = {"color": model.colour, "symbol": model.symbol, "size": _MARKER_SIZES[model.role]}
+            marker = {"color": model.colour, "symbol": model.symbol, "size": model.mark}
             marks.append((name, self._curve.contacts[model.role], marker))
         jumps = (("snap-in", self._curve.snap_in, "down"), ("pull-off", self._curve.pull_off, "up"))
         for name, mark, way in jumps:
@@ -222,7 +224,6 @@ class _Curve:
 
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
-_LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _LONG_TITLE = 11  # pixels: fits the height of a panel in a narrow window
 _ROOM = 0.08  # margin at either end of an axis
 _IN_VIEW = 10.0  # times the noise's band: initial range of residuals
@@ -374,7 +375,7 @@ def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
         "yaxis.range": [float(low - room) if wide else 0.0, float(high + room)],
     }
     phases = [columns["measured phase" if name == "measured" else f"{name} phase"] for name in names]
-    low, high = min(-_LEAST_PHASE, *map(np.min, phases)), max(_LEAST_PHASE, *map(np.max, phases))
+    low, high = min(-LEAST_PHASE, *map(np.min, phases)), max(LEAST_PHASE, *map(np.max, phases))
     view["yaxis2.range"] = [float(low - _ROOM * (high - low)), float(high + _ROOM * (high - low))]
     for axis, part in ((3, "real"), (4, "imaginary")):
         band = float(columns[f"noise {part} high"].max())

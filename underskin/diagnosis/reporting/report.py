@@ -23,7 +23,7 @@ _EMPTY: Mapping[str, Any] = {  # the report of recordings that say too little, a
     "schema": SCHEMA,
     "campaign": "",
     "verdict": "insufficient_data",
-    "probability": 1.0,
+    "probability": None,
     "statement": "",
     "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
     "mechanisms": [],
@@ -59,6 +59,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         document = {
             **_EMPTY,
             "campaign": diagnosis.name,
+            "probability": 1.0,
             "statement": statement.insufficient_statement(diagnosis.lacking, findings),
             "findings": findings,
             "next_experiment": None,
