@@ -50,8 +50,8 @@ def styled(figure: go.Figure) -> go.Figure:
 
 
 class Model(NamedTuple):
-    """Name and style of a model; `role` is before or after, `words` the name in a legend, `mark` the size of its contact
-    points [pixels]."""
+    """Style of a model; `role` is before or after, `words` its name in a legend, `mark` the size of its contact points
+    [pixels]."""
 
     role: str
     words: str
