@@ -33,9 +33,9 @@ class _Template(string.Formatter):
             return yes if value else no
         if value is None:
             return ""
-        kind, _, argument = format_spec.partition(" ")
-        if kind in _WORDS:
-            return _WORDS[kind](value, argument)
+        name, _, argument = format_spec.partition(" ")
+        if name in _WORDS:
+            return _WORDS[name](value, argument)
         return str(super().format_field(value, format_spec))
 
 

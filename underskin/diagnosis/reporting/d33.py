@@ -17,7 +17,14 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.inference.residuals import declared_d33, with_hidden_mechanism
-from underskin.diagnosis.reporting.numbers import COUNTS, covariance_of, law_shares, of_logarithms, parameter_index
+from underskin.diagnosis.reporting.numbers import (
+    COUNTS,
+    HIDES,
+    covariance_of,
+    law_shares,
+    of_logarithms,
+    parameter_index,
+)
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, declared_laws
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
@@ -27,7 +34,6 @@ from underskin.units import Floats
 
 _LEVELS = 9  # quantiles over the rows
 _FACTORS = ("gain", "frequency_response")
-_WORTH_MORE = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
 _MOST_NAMED = 2  # mechanisms that would not show, named with a value to quote
 SEVERAL_ANSWERS = "several answers remain"
 BY_NUISANCES = ("d33", "noise")  # confounders of mechanisms that d33, E, h or the noise hide
@@ -111,7 +117,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
         deviation = np.sqrt(covariance_of(explanation, [index])[0])
         parts = [NormalMixture(np.ones(1), explanation.point.fit[index : index + 1], deviation)]
     parts = list(parts)
-    if probability > _WORTH_MORE:
+    if probability > HIDES:
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
         declared = declared_laws(problem.lines)
         answers = [set(answer.explanation.names) for answer in search.answers if answer.explanation is not None]

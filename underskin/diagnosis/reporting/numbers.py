@@ -203,8 +203,9 @@ def at_bounds(explanation: Explanation) -> dict[str, Finding]:
 
 
 COUNTS = 0.003  # probability below which an answer is left out of averages
+HIDES = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
 _TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
-_NAMED, _LEAST_NAMED = 0.02, 3  # probability from which a group is listed, and the least number listed
+NAMED, _LEAST_NAMED = 0.02, 3  # probability from which a rival or a group is named, and least number of groups
 _ALIKE = 0.5  # of the noise: answers that differ by less have the same predictions
 _ENOUGH_ALIKE = 0.95
 
@@ -230,7 +231,7 @@ def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any
     return [
         {"mechanisms": group, "probability": round(probability, 3)}
         for rank, (probability, group) in enumerate(groups)
-        if rank < _LEAST_NAMED or probability >= _NAMED
+        if rank < _LEAST_NAMED or probability >= NAMED
     ]
 
 
@@ -297,9 +298,6 @@ def alike_clause(document: Mapping[str, Any]) -> str:
     )
 
 
-_LEAST_ASKED = 0.03  # probability below which an answer without the law contributes none to it
-
-
 def idealised(search: Search, problem: FittingProblem, shown: Explanation, measured: str) -> list[dict[str, Any]]:
     """Laws without a free parameter that the base model idealises: their posteriors over all answers, and their effect
     on the response of `shown`, root mean square in percent of it.
@@ -330,7 +328,7 @@ def _joint(
     if answer.explanation is None or name in answer.names:
         return answer.probability * (0.5 if answer.explanation is None else 1.0)
     with_law = frozenset({name, *answer.explanation.names, *answer.alone})
-    if answer.probability < _LEAST_ASKED or with_law in stated:
+    if answer.probability < HIDES or with_law in stated:
         return 0.0
     normals = with_hidden_mechanism(problem, answer.explanation, name, measured)
     odds = 0.0 if normals is None else float(normals.share.sum())

@@ -16,7 +16,7 @@ from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.entries import shape_clause
 from underskin.diagnosis.reporting.facts import Facts
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
-from underskin.diagnosis.reporting.numbers import SDS_OF_95
+from underskin.diagnosis.reporting.numbers import NAMED, SDS_OF_95
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.validation.signatures import Power
@@ -36,7 +36,6 @@ from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.readers.calendar_times import time_zone
 from underskin.units import Floats
 
-_WORTH_NAMING = 0.02
 _FAR_ABOVE = 2.0  # times the noise: a held-out error that the first sentence mentions
 _INSUFFICIENT = "The recordings cannot tell anything: "
 _TO_CORRECT = "Nothing can be told before a correction: "
@@ -132,7 +131,7 @@ def answer_clauses(
     """
     leader = answers[0]
     percent = in_percent(leader.probability)
-    rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
+    rivals = [answer for answer in answers[1:4] if answer.probability > NAMED]
     listed = _answers_in_words(rivals)
     mentioned = list(dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE))
     if verdict == "no_mismatch":
@@ -156,7 +155,7 @@ def answer_clauses(
     but = list(bounds)
     but += [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
     but += [f"these rivals remain: {listed}"] if listed else []
-    but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
+    but = but or [f"many rivals remain, each below {in_percent(NAMED)}"]
     doubtful = bool(idle or bounds) and leader.names != (NOTHING_MISSING,)
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     lead = f"best explained by {in_words(leader.names)} ({percent})"
@@ -173,7 +172,7 @@ def _lacking(
 
     It has where it is also in other sets, or these hold an indistinguishable one in its place.
     """
-    group, least = next(iter(presence), None), leader.probability + _WORTH_NAMING
+    group, least = next(iter(presence), None), leader.probability + NAMED
     twins = group is not None and len(group["mechanisms"]) > 1 and set(leader.names) < set(group["mechanisms"])
     if group is not None and twins and group["probability"] > least:
         return f"{_group_in_words(group)}, rather {in_words(leader.names)} ({in_percent(leader.probability)})", True
