@@ -52,7 +52,9 @@ _WORDS: Mapping[str, Callable[[Any, str], str]] = {
 
 def in_english(words: Words, arguments: Mapping[str, Any]) -> str:
     """A template or a function with its arguments."""
-    return words(**arguments) if callable(words) else _Template().vformat(words, (), {**OPTIONAL, **arguments})
+    if isinstance(words, str):
+        return _Template().vformat(words, (), {**OPTIONAL, **arguments})
+    return words(**arguments)
 
 
 def statement(reason: Reason, arguments: Mapping[str, Any]) -> str:

@@ -235,7 +235,7 @@ class Facts:
             factors = [i for i, parameter in enumerate(explanation.model.parameters) if parameter.name == _FACTOR]
             if factors:
                 value, factor = numbers.product(explanation, [index, *factors])
-                modulus |= numbers.with_ends(value, value / factor, value * factor, 6)
+                modulus |= numbers.with_ends(value, value / factor, value * factor, digits=6)
             modulus |= {"unit": "MPa", **numbers.scaled(modulus, declared)}
         hiding = may_hide(mechanisms, campaign, mechanisms.named)
         return numbers.with_hidden(modulus, hidden_factors(hiding, explanation.names))

@@ -38,7 +38,7 @@ def rounded(value: float, digits: int = 4) -> float | None:
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
-def with_ends(value: float, low: float, high: float, digits: int = 4) -> dict[str, float | None]:
+def with_ends(value: float, low: float, high: float, *, digits: int = 4) -> dict[str, float | None]:
     """`value`, `low` and `high` to significant digits."""
     return {key: rounded(float(end), digits) for key, end in zip(ENDS, (value, low, high), strict=True)}
 
@@ -95,7 +95,8 @@ def parameter_index(explanation: Explanation, name: str) -> int:
 def covariance_of(explanation: Explanation, indices: Sequence[int]) -> Floats:
     """The covariance of parameters of the model's mean (indices, indices), in fit coordinates."""
     rows = [explanation.best.hypothesis.mean_indices.index(index) for index in indices]
-    return explanation.best.covariance[np.ix_(rows, rows)]
+    block: Floats = explanation.best.covariance[np.ix_(rows, rows)]
+    return block
 
 
 def product(explanation: Explanation, indices: Sequence[int]) -> tuple[float, float]:
