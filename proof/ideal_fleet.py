@@ -10,15 +10,8 @@ import numpy as np
 from rig.joint_campaign import Joint, JointDocument
 from rig.joint_hypotheses import skin_covariance
 from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.several.fleet import SPREADS
-from underskin.diagnosis.several.population import FAR, QUANTITIES, REGULAR, Batch, State, populations
+from underskin.diagnosis.several.population import QUANTITIES, REGULAR, Batch, State, populations
 from underskin.units import Floats
-
-_DECLARED = (
-    0.02,
-    0.01,
-    1.5,
-)  # standard deviations of the batch's logarithms about the declared values; of d33, about the truth
 
 
 def departures(joint: Joint) -> dict[str, float]:
@@ -26,8 +19,9 @@ def departures(joint: Joint) -> dict[str, float]:
     skins = [_states(document) for document in joint.documents]
     experiment = joint.documents[0].experiment
     declared = [experiment.skin.youngs_modulus_mpa, experiment.skin.thickness_mm, experiment.skin.d33_pc_per_n]
-    batch = Batch(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
-    fitted = populations(skins, [batch], SPREADS)
+    about_declared = np.array([quantity.declared for quantity in QUANTITIES])  # of d33, about the truth
+    batch = Batch(0.0, np.log(declared), about_declared**-2.0)
+    fitted = populations(skins, [batch], [quantity.spread for quantity in QUANTITIES])
     return {
         document.skin: 1 - class_probabilities[REGULAR]
         for document, class_probabilities in zip(joint.documents, fitted.departures, strict=True)
@@ -38,8 +32,8 @@ def _states(document: JointDocument) -> list[State]:
     truth = np.log([document.true_modulus_mpa, document.true_thickness_mm, document.experiment.skin.d33_pc_per_n])
     precision: Floats = np.linalg.inv(skin_covariance(document)).astype(np.float64)
     estimate = Gaussian.of(truth, precision, 0.0)
-    further = np.diag(np.square(FAR))
+    further = np.diag([quantity.far**2 for quantity in QUANTITIES])
     return [
-        State(REGULAR, estimate, np.zeros(len(FAR))),
-        *(State(name, estimate, row) for name, row in zip(QUANTITIES, further, strict=True)),
+        State(REGULAR, estimate, np.zeros(len(QUANTITIES))),
+        *(State(quantity.departure, estimate, row) for quantity, row in zip(QUANTITIES, further, strict=True)),
     ]

@@ -33,7 +33,7 @@ def other_priors(priors: Priors) -> Iterator[None]:
         for plateau in (GAIN_PRIOR, POSITION_PRIOR):
             vars(plateau).update(vars(_wider(plateau, priors.scatter)))
         for mechanism in CATALOGUE.values():
-            vars(mechanism)["parameters_with"] = partial(_parameters, mechanism, priors.strengths)
+            vars(mechanism)["parameters"] = partial(_parameters, mechanism, priors.strengths)
         remaining = (1 - priors.nothing) / (1 - sets[_NOTHING])
         PRIORS.update({name: priors.nothing if name == _NOTHING else remaining * share for name, share in sets.items()})
         yield
@@ -41,7 +41,7 @@ def other_priors(priors: Priors) -> Iterator[None]:
         for plateau in (GAIN_PRIOR, POSITION_PRIOR):
             vars(plateau).update(scatter[id(plateau)])
         for mechanism in CATALOGUE.values():
-            vars(mechanism).pop("parameters_with", None)
+            vars(mechanism).pop("parameters", None)
         PRIORS.update(sets)
 
 
@@ -54,7 +54,7 @@ def _wider(plateau: Plateau, factor: float) -> Plateau:
 
 def _parameters(mechanism: Mechanism, factor: float, *arguments: Any) -> tuple[Parameter, ...]:
     """A mechanism's parameters, with priors of strengths wider by this factor."""
-    parameters = type(mechanism).parameters_with(mechanism, *arguments)
+    parameters = type(mechanism).parameters(mechanism, *arguments)
     return tuple(
         replace(parameter, prior=HeavyTailed(parameter.prior.mean, factor * parameter.prior.sd))
         if isinstance(parameter.prior, HeavyTailed)

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import NdBSpline
 from scipy.ndimage import maximum_filter
 
 from tablegen import base_stress, discretisation, faces, linear_layer, mesh, neo_hookean, newton
@@ -26,7 +25,7 @@ from tablegen.sigma import Column, Nodes, solve_column
 from tablegen.sweep import Arrays, run_pieces, sources_hash
 from underskin.physics import hankel_transform, hertz
 from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Dataset, data_hash, write_table
-from underskin.surrogate.sigma_table import interpolation_coefficients
+from underskin.surrogate.tensor_spline import TensorSpline
 from underskin.units import Floats
 
 ORDER = 5
@@ -141,9 +140,8 @@ def _write(path: Path, nodes: Nodes, fine: list[Column], coarse: list[Column], s
 def interpolation_error(axes: tuple[Floats, ...], values: Floats) -> Floats:
     """The relative error of the cubic spline through `values`, from the spline through every other node."""
     coarse = tuple(axis[::2] for axis in axes)
-    knots, coefficients = interpolation_coefficients(coarse, values[::2, ::2, ::2])
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    left_out = np.abs(NdBSpline(knots, coefficients, 3)(points) / values - 1)
+    points = np.meshgrid(*axes, indexing="ij", sparse=True)
+    left_out = np.abs(TensorSpline.through(coarse, values[::2, ::2, ::2]).values(*points) / values - 1)
     return np.asarray(maximum_filter(left_out, size=3) / _SPLINE_GAIN)
 
 

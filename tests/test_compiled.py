@@ -15,7 +15,7 @@ tempfile.TemporaryFile = refuse
 from underskin.compiled import load_all
 load_all()
 from underskin.diagnosis.inference.kernels import log_likelihoods
-from underskin.surrogate.table_kernel import sigma_rows
+from underskin.surrogate.spline_kernel import sigma_rows
 for function in (log_likelihoods, sigma_rows):
     assert sum(function.stats.cache_hits.values()) == 1, function.stats
     assert not function.stats.cache_misses, function.stats
@@ -26,9 +26,3 @@ def test_set_up_compiled_loaded_not_compiled() -> None:
     """What set up compiled is loaded and not compiled again."""
     subprocess.run([sys.executable, "-m", "underskin.compiled"], check=True)
     subprocess.run([sys.executable, "-c", _LOADED], check=True)
-
-
-def test_command_line_small_tables() -> None:
-    """The command line and small tables do without."""
-    small = "import sys, underskin.cli.app; from underskin import load_table; load_table().sigma([0.5, 1.0], 0.5, 0.01)"
-    subprocess.run([sys.executable, "-c", f"{small}; assert 'numba' not in sys.modules"], check=True)

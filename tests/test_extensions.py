@@ -5,7 +5,7 @@ import pickle
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, get_args
 
@@ -16,12 +16,10 @@ from tests.support.cases import first
 from tests.support.installed_package import installed
 from tests.support.repository import ROOT
 from underskin import ExtensionError, InvalidInput, extensions
-from underskin.autodiff import Differentiated
-from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
-from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS
-from underskin.mechanisms.contract import HOOKS, check
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign, Pickup, together
+from underskin.mechanisms import CATALOGUE, FrfState, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
+from underskin.mechanisms.base import AXES, READS, UNITS
+from underskin.mechanisms.contract import check
+from underskin.mechanisms.models.frf_design import Pickup, together
 from underskin.mechanisms.parameter import ActsOn
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
@@ -42,7 +40,9 @@ class LowPass(Mechanism):
     axes = ("frequency_hz",)
     changes: Mapping[str, Any] = {}
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
+    ) -> tuple[Parameter, ...]:
         fields: dict[str, Any] = {
             "name": "upper_corner",
             "unit": "Hz",
@@ -55,8 +55,8 @@ class LowPass(Mechanism):
         }
         return (Parameter(**{name: value for name, value in {**fields, **self.changes}.items() if value != "gone"}),)
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-        return 1.0 / (1.0 + 1j * design.line_frequency / values["upper_corner"])
+    def act(self, state: FrfState, values: Values) -> None:
+        state.factor = 1.0 / (1.0 + 1j * state.design.line_frequency / values["upper_corner"])
 
 
 def changed(base: type[Mechanism] = LowPass, **attributes: Any) -> Mechanism:
@@ -75,14 +75,11 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"law": " "}, "law", "text"),
         ({"source": None}, "source", "text"),
         ({"stage": "lines"}, "stage", "LINES"),
-        ({"stage": Stage.SENSOR}, "stage", "must be LINES, since on_lines is overridden"),
         ({"order": "last"}, "order", "whole number"),
         ({"kinds": ()}, "kinds", "indentation"),
-        ({"kinds": ("frf", "compression")}, "kinds", "on_curve"),
         ({"axes": ("temperature_c",)}, "axes", "preload_n"),
-        ({"needs_fields": ("day",)}, "needs_fields", "dwell_s"),
-        ({"moves_predictions": False}, "moves_predictions", "True"),
-        ({"on_lines": Mechanism.on_lines}, "law", "none is overridden"),
+        ({"reads": ("day",)}, "reads", "dwell_s"),
+        ({"act": Mechanism.act}, "parameters[upper_corner].acts_on", "act is not overridden"),
         ({"changes": {"name": "d33"}}, "parameters[d33].name", "the base model"),
         ({"changes": {"name": "corner"}}, "parameters[corner].name", "amplifier_high_pass"),
         ({"changes": {"unit": "furlong"}}, "parameters[upper_corner].unit", "1/MPa"),
@@ -101,7 +98,8 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"changes": {"relative_to": "corner"}}, "parameters[upper_corner].relative_to", "another"),
         ({"changes": {"relative_to": "upper_corner"}}, "parameters[upper_corner].relative_to", "another"),
         ({"changes": {"acts_on": "line_variance"}}, "parameters[upper_corner].acts_on", "mean"),
-        ({"on_lines": lambda *_: 1 / 0}, "law (frf) at the priors' centres", "ZeroDivisionError"),
+        ({"act": lambda *_: 1 / 0}, "law (frf) at the priors' centres", "ZeroDivisionError"),
+        ({"act": lambda *_: None}, "law (frf)", "must change the recordings"),
         ({"parameters": lambda *_: None}, "parameters", "tuple"),
     ],
 )
@@ -117,12 +115,12 @@ def test_law_not_finite_bound_refused() -> None:
     """A law that is not finite at a bound is refused there."""
 
     class Diverging(LowPass):
-        def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-            """From a limit at which the law divides by zero."""
-            return (Parameter("gap", "-", 0.0, 1.0, Uniform(), "linear", None, "a guess"),)
+        parameters_stated = (Parameter("gap", "-", 0.0, 1.0, Uniform(), "linear", None, "a guess"),)
+        parameters = Mechanism.parameters
 
-        def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-            return values["gap"] / (values["gap"] * design.line_frequency)
+        def act(self, state: FrfState, values: Values) -> None:
+            """Divide by zero at a bound."""
+            state.factor = values["gap"] / (values["gap"] * state.design.line_frequency)
 
     with pytest.raises(InvalidInput, match="not finite") as refusal:
         check(Diverging(), built_in())
@@ -139,8 +137,7 @@ def test_second_spread_sensors_gains_refused() -> None:
     """A second spread of the sensors gains is refused."""
     attributes: dict[str, Any] = {
         "stage": Stage.SENSOR,
-        "moves_predictions": False,
-        "on_lines": Mechanism.on_lines,
+        "act": Mechanism.act,
         "changes": {"acts_on": "gain_spread"},
     }
     check(changed(**attributes))
@@ -165,10 +162,8 @@ def test_page_lists_mechanism_state() -> None:
     """The page lists all that a mechanism may state."""
     page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
     traits = [name for name in vars(Mechanism)["__annotations__"] if not name.startswith("_")]
-    for name in (*UNITS, *AXES, *NEEDED_FIELDS, *Stage.__members__, *traits, *get_args(ActsOn), *get_args(Kind)):
+    for name in (*UNITS, *AXES, *READS, *Stage.__members__, *traits, *get_args(ActsOn), *get_args(Kind)):
         assert f"`{name}`" in page, name
-    for hook in HOOKS:
-        assert f"`{hook}(" in page, hook
 
 
 def underskin(*arguments: str, path: Path, data: Path) -> "subprocess.CompletedProcess[str]":

@@ -158,24 +158,6 @@ def constant(value: Array | float, parameters: int, points: tuple[int, ...] = ()
     return Differentiated(rows.reshape(*ones, -1), np.zeros((parameters, *ones, 1)))
 
 
-def variables(values: Array, slopes: Array) -> list[Differentiated]:
-    """The independent variables of a model.
-
-    Parameters
-    ----------
-    values
-        Each variable's value in its unit, shape (…, variables).
-    slopes
-        Their derivatives by what the model is differentiated with respect to, shape (parameters, …, variables).
-
-    Returns
-    -------
-    list of Differentiated
-        One of a single row for each variable.
-    """
-    return [Differentiated(values[..., [index]], slopes[..., [index]]) for index in range(values.shape[-1])]
-
-
 def stacked(parts: Sequence[Differentiated], points: Sequence[int]) -> Differentiated:
     """Several with (points, rows), concatenated along the points; `points` is the number of each."""
     if len(parts) == 1:

@@ -1,7 +1,8 @@
 """Functions compiled by numba at set-up; later processes load them from its cache.
 
 `python -m underskin.compiled` fills the cache. Modules of compiled functions (named in `KERNELS`) are imported where
-they are called, since importing numba takes a tenth of a second and 50 MB, which small answers do not need.
+they are called, since importing numba takes half a second and 100 MB, which a command that computes nothing does not
+need.
 """
 
 import gc
@@ -21,9 +22,8 @@ KERNELS = (
     "underskin.diagnosis.kernels",
     "underskin.mechanisms.models.sphere_kernels",
     "underskin.mechanisms.models.sigma_kernels",
-    "underskin.physics.bessel_kernel",
     "underskin.physics.contact_kernel",
-    "underskin.surrogate.table_kernel",
+    "underskin.surrogate.spline_kernel",
 )
 
 # Every processor of a kind runs the same code, so that a cache made on one serves another, and gives the same bytes.
@@ -57,13 +57,13 @@ CacheImpl._locator_classes.insert(0, _SourceCacheLocator)
 def compiled(signature: str | None = None) -> Callable[[Function], Function]:
     """A decorator: compiled for this signature when its module is imported, or within its callers where there is none.
 
-    Errors are those of NumPy: a division by zero is infinite.
+    Errors are those of NumPy: a division by zero is infinite. Other threads run meanwhile.
     """
 
     def decorate(function: Function) -> Function:
         if signature is None:
             return numba.njit(function, error_model="numpy", inline="never")
-        return numba.njit(signature, cache=True, error_model="numpy")(function)
+        return numba.njit(signature, cache=True, error_model="numpy", nogil=True)(function)
 
     return decorate
 

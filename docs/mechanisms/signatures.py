@@ -43,6 +43,20 @@ class Panel:
     logarithmic: bool = False
 
 
+_AXES = {  # of figures, where they are not the first two on which the mechanism shows
+    "compressible_layer": ("preload_n", "position_mm"),
+    "contact_creep": ("dwell_s", "time_s"),
+    "crosstalk": ("position_mm",),
+    "interface_slip": ("preload_n", "position_mm"),
+    "layered_contact": ("preload_n", "force_n"),
+    "mains_pickup": ("mains",),
+    "misalignment": ("preload_n", "position_mm"),
+    "platen_friction": ("displacement_mm",),
+    "strain_stiffening": ("preload_n", "displacement_mm"),
+    "timing_delay": ("phase",),
+}
+
+
 def panels(name: str, table: SigmaTable) -> list[Panel]:
     """The panels of one mechanism."""
     return [PANELS[axis][1](name, table) for axis in axes(CATALOGUE[name])]
@@ -51,7 +65,7 @@ def panels(name: str, table: SigmaTable) -> list[Panel]:
 def axes(mechanism: Mechanism) -> tuple[str, ...]:
     """The axes of its figure: those that it names, else the first two on which it shows and that have a panel."""
     usual = [axis for axis in mechanism.axes if axis in PANELS and PANELS[axis][0] in mechanism.kinds]
-    return mechanism.figure or tuple(usual[:2])
+    return _AXES.get(mechanism.name) or tuple(usual[:2])
 
 
 def shown(parameter: Parameter) -> float:

@@ -8,6 +8,7 @@ import pytest
 from tests.support.declared_documents import refusal
 from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.declared.document import parse
+from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.recordings.campaign import Campaign, IndentationRecording
@@ -33,7 +34,7 @@ def campaign() -> Campaign:
     return reference_campaign("indentation")
 
 
-def mechanism(acts_on: str, axis: str, law: str) -> Mechanism:
+def mechanism(acts_on: str, axis: str, law: str) -> DeclaredMechanism:
     text = BENT.replace("acts_on: gain", f"acts_on: {acts_on}").replace("[force_n]", f"[{axis}]")
     return parse(text.replace("1 - bend * force_n", law).encode(), "lab.yaml")
 

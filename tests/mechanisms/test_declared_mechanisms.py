@@ -18,7 +18,7 @@ from underskin.cli.mechanism import app
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.declared import saving
 from underskin.mechanisms.declared.document import parse
-from underskin.mechanisms.declared.mechanism import read
+from underskin.mechanisms.declared.mechanism import read, value_of
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import CATALOGUE
@@ -149,14 +149,14 @@ def test_expressions_derivatives_numpy() -> None:
         )  # fmt: skip
 
     for x in (0.5, 1.7, 2.5, 4.0):
-        found = expression({"x": Differentiated(np.array([x]), np.ones((1, 1)))})
+        found = value_of(expression, {"x": Differentiated(np.array([x]), np.ones((1, 1)))})
         assert isinstance(found, Differentiated)
         assert found.value[0] == pytest.approx(plain(x))
         assert found.slopes[0, 0] == pytest.approx((plain(x + 1e-6) - plain(x - 1e-6)) / 2e-6, abs=1e-6)
-    power = read("2 ** n", "law", {"n"})({"n": Differentiated(np.array([3.0]), np.ones((1, 1)))})
+    power = value_of(read("2 ** n", "law", {"n"}), {"n": Differentiated(np.array([3.0]), np.ones((1, 1)))})
     assert isinstance(power, Differentiated)
     assert (power.value[0], power.slopes[0, 0]) == pytest.approx((8.0, 8.0 * np.log(2.0)))
-    assert complex(np.asarray(read("exp(i * pi)", "law", set())({}))) == pytest.approx(-1.0)
+    assert complex(np.asarray(value_of(read("exp(i * pi)", "law", set()), {}))) == pytest.approx(-1.0)
 
 
 def test_declared_modulus_skin_much_softer(campaign: Campaign, table: SigmaTable) -> None:
@@ -224,7 +224,7 @@ def test_law_report_kept_read() -> None:
     mechanism = parse(text.encode(), "warm_up.yaml")
     names = {"change", "approach", "recorded_at"}
     law = read(mechanism.laws[0].text, "law", names)
-    value = law({"change": -0.2, "approach": 3.0, "recorded_at": np.array([8.0, 18.0])})
+    value = value_of(law, {"change": -0.2, "approach": 3.0, "recorded_at": np.array([8.0, 18.0])})
     assert np.asarray(value) == pytest.approx([1.0, 0.8])
 
 

@@ -65,7 +65,7 @@ def test_catalogue_order_composition() -> None:
 
     A model composes by stage; the page that lists the names is held to the catalogue by its own test.
     """
-    stages = [mechanism.stage.position for mechanism in built_in()]
+    stages = [mechanism.rank for mechanism in built_in()]
     assert stages == sorted(stages)
     assert [name for name in CATALOGUE if name in NAMES] == list(NAMES)
     assert len({(mechanism.stage, mechanism.order) for mechanism in built_in()}) == len(NAMES)

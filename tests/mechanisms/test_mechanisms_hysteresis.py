@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 from tests.mechanisms.indentation_loops import E_MPA, NO_CREEP, R_MM, REDUCED, R, force_at, jkr
 from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted
+from underskin.mechanisms.laws import contact_creep
 from underskin.mechanisms.models.indentation import Sphere, Stiffening
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, IndentationRecording
 from underskin.units import Floats
 
@@ -70,10 +70,10 @@ def test_two_prony_pairs_relax_as_their_sum() -> None:
     fast, slow = 2.0 * np.exp(-3.0 * 0.7), 2.0 * np.exp(3.0 * 0.3)
     left = 1 - 0.5 * (0.3 * (1 - np.exp(-ages / fast)) + 0.7 * (1 - np.exp(-ages / slow)))
     assert found[-8:] == pytest.approx(found[1999] * left, rel=1e-4)
-    told = CATALOGUE["contact_creep"].told(values)
+    told = contact_creep.meaning(values)
     assert told == f"The force relaxes by 15 % with {fast:.2g} s and by 35 % with {slow:.2g} s."
     at_once = {**values, "time_spread": 0.001}
-    assert CATALOGUE["contact_creep"].told(at_once) == "The force relaxes by 50 % with 2 s."
+    assert contact_creep.meaning(at_once) == "The force relaxes by 50 % with 2 s."
 
 
 def test_radius_travel_travel_stiffening_law() -> None:

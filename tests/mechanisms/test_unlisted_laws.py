@@ -9,6 +9,7 @@ import pytest
 from bench.soak import SOAK
 from underskin.mechanisms import CATALOGUE
 from underskin.mechanisms.declared.document import parse
+from underskin.mechanisms.declared.mechanism import value_of
 from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
@@ -41,7 +42,7 @@ def campaign() -> Campaign:
 
 @pytest.fixture(scope="module")
 def grammar(campaign: Campaign, table: SigmaTable) -> Grammar:
-    return Grammar.of(campaign, lines_of(campaign), table, tuple(CATALOGUE.values()), CATALOGUE)
+    return Grammar.of(campaign, lines_of(campaign), table, CATALOGUE)
 
 
 def lines_of(conditions: Conditions) -> Floats:
@@ -67,8 +68,8 @@ def point(model: FrfModel, own: Sequence[float]) -> Floats:
 def coordinates(law: UnlistedLaw, amplitude: float) -> list[float]:
     """All amplitudes at a share of their priors' sd, what bends the law at the first of its grid."""
     count = len(law.amplitudes)
-    sds = [entry.prior.sd for entry in law.parameters_bound[:count]]  # type: ignore[union-attr]
-    return [*(amplitude * sd for sd in sds), *law.grid[0][: len(law.parameters_bound) - count]]
+    sds = [entry.prior.sd for entry in law.parameters_stated[:count]]  # type: ignore[union-attr]
+    return [*(amplitude * sd for sd in sds), *law.grid[0][: len(law.parameters_stated) - count]]
 
 
 def test_grammar_holds_several_hundred_laws(grammar: Grammar) -> None:
@@ -85,19 +86,19 @@ def test_grammar_holds_several_hundred_laws(grammar: Grammar) -> None:
 
 @pytest.mark.slow
 def test_amplitudes_of_0_are_the_base_model(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
-    base = predicted(FrfModel((), campaign, table, tuple(CATALOGUE.values())), ())
+    base = predicted(FrfModel((), campaign, table), ())
     for law in of_each_combination(grammar)[:: 1 if SOAK else 3]:
-        model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
+        model = FrfModel([law], campaign, table)
         assert predicted(model, coordinates(law, 0.0)) == pytest.approx(base, rel=1e-9), law.name
 
 
 @pytest.mark.slow
 def test_derivatives_are_those_of_differences(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
     for law in of_each_combination(grammar)[:: 1 if SOAK else 3]:
-        model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
+        model = FrfModel([law], campaign, table)
         fit = point(model, coordinates(law, 0.31))
         exact = model.predict(fit).slopes
-        for place in range(len(law.parameters_bound)):
+        for place in range(len(law.parameters_stated)):
             step = np.zeros(len(fit))
             step[place] = 1e-6
             ahead, behind = (model.predict(fit + sign * step, slopes=False).value for sign in (1, -1))
@@ -108,9 +109,8 @@ def test_derivatives_are_those_of_differences(grammar: Grammar, campaign: Campai
 def one_law(acts_on: str, axis: Axis, campaign: Campaign, table: SigmaTable) -> tuple[RecordingLaw, FrfModel]:
     """A linear law over an axis, from its least value on, in a model."""
     shape = next(entry for entry in shapes(axis) if entry.form == "linear")
-    beside = tuple(CATALOGUE.values())
-    law = RecordingLaw(acts_on, axis, shape, LevelTables(campaign, table, beside))  # type: ignore[arg-type]
-    return law, FrfModel([law], campaign, table, beside)
+    law = RecordingLaw(acts_on, axis, shape, LevelTables(campaign, table))  # type: ignore[arg-type]
+    return law, FrfModel([law], campaign, table)
 
 
 def along(campaign: Campaign, name: str) -> Axis:
@@ -137,18 +137,18 @@ def test_law_base_model_skin_changes(acts_on: str, size: float, campaign: Campai
             thickness *= factor
         skin = replace(campaign.skin, youngs_modulus_mpa=modulus, thickness_mm=thickness)
         alone = Conditions("one", skin, (replace(entry, indenter_radius_mm=radius),))
-        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        expected = predicted(FrfModel((), alone, table), ())
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), (acts_on, number)
 
 
 def test_force_lost_smaller_preload(campaign: Campaign, table: SigmaTable, grammar: Grammar) -> None:
     """A force that is lost is a smaller preload."""
     lost = next(law for law in grammar.laws if combination(law) == ("force", "preload_n", "threshold"))
-    model = FrfModel([lost], campaign, table, tuple(CATALOGUE.values()))
+    model = FrfModel([lost], campaign, table)
     found = predicted(model, [0.2])
     for number, entry in enumerate(frf_of(campaign)):
         alone = Conditions("one", campaign.skin, (replace(entry, preload_n=entry.preload_n - 0.2),))
-        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        expected = predicted(FrfModel((), alone, table), ())
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), number
 
 
@@ -162,7 +162,7 @@ def test_place_wanders_press_elsewhere(campaign: Campaign, table: SigmaTable) ->
         assert entry.position_mm is not None
         there = entry.position_mm[0] + 0.8 * share, entry.position_mm[1] - 0.5 * share
         alone = Conditions("one", campaign.skin, (replace(entry, position_mm=there),))
-        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        expected = predicted(FrfModel((), alone, table), ())
         assert found[model.recording == number] == pytest.approx(expected, rel=3e-3), number
 
 
@@ -170,7 +170,7 @@ def test_part_campaign_order_range_whole(campaign: Campaign, table: SigmaTable) 
     """A part of a campaign has the order and the range of the whole."""
     law, model = one_law("gain", along(campaign, "previous_preload_n"), campaign, table)
     part = replace(campaign, recordings=campaign.recordings[3:9])
-    of_part = FrfModel([law], part, table, tuple(CATALOGUE.values()))
+    of_part = FrfModel([law], part, table)
     kept = (model.recording >= 3) & (model.recording < 9)
     assert predicted(of_part, [0.3]) == pytest.approx(predicted(model, [0.3])[kept])
 
@@ -181,7 +181,7 @@ def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
     for law in grammar.laws[:: 1 if SOAK else 4]:
         if not isinstance(law, RecordingLaw) or law.axis.words or law.description.form == "free":
             continue
-        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
+        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_stated}
         said = {"acts_on": law.description.acts_on, "axis": law.axis.name, "form": law.description.form}
         stated = {**said, "expression": "E", "range": {law.axis.name: [law.axis.low, law.axis.high]}}
         found = {"law": law.name, "parameters": values}
@@ -192,7 +192,7 @@ def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
         exact = change_along(law, values, x).reshape(len(x), -1)
         axes = {law.axis.name: x, **({"preload_n": np.ones(len(x))} if law.axis.relative else {})}
         for place, expected in zip(kept.laws, exact.T, strict=True):
-            told = np.broadcast_to(np.asarray(place({**short, **axes})), x.shape)
+            told = np.broadcast_to(np.asarray(value_of(place, {**short, **axes})), x.shape)
             change = told if law.description.acts_on in ("force", "position") else told - 1
             assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
 
@@ -234,9 +234,7 @@ def test_many_columns_share_half_axes(campaign: Campaign, table: SigmaTable) -> 
         replace(entry, conditions={f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
         for entry in frf_of(campaign)
     )
-    many = Grammar.of(
-        Conditions("many", campaign.skin, entries), lines_of(campaign), table, tuple(CATALOGUE.values()), CATALOGUE
-    )
+    many = Grammar.of(Conditions("many", campaign.skin, entries), lines_of(campaign), table, CATALOGUE)
     shares = np.exp(many.log_shares)
     added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.description.axis)
     one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.description.axis == "order")
@@ -246,7 +244,7 @@ def test_many_columns_share_half_axes(campaign: Campaign, table: SigmaTable) -> 
 def test_every_law_expression_without_powers_ten(grammar: Grammar) -> None:
     """Every law has an expression without powers of ten."""
     for law in grammar.laws:
-        own = zip(law.parameters_bound, coordinates(law, 0.3), strict=True)
+        own = zip(law.parameters_stated, coordinates(law, 0.3), strict=True)
         text = expression(law, {entry.name: entry.from_fit(at) for entry, at in own})
         assert "=" in text
         assert "e-" not in text

@@ -53,15 +53,15 @@ def test_priors_last_long_context() -> None:
     """Other priors last as long as their context."""
     campaign = parse(DrawnCase(11, 3, "none", WIDE).document())
     mechanism = CATALOGUE["thickness_error"]
-    before = GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters_with((), campaign, "frf")
+    before = GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters(campaign, "frf")
     with suppress(KeyError), other_priors(Priors(scatter=2.0, strengths=0.5, nothing=0.45)):
         assert GAIN_PRIOR.high - GAIN_PRIOR.middle == pytest.approx(2 * (before[0][1] - GAIN_PRIOR.middle))
         assert PRIORS["nothing_missing"] == 0.45
         assert sum(PRIORS.values()) == pytest.approx(sum(before[1].values()))
-        (narrow,) = mechanism.parameters_with((), campaign, "frf")
+        (narrow,) = mechanism.parameters(campaign, "frf")
         assert narrow.quantile(0.75) == pytest.approx(before[2][0].quantile(0.75) / 2, rel=0.05)
         raise KeyError
-    assert before == (GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters_with((), campaign, "frf"))
+    assert before == (GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters(campaign, "frf"))
 
 
 def test_tables_count_what_they_say() -> None:

@@ -91,9 +91,10 @@ def test_heading_s_wrong_unit_overridden_rig() -> None:
     Its heading says nm and means um.
     """
     text = table({"Depth (nm)": DEPTH_UM, "Force (uN)": FORCE_UN})
-    said = r"channel 'Depth \(nm\)': is labelled 'nm', but the rig description says 'um': .* add labelled: nm"
-    with pytest.raises(FileError, match=said):
-        read(text, {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um"}})
+    confirmed = read(text, {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um"}})
+    the_curve(confirmed)
+    said = "channel 'Depth (nm)' is labelled 'nm', but the rig description says 'um', whose units_checked confirms it"
+    assert confirmed.warnings == [said]
     known = {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um", "labelled": "nm"}}
     reading = read(text, known)
     the_curve(reading)

@@ -82,6 +82,16 @@ def test_label_contradicts_rig_refused(label: str, stated: str) -> None:
     np.testing.assert_allclose(force_of(reading), FORCE * (1 if stated == "N" else 1e-3))
 
 
+def test_confirmed_magnitude_overrides_label() -> None:
+    """`units_checked` confirms a unit that differs from the label by its magnitude, with a warning; no other unit."""
+    force = {"channel": "Force", "unit": "N"}
+    reading = read_file(table("Force (mN)"), "a.csv", rig(force, units_checked=True))
+    np.testing.assert_allclose(force_of(reading), FORCE)
+    assert [note for note in reading.warnings if "labelled 'mN'" in note and "'N'" in note]
+    with pytest.raises(FileError, match="is labelled 'mV'"):
+        read_file(table("Force (mV)"), "a.csv", rig(force, units_checked=True))
+
+
 @pytest.mark.parametrize(
     "label", ["left", "tared", "raw data", "Kanal 1", "na", "-", "%", "a.u.", "ch. 3", "N/A", "#2"]
 )

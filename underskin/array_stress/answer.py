@@ -7,7 +7,7 @@ import numpy as np
 
 from underskin.array_stress import load_integration as integration
 from underskin.array_stress.finite_strain import finite_strain
-from underskin.array_stress.load_integration import Load, charge
+from underskin.array_stress.load_integration import Load
 from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_coarse, refuse_many, refuse_off_skin, refuse_overlap
 from underskin.errors import Mention, Requirement, out_of_range
@@ -67,16 +67,16 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     total = integration.array_stress(influence, thickness, sensors, loads)
     radii = np.array([pressure.radius for pressure in pressures])
     if request.contact == "solved":
-        added = finite_strain(solved_contact(table.path.parent / CONTACT_TABLE), request, sensors)
-        total = replace(total, stress=total.stress + added.stress, error=total.error + added.error)
-        radii = added.contact_radius
+        added, added_error, radii = finite_strain(solved_contact(table.path.parent / CONTACT_TABLE), request, sensors)
+        total = replace(total, stress=total.stress + added, error=total.error + added_error)
     inside = total.inside & np.isfinite(total.stress)
     stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
+    charge = d33 * np.pi * radius**2  # [C/Pa]
     columns = {
         "x_mm": to_lab("x_mm", sensors[:, 0]),
         "y_mm": to_lab("y_mm", sensors[:, 1]),
-        "charge_pc": to_lab("charge_pc", charge(stress, d33, radius)),
-        "charge_error_pc": to_lab("charge_error_pc", np.abs(charge(error, d33, radius))),
+        "charge_pc": to_lab("charge_pc", 0.0 - charge * stress),  # no load is 0, not −0
+        "charge_error_pc": to_lab("charge_error_pc", np.abs(charge * error)),
         "mean_stress_mpa": to_lab("mean_stress_mpa", 0.0 - stress),
     }
     return ArrayStress(

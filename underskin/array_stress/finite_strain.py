@@ -1,8 +1,6 @@
 """The contribution of finite strain to the stress on sensors beneath spheres, in addition to the linear layer's
 contacts."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
@@ -14,17 +12,7 @@ from underskin.surrogate.solved_contact import SolvedContact
 from underskin.units import Floats, to_si
 
 
-@dataclass(frozen=True)
-class FiniteStrain:
-    """`stress` [Pa] on each sensor, tension positive, with the bound on its `error` (sensors,), and the radius [m] of
-    each contact (contacts,)."""
-
-    stress: Floats
-    error: Floats
-    contact_radius: Floats
-
-
-def finite_strain(solved: SolvedContact, request: LoadCase, sensors: Floats) -> FiniteStrain:
+def finite_strain(solved: SolvedContact, request: LoadCase, sensors: Floats) -> tuple[Floats, Floats, Floats]:
     """The change beneath each contact as for a single contact; changes add.
 
     Parameters
@@ -34,6 +22,13 @@ def finite_strain(solved: SolvedContact, request: LoadCase, sensors: Floats) -> 
         With contacts on a bonded incompressible layer.
     sensors : ndarray, (sensors, 2)
         Centres x, y [m].
+
+    Returns
+    -------
+    stress, error : ndarray, (sensors,)
+        [Pa] on each sensor, tension positive, and the bound on its error.
+    contact_radius : ndarray, (contacts,)
+        [m].
 
     Raises
     ------
@@ -59,7 +54,7 @@ def finite_strain(solved: SolvedContact, request: LoadCase, sensors: Floats) -> 
         scale = float(charge_response.mean_stress(force[index], 1.0, h))
         stress -= scale * np.where(near, added(np.minimum(away, offset[-1])), 0.0)
         error += scale * np.where(near, tabulated.rel_error[index] * tabulated.sigma[index], 0.0)
-    return FiniteStrain(stress, error, contact_radii.radius)
+    return stress, error, contact_radii.radius
 
 
 def _beyond(solved: SolvedContact, index: int, force: float, a_over_h: float, load: float) -> Exception:

@@ -169,26 +169,6 @@ def stress_around(
     return stress
 
 
-def charge(stress: Floats, d33: float, sensor_radius: float) -> Floats:
-    """Charge Q = −d33 π rT² T̄, positive in compression for a positive d33.
-
-    Parameters
-    ----------
-    stress : ndarray
-        Mean stress T̄ [Pa], tension positive.
-    d33 : float
-        [C/N].
-    sensor_radius : float
-        rT [m].
-
-    Returns
-    -------
-    ndarray
-        [C], of the shape of `stress`.
-    """
-    return 0.0 - d33 * np.pi * sensor_radius**2 * stress  # no load is 0, not −0
-
-
 def _rule_of(size: float) -> tuple[int, int]:
     """Number of quadrature points in each part of a cell of `size` thicknesses, and number of parts."""
     points = 1 if size <= _FINE_CELL else 2 if size <= _MIDDLING_CELL else 3

@@ -92,7 +92,12 @@ def of_several(
     target = output_dir / f"{_name(together, fleet)}.json"
     if any(file.resolve() == target.resolve() for file in files):
         raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
-    readings = _read_all(files, read_file)
+    readings = []
+    for file in files:
+        try:
+            readings.append(read_file(file))
+        except UnderskinError as error:
+            raise UnderskinError(f"{file}: {error}") from error
     skin_ids = sorted({reading.campaign.skin.id for reading in readings if reading.campaign.skin.id is not None})
     if together is not None and len(skin_ids) > 1:
         allowed = f"the campaigns are of several skins (skin.id): {', '.join(skin_ids)}"
@@ -101,14 +106,14 @@ def of_several(
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
 
-        def show_progress(share: float) -> None:
+        def show(share: float) -> None:
             progress.update(bar, completed=share)
 
         if together is not None:
-            report = diagnose_together(readings, target.stem, without=without, progress=show_progress)
+            report = diagnose_together(readings, target.stem, without=without, progress=show)
         else:
-            report = diagnose_fleet(_by_skin(readings), target.stem, without=without, progress=show_progress)
-        show_progress(1.0)
+            report = diagnose_fleet(_by_skin(readings), target.stem, without=without, progress=show)
+        show(1.0)
     document = dict(report)
     write_report(document, target)
     if html:
@@ -129,17 +134,6 @@ def _name(together: str | None, fleet: str | None) -> str:
             f"{name!r}: letters, digits, spaces, points and hyphens", param_hint="--together, --fleet"
         )
     return name
-
-
-def _read_all(files: Sequence[Path], read_file: "Callable[[Path], Reading]") -> list["Reading"]:
-
-    readings = []
-    for file in files:
-        try:
-            readings.append(read_file(file))
-        except UnderskinError as error:
-            raise UnderskinError(f"{file}: {error}") from error
-    return readings
 
 
 def _by_skin(readings: Sequence["Reading"]) -> dict[str, list["Reading"]]:

@@ -77,10 +77,9 @@ def save(
 
 def _on(mechanism: "DeclaredMechanism") -> str:
     """The recordings it acts on, with the columns of `conditions` that it reads, so that a misspelt name shows."""
-    from underskin.mechanisms.declared.mechanism import FREQUENCY
-    from underskin.mechanisms.unlisted.axes import BUILT_IN
+    from underskin.mechanisms.unlisted.vocabulary import AXES
 
-    column_names = [name for name in mechanism.axes if name not in (*BUILT_IN, FREQUENCY)]
+    column_names = [name for name in mechanism.axes if name not in AXES]
     columns = f", by {' and '.join(column_names)} of their conditions" if column_names else ""
     return ("on FRFs" if "frf" in mechanism.kinds else "on indentation curves") + columns
 

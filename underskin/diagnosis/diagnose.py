@@ -97,7 +97,7 @@ def diagnose_fleet(
     Raises
     ------
     InvalidInput
-        Fewer than two skins, or campaigns of a skin that cannot be diagnosed together.
+        Fewer than three skins, one without campaigns of FRFs, or FRFs in two campaigns.
     """
     campaigns_by_skin = {skin: [_campaign(campaign) for campaign in campaigns] for skin, campaigns in skins.items()}
     document = fleet.diagnose_fleet(campaigns_by_skin, table or load_table(), name, without, progress)

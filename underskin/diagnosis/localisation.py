@@ -16,10 +16,11 @@ drift (linear in x), over frequency also a peak (a Lorentzian, real and imaginar
 Lorentzian), compared by the Bayesian information criterion. A form is a description, not an explanation.
 """
 
+import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import factorial
 
 import numpy as np
 
@@ -55,26 +56,8 @@ class EffectSize:
 
 
 def effect(lines: Lines, predicted: Array, rows: Mask, gain: float, level: float) -> EffectSize:
-    """The size of the misfit on some rows.
-
-    Parameters
-    ----------
-    lines : Lines
-        The recordings.
-    predicted : (rows,) complex array
-        The base model's response, in the unit of the lines.
-    rows : (rows,) array of bool
-        Where the misfit lies.
-    gain : float
-        Scatter of a recording's gain, relative.
-    level : float
-        Noise of the lines over their deviations.
-
-    Returns
-    -------
-    EffectSize
-        The misfit with its 95 % interval, in percent of the base model's response.
-    """
+    """The misfit on some `rows`, with its 95 % interval, beside the base model's response (rows,) in the unit of the
+    lines; `gain` is the relative scatter of recordings' gains, `level` the noise of the lines over their deviations."""
     weight = lines.deviation[rows] ** -2.0
     off, model = (lines.value - predicted)[rows], predicted[rows]
     _, recording = np.unique(lines.recording[rows], return_inverse=True)
@@ -87,16 +70,14 @@ def effect(lines: Lines, predicted: Array, rows: Mask, gain: float, level: float
     noise = parts * level**2 * np.bincount(recording) + gain**2 * size
     square = summed(weight * np.abs(off) ** 2) - noise
     along = summed(weight * (model.conj() * off).real)
-    mean, rms = _ratios(square.sum(), along.sum(), size.sum())
-    signed = bool(abs(mean) >= _ONE_SIGN * rms)
     drawn = np.random.default_rng(_SEED).integers(len(size), size=(_DRAWS, len(size)))
-    means, sizes = _ratios(*(column[drawn].sum(axis=1) for column in (square, along, size)))
-    low, high = np.quantile(means if signed else sizes, [0.025, 0.975])
-    return EffectSize(100 * float(mean if signed else rms), 100 * float(low), 100 * float(high), signed)
-
-
-def _ratios(square: Floats, along: Floats, size: Floats) -> tuple[Floats, Floats]:
-    return along / size, np.sqrt(np.maximum(square, 0.0) / size)
+    drawn = np.concatenate([np.arange(len(size))[None], drawn])  # as observed, then of each bootstrap
+    squares, alongs, sizes = (column[drawn].sum(axis=1) for column in (square, along, size))
+    means, rms = 100 * alongs / sizes, 100 * np.sqrt(np.maximum(squares, 0.0) / sizes)
+    signed = bool(abs(means[0]) >= _ONE_SIGN * rms[0])
+    percent = means if signed else rms
+    low, high = np.quantile(percent[1:], [0.025, 0.975]).tolist()
+    return EffectSize(float(percent[0]), low, high, signed)
 
 
 PERMUTATIONS = 999
@@ -144,45 +125,29 @@ class AxisResult:
 
 
 def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
-    """On which axes the residual depends.
-
-    Parameters
-    ----------
-    lines : Lines
-        The recordings.
-    residuals : Residuals
-        Residuals of each recording's gain and of each line, against the base model.
-
-    Returns
-    -------
-    list of AxisResult
-        Every axis of the campaign: first the undecidable ones, then the others with p-values corrected for their
-        number.
-
-    Source
-    ------
-    Freedman and Lane 1983; Westfall and Young 1993.
-    """
+    """On which axes of the campaign the residuals against the base model depend: first the undecidable axes, then the
+    others, with p-values corrected for their number (Freedman and Lane 1983; Westfall and Young 1993)."""
     random = np.random.default_rng(SEED)
-    bases = _bases(lines)
+    axes = recording_axes(lines.campaign)
+    bases = {name: basis for name, column in axes.items() if (basis := _basis(name, column)) is not None}
     weight = 1 / residuals.gain_deviation
-    blocks = _blocks(lines, bases)
     gain_misfit = float(((residuals.gain * weight) ** 2).sum())
     line_misfit = max(float((residuals.line_weight * np.abs(residuals.line) ** 2).sum()) - 2 * len(residuals.line), 0.0)
     total = gain_misfit + line_misfit
-    results = [
-        AxisResult(name, None, 0.0, Undecidable.FEW_RECORDINGS)
-        for name in recording_axes(lines.campaign)
-        if name not in bases
-    ]
+    results = [AxisResult(name, None, 0.0, Undecidable.FEW_RECORDINGS) for name in axes if name not in bases]
     statistics: dict[str, Floats] = {}
     for name, basis in bases.items():
-        others = [other for key, other in bases.items() if key != name]
-        reason = _undecidable(basis, others, blocks[name])
-        if reason:
-            results.append(AxisResult(name, None, 0.0, reason, _determining(name, bases, reason)))
-        else:
-            statistics[name] = _freedman_lane(residuals.gain, weight, basis, others, blocks[name], random)
+        others, block = {key: other for key, other in bases.items() if key != name}, _block(lines, name, axes[name])
+        reason = _undecidable(basis, others, block)
+        if reason is None:
+            statistics[name] = _freedman_lane(residuals.gain, weight, basis, others, block, random)
+            continue
+        determining = [
+            removed
+            for removed in (others if reason is Undecidable.ALIASED else ())
+            if not _determined(basis, {key: other for key, other in others.items() if key != removed})
+        ]
+        results.append(AxisResult(name, None, 0.0, reason, determining))
     statistics |= _sign_flips(lines, residuals, random)
     standardised = [_standardised(values) for values in statistics.values()]
     highest = np.max(standardised, axis=0)[1:] if standardised else np.zeros(0)
@@ -199,86 +164,61 @@ def _standardised(values: Floats) -> Floats:
     return (values - values[1:].mean()) / (spread if spread > 0 else 1.0)
 
 
-def _bases(lines: Lines) -> dict[str, Floats]:
-    """A few functions of each axis over the recordings (recordings, functions); none for too many sensors."""
-    bases = {}
-    for name, column in recording_axes(lines.campaign).items():
-        levels, level = np.unique(np.round(column, 9), axis=0, return_inverse=True)
-        if name == "sensor" and len(levels) > _MOST_SENSORS:
-            continue
-        if name == "sensor" or (len(levels) <= _LEVELS and column.shape[1] == 1):
-            basis = np.eye(len(levels))[level.reshape(-1)][:, 1:]
-        else:
-            scaled = (column - column.mean(axis=0)) / np.maximum(np.ptp(column, axis=0), 1e-12)
-            if column.shape[1] == 1:
-                basis = np.concatenate([scaled**power for power in (1, 2, 3)], axis=1)
-            else:
-                distance = np.hypot(*column.T)[:, None]
-                basis = np.concatenate([scaled, distance / distance.max(), (distance / distance.max()) ** 2], axis=1)
-        bases[name] = basis
-    return bases
+def _basis(name: str, column: Floats) -> Floats | None:
+    """A few functions of an axis (recordings, coordinates) over the recordings (recordings, functions); None for too
+    many sensors."""
+    levels, level = np.unique(np.round(column, 9), axis=0, return_inverse=True)
+    if name == "sensor" and len(levels) > _MOST_SENSORS:
+        return None
+    if name == "sensor" or (len(levels) <= _LEVELS and column.shape[1] == 1):
+        return np.eye(len(levels))[level.reshape(-1)][:, 1:]
+    scaled = (column - column.mean(axis=0)) / np.maximum(np.ptp(column, axis=0), 1e-12)
+    if column.shape[1] == 1:
+        return np.concatenate([scaled**power for power in (1, 2, 3)], axis=1)
+    distance = np.hypot(*column.T)[:, None]
+    return np.concatenate([scaled, distance / distance.max(), (distance / distance.max()) ** 2], axis=1)
 
 
-def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
-    """The blocks (recordings,) within which recordings may be permuted for each axis: sensors, where each has several
-    values of the axis, otherwise days."""
-    none = np.zeros(lines.recordings, dtype=np.intp)
-    days = none
+def _block(lines: Lines, name: str, column: Floats) -> Indices:
+    """The block of each recording, within which recordings may be permuted for an axis: the sensor, where each has
+    several values of the axis, otherwise the day."""
+    sensors = np.unique(lines.sensor)
     times = [recording.recorded_at for recording in lines.campaign.recordings]
-    if None not in times:
-        days = np.unique([str(time)[:10] for time in times], return_inverse=True)[1].reshape(-1)
-    axes = recording_axes(lines.campaign)
-    blocks = {}
-    for name in bases:
-        if name == "sensor":
-            blocks[name] = none
-            continue
-        varies = [len(np.unique(axes[name][lines.sensor == sensor], axis=0)) > 1 for sensor in np.unique(lines.sensor)]
-        blocks[name] = lines.sensor if all(varies) else (days if name != "recorded_at" else none)
-    return blocks
+    if name != "sensor" and all(len(np.unique(column[lines.sensor == sensor], axis=0)) > 1 for sensor in sensors):
+        return lines.sensor
+    if name in ("sensor", "recorded_at") or None in times:
+        return np.zeros(lines.recordings, dtype=np.intp)
+    return np.unique([str(time)[:10] for time in times], return_inverse=True)[1].reshape(-1)
 
 
-def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undecidable | None:
-    arrangements = 1.0
-    for block in np.unique(blocks):
-        arrangements *= float(factorial(min(int((blocks == block).sum()), 20)))
-    if arrangements < _LEAST_ARRANGEMENTS:
+def _undecidable(basis: Floats, others: Mapping[str, Floats], blocks: Indices) -> Undecidable | None:
+    sizes = np.unique(blocks, return_counts=True)[1].tolist()
+    if math.prod(float(math.factorial(min(size, 20))) for size in sizes) < _LEAST_ARRANGEMENTS:
         return Undecidable.FEW_EXCHANGEABLE
-    if others:
-        design = np.column_stack([np.ones(len(basis)), *others])
-        if design.shape[1] >= len(basis):
-            return Undecidable.FEW_RECORDINGS
-        if _determined(basis, others):
-            return Undecidable.ALIASED
-    return None
+    if others and 1 + sum(other.shape[1] for other in others.values()) >= len(basis):
+        return Undecidable.FEW_RECORDINGS
+    return Undecidable.ALIASED if others and _determined(basis, others) else None
 
 
-def _determined(basis: Floats, others: Sequence[Floats]) -> bool:
+def _determined(basis: Floats, others: Mapping[str, Floats]) -> bool:
     """Whether the functions of other axes determine nearly all of each function of an axis."""
-    design = np.column_stack([np.ones(len(basis)), *others])
+    design = np.column_stack([np.ones(len(basis)), *others.values()])
     fitted = design @ np.linalg.lstsq(design, basis, rcond=None)[0]
     centred = basis - basis.mean(axis=0)
     unexplained = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
     return bool(unexplained.max() < 1 - _ALIASED)
 
 
-def _determining(name: str, bases: Mapping[str, Floats], reason: Undecidable) -> tuple[str, ...]:
-    """The axes each of which is needed for the others to determine an aliased one."""
-    if reason is not Undecidable.ALIASED:
-        return ()
-    others = {key: basis for key, basis in bases.items() if key != name}
-    return tuple(
-        removed
-        for removed in others
-        if not _determined(bases[name], [basis for key, basis in others.items() if key != removed])
-    )
-
-
 def _freedman_lane(
-    gain: Floats, weight: Floats, basis: Floats, others: list[Floats], blocks: Indices, random: np.random.Generator
+    gain: Floats,
+    weight: Floats,
+    basis: Floats,
+    others: Mapping[str, Floats],
+    blocks: Indices,
+    random: np.random.Generator,
 ) -> Floats:
     """The weighted sum of squares explained beyond the other axes: as observed, then under each permutation."""
-    reduced = np.column_stack([np.ones(len(gain)), *others]) * weight[:, None]
+    reduced = np.column_stack([np.ones(len(gain)), *others.values()]) * weight[:, None]
     reduced_basis, _, _ = np.linalg.svd(reduced, full_matrices=False)
     reduced_basis = reduced_basis[:, : np.linalg.matrix_rank(reduced)]
 
@@ -330,21 +270,8 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     """The smallest ranges of up to two significant axes that hold most of the misfit; of sensors or days the one where
     it is largest.
 
-    The misfit is that of the lines for axes of the lines, and that of the gains for axes of the recordings.
-
-    Parameters
-    ----------
-    lines : Lines
-        The recordings.
-    residuals : Residuals
-        As for `locate`.
-    results : list of AxisResult
-        As `locate` returns them.
-
-    Returns
-    -------
-    dict
-        By axis the two ends of its range in the units of the campaign, or one text; empty where no axis is significant.
+    The misfit is that of the lines for axes of the lines, and that of the gains for axes of the recordings. By axis the
+    two ends of its range in the units of the campaign, or one text; empty where no axis is significant.
     """
     telling = sorted((result for result in results if result.telling), key=lambda result: -result.share)[:2]
     if not telling:
@@ -354,24 +281,20 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     if by_line:
         gain_misfit = (gain_misfit / np.bincount(lines.recording))[lines.recording]
     line_misfit = residuals.line_weight * np.abs(residuals.line) ** 2
-    columns = {}
-    for result in telling:
-        name = "frequency_hz" if result.axis == "phase" else result.axis
-        column = axis_values(lines, name, by_line)
-        if column is not None:
-            columns[name] = column
     inside = np.ones(len(gain_misfit), dtype=bool)
     ranges: dict[str, list[float | str]] = {}
-    for name, column in columns.items():
-        misfit = line_misfit if name in lines.row_axes else gain_misfit
-        chosen = _smallest_range(column[inside], misfit[inside])
-        if column.dtype.kind == "U":
-            ranges[name] = [str(chosen[0])]
-            inside &= column == chosen[0]
-        else:
-            ranges[name] = [float(chosen[0]), float(chosen[1])]
-            inside &= (column >= chosen[0]) & (column <= chosen[1])
+    for name in dict.fromkeys("frequency_hz" if result.axis == "phase" else result.axis for result in telling):
+        column = axis_values(lines, name, by_line)
+        if column is not None:
+            misfit = line_misfit if name in lines.row_axes else gain_misfit
+            ranges[name] = _smallest_range(column[inside], misfit[inside])
+            inside &= _within(column, ranges[name])
     return ranges
+
+
+def _within(column: Array, ends: Sequence[float | str]) -> Mask:
+    """Which values lie between two ends, or are one text."""
+    return np.asarray(column == ends[0] if len(ends) == 1 else (column >= ends[0]) & (column <= ends[1]))
 
 
 def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> Mask:
@@ -380,7 +303,7 @@ def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> Mask:
     for name, limits in ranges.items():
         column = axis_values(lines, name, True)
         assert column is not None
-        inside &= (column == limits[0]) if len(limits) == 1 else ((column >= limits[0]) & (column <= limits[1]))
+        inside &= _within(column, limits)
     return inside
 
 
@@ -388,9 +311,7 @@ def reaches_all_along(lines: Lines, name: str, ends: Sequence[float | str]) -> b
     """Whether a region holds all values of one of its axes in the campaign."""
     column = axis_values(lines, name, True)
     assert column is not None
-    if column.dtype.kind == "U":
-        return bool((column == ends[0]).all())
-    return bool(column.min() >= float(ends[0]) and column.max() <= float(ends[1]))
+    return bool(_within(column, ends).all())
 
 
 def axis_values(lines: Lines, name: str, by_line: bool) -> Array | None:
@@ -412,14 +333,13 @@ def axis_values(lines: Lines, name: str, by_line: bool) -> Array | None:
     return column[lines.recording] if by_line else column
 
 
-def _smallest_range(column: Array, misfit: Floats) -> tuple[float | str, float | str]:
+def _smallest_range(column: Array, misfit: Floats) -> list[float | str]:
     """The contiguous levels with the fewest rows that hold `_MOST_OF_IT` of the misfit; one level of an axis without
     order."""
     levels, level, counts = np.unique(column, return_inverse=True, return_counts=True)
     held = np.bincount(level.reshape(-1), misfit, len(levels))
     if column.dtype.kind == "U":
-        worst = str(levels[int(np.argmax(held / counts))])
-        return worst, worst
+        return [str(levels[int(np.argmax(held / counts))])]
     best = (0, len(levels) - 1)
     fewest = int(counts.sum())
     summed, rows = np.concatenate([[0.0], np.cumsum(held)]), np.concatenate([[0], np.cumsum(counts)])
@@ -427,19 +347,12 @@ def _smallest_range(column: Array, misfit: Floats) -> tuple[float | str, float |
         high = int(np.searchsorted(summed, summed[low] + _MOST_OF_IT * summed[-1] - 1e-9 * summed[-1]))
         if high <= len(levels) and high > low and rows[high] - rows[low] < fewest:
             fewest, best = int(rows[high] - rows[low]), (low, high - 1)
-    return float(levels[best[0]]), float(levels[best[1]])
+    return [float(levels[end]) for end in best]
 
 
 _GRID = 40
 ALONG_CURVES = {"displacement_mm": ("the displacement", "mm"), "time_s": ("time", "s")}  # in words, and the unit
-_LOGARITHMIC = (
-    "preload_n",
-    "indenter_radius_mm",
-    "dynamic_force_n",
-    "load_cycles",
-    "dwell_s",
-    "frequency_hz",
-)
+_LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz")
 
 
 class FormKind(StrEnum):
@@ -543,10 +456,7 @@ def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[Sha
     return best
 
 
-_Candidate = tuple[Floats, int, FormKind, float]
-
-
-def _forms(x: Floats, axis: str) -> Iterator[_Candidate]:
+def _forms(x: Floats, axis: str) -> Iterator[tuple[Floats, int, FormKind, float]]:
     """Basis functions, number of shape parameters, form and position; of logarithmic axes x is the logarithm."""
     logarithmic = axis in _LOGARITHMIC
     yield x[:, None], 0, FormKind.POWER_LAW if logarithmic else FormKind.DRIFT, np.nan
@@ -559,23 +469,11 @@ def _forms(x: Floats, axis: str) -> Iterator[_Candidate]:
             angle = 2 * np.pi * natural / period
             yield np.column_stack([np.sin(angle), np.cos(angle)]), 1, FormKind.PERIODIC, float(period)
     if axis == "frequency_hz":
-        yield from _peaks(x)
+        widths = [width for width in (0.05, 0.1, 0.2, 0.4) if width < 0.5 * np.ptp(x)]
+        for centre, width in itertools.product(np.linspace(x.min(), x.max(), 2 * _GRID), widths):
+            offset = (x - centre) / width
+            lorentzian = np.column_stack([np.ones(len(x)), offset]) / (1 + offset**2)[:, None]
+            yield lorentzian, 2, FormKind.PEAK, float(np.exp(centre))
     if axis in ALONG_CURVES:
-        yield from _bumps(x)
-
-
-def _bumps(x: Floats) -> Iterator[_Candidate]:
-    for centre in np.linspace(x.min(), x.max(), _GRID):
-        for width in (0.03, 0.1, 0.3):
-            lorentzian = 1 / (1 + ((x - centre) / (width * np.ptp(x))) ** 2)
-            yield lorentzian[:, None], 2, FormKind.BUMP, float(centre)
-
-
-def _peaks(x: Floats) -> Iterator[_Candidate]:
-    for centre in np.linspace(x.min(), x.max(), 2 * _GRID):
-        for width in (0.05, 0.1, 0.2, 0.4):
-            if width < 0.5 * np.ptp(x):
-                offset = (x - centre) / width
-                lorentzian = 1 / (1 + offset**2)
-                basis = np.column_stack([lorentzian, offset * lorentzian])
-                yield basis, 2, FormKind.PEAK, float(np.exp(centre))
+        for centre, width in itertools.product(np.linspace(x.min(), x.max(), _GRID), (0.03, 0.1, 0.3)):
+            yield 1 / (1 + ((x - centre) / (width * np.ptp(x))) ** 2)[:, None], 2, FormKind.BUMP, float(centre)

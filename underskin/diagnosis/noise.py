@@ -14,13 +14,13 @@ coefficients, scaled to the prior's standard deviation. Where samples in the air
 else a tared cell is within a hundredth of the largest force. The drift over the curve is 2 % of the largest force, or a
 larger one that the air shows; without air there is none. The position of the surface, friction in a stage and the
 idealisation of every law also bend a curve a little. With s the force (at least 0.7 of the largest near the beginning
-of contact and 0.2 in the air), x the position along the curve from 0 to 1 and η the size,
+of contact and 0.2 in the air), x the position along the curve (data/dataset.path_fractions) and η the size,
 
     ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
 
 k the mean of Matérn-3/2 kernels of length 0.025 and 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
-idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, decreasing outside, slowly
-downwards.
+idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, decreasing outside, so that
+3 % has 0.3 and 10 % 0.005 of that density: laws leave 0.3 to 5 % of the force of laboratories' elastomers.
 
 Noise of single lines, from their roughness along frequency. Real and imaginary part each have variance
 d² = rel(f)² A² + floor², A the recording's amplitude around the line. The part common to all recordings at a frequency
@@ -145,7 +145,8 @@ class SeveralLevels:
         return NoiseLevels(gain, level, position, spread, pickup, smooth)
 
 
-USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
+USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.7))
+DISCREPANCY = Plateau.of((3e-2, 3.0), (0.5, 1.0))  # of a law that is missing
 TYPICAL = 3e-3
 _LENGTHS = (0.025, 0.1, 0.4)
 USUAL_DRIFT = 0.02  # of the largest force, over the curve

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, chdtri, ndtr, ndtri
 
+from underskin.inversion.mixed_model import mixture_quantile
 from underskin.units import Floats, Mask
 
 BY_CHANCE = 0.05  # family-wise false-alarm probability
@@ -62,7 +63,7 @@ _NO_WALK, _WALK_SCALE = 0.6, 0.05
 _NODES = np.concatenate([[0.0], np.geomspace(1e-3, 0.5, 12)])
 _LEAST_DEVIATION = 1e-6  # relative: values without noise
 _LEVEL = 0.95
-_POLISHES, _HALVINGS = 60, 60
+_POLISHES = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +159,7 @@ def _summary(weights: Floats, mean: Floats, spread: Floats) -> Floats:
     """Mean, standard deviation, interval and p-value (5, series) of mixtures of normals (series, nodes)."""
     centre = (weights * mean).sum(axis=1)
     variance = (weights * (spread**2 + (mean - centre[:, None]) ** 2)).sum(axis=1)
-    low, high = (_quantile(weights, mean, spread, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
+    low, high = (mixture_quantile(weights, mean, spread, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
     below = (weights * ndtr(-mean / spread)).sum(axis=1)
     return np.array([centre, np.sqrt(variance), low, high, 2 * np.minimum(below, 1 - below)])
 
@@ -277,14 +278,3 @@ def _log_prior(walk: Floats, gain: Floats) -> Floats:
         cells[0] = none
         total += np.log(np.maximum(cells[np.searchsorted(_NODES, at)], 1e-300))
     return total
-
-
-def _quantile(weights: Floats, mean: Floats, deviation: Floats, probability: float) -> Floats:
-    """The quantile of each mixture of normals (series, nodes), by bisection."""
-    reach = float(ndtri(1 - 1e-9)) * deviation
-    low, high = (mean - reach).min(axis=1), (mean + reach).max(axis=1)
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        below = (weights * ndtr((middle[:, None] - mean) / deviation)).sum(axis=1) < probability
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return np.asarray((low + high) / 2)

@@ -158,7 +158,8 @@ def scatter_flags(
     lines = rows.line_scatter[good] * np.abs(level)
     line_of = np.array([np.median(lines[member == index]) for index in range(len(numbers))])
     usual = float(np.median(line_of))
-    residual = _beyond_common(level, member, rows.condition[good])
+    relative = level / np.array([np.median(level[member == index]) for index in range(len(numbers))])[member]
+    residual = relative - _common(member, rows.condition[good], relative, 1.0)
     alarm = _FALSE_ALARMS / len(numbers)
     flags = []
     for index, name in enumerate(ids[sensor_index] for sensor_index in numbers):
@@ -173,18 +174,6 @@ def scatter_flags(
         elif scatter > _NOISY and chdtrc(freedom, freedom * scatter**2) < alarm:
             flags.append(Flag(name, Reason.NOISY_RECORDINGS, {"times": scatter}))
     return flags
-
-
-def _beyond_common(level: Floats, member: Indices, condition: Indices) -> Floats:
-    """Each recording over its sensor's median, less the effect of its condition common to three or more sensors."""
-    median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
-    relative = level / median[member]
-    residual = relative - 1
-    for index in np.unique(condition):
-        of_condition = condition == index
-        if len(np.unique(member[of_condition])) > 2:
-            residual[of_condition] = relative[of_condition] - np.median(relative[of_condition])
-    return residual
 
 
 def _curvature(residual: Floats, preload: Floats, expected: Floats) -> tuple[float, float, float, int]:
@@ -228,7 +217,7 @@ def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, po
     """
     array = typical_size(d33)
     relative = _over_usual(sensor, d33, array)
-    residual = relative - _common(sensor, condition, relative)
+    residual = relative - _common(sensor, condition, relative, float(np.median(relative)))
     scatter = 1.4826 * float(np.median(np.abs(residual)))
     expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
     far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
@@ -252,10 +241,9 @@ def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
     return over
 
 
-def _common(sensor: Indices, condition: Indices, relative: Floats) -> Floats:
-    """The median over sensors for the condition of each recording; the overall median for conditions with few
-    sensors."""
-    common = np.full(len(relative), float(np.median(relative)))
+def _common(sensor: Indices, condition: Indices, relative: Floats, otherwise: float) -> Floats:
+    """The median over sensors for the condition of each recording; `otherwise` for conditions with few sensors."""
+    common = np.full(len(relative), otherwise)
     for index in np.unique(condition):
         of_condition = condition == index
         if len(np.unique(sensor[of_condition])) >= _ENOUGH:

@@ -199,20 +199,19 @@ def _mixture(weights: Floats, means: Floats, deviations: Floats) -> Estimate:
     """Mean and central interval of a mixture of normals; its uncertainty is that of a normal with this interval."""
     relevant = weights > 1e-7 * weights.max()
     weight, mean, deviation = weights[relevant] / weights[relevant].sum(), means[relevant], deviations[relevant]
-    low, high = (_quantile(weight, mean, deviation, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
+    low, high = (mixture_quantile(weight, mean, deviation, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
     uncertainty = (high - low) / (2 * _HALF_WIDTH)
-    return Estimate(np.array(weight @ mean), np.array(uncertainty), np.array(low), np.array(high))
+    return Estimate(np.array(weight @ mean), np.array(uncertainty), low, high)
 
 
-def _quantile(weight: Floats, mean: Floats, deviation: Floats, probability: float) -> float:
-    low, high = float((mean - 40 * deviation).min()), float((mean + 40 * deviation).max())
+def mixture_quantile(weights: Floats, means: Floats, deviations: Floats, probability: float) -> Floats:
+    """The quantile of each mixture of normals (…, nodes), by bisection."""
+    low, high = (means - 40 * deviations).min(axis=-1), (means + 40 * deviations).max(axis=-1)
     for _ in range(60):
         middle = (low + high) / 2
-        if weight @ ndtr((middle - mean) / deviation) < probability:
-            low = middle
-        else:
-            high = middle
-    return (low + high) / 2
+        below = (weights * ndtr((middle[..., None] - means) / deviations)).sum(axis=-1) < probability
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray((low + high) / 2)
 
 
 def _scale_estimate(weights: Floats, nodes: Floats) -> Estimate:

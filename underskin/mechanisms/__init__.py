@@ -6,11 +6,16 @@ prediction = model.predict(np.array([parameter.start for parameter in model.para
 
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Unsupported, Values
 from underskin.mechanisms.models.composed import Model, Prediction, compose
+from underskin.mechanisms.models.contact_state import Contacts, FrfState
+from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.registry import CATALOGUE
 
 __all__ = [
     "CATALOGUE",
+    "Contacts",
+    "Curve",
+    "FrfState",
     "HeavyTailed",
     "Kind",
     "Mechanism",

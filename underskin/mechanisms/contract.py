@@ -10,7 +10,7 @@ from typing import Any, TypeVar, get_args
 
 import numpy as np
 
-from underskin.errors import InvalidInput, not_finite, not_unique, required
+from underskin.errors import InvalidInput, not_finite, not_unique
 from underskin.extensions import described
 from underskin.mechanisms import base
 from underskin.mechanisms.base import Kind, Mechanism, Stage
@@ -25,19 +25,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
-HOOKS = {  # by the stage that calls them
-    "on_declared": (Stage.DECLARED,),
-    "on_material": (Stage.MATERIAL, Stage.CONTACT),
-    "offset": (Stage.POSITION,),
-    "force_nodes": (Stage.LOAD_INCREMENT,),
-    "mobility": (Stage.LOAD_INCREMENT,),
-    "on_d33": (Stage.SENSOR,),
-    "neighbour_fraction": (Stage.NEIGHBOURS,),
-    "on_recordings": (Stage.RECORDING,),
-    "on_lines": (Stage.LINES,),
-    "pickup": (Stage.ADDED_CHARGE,),
-    "on_curve": (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.CURVE),
-}
 T = TypeVar("T")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _NUISANCES = (*(parameter.name for parameter in (D33, YOUNGS_MODULUS, THICKNESS, STRAIN_SHARE)), "contact_point")
@@ -104,30 +91,11 @@ def _check_traits(mechanism: Mechanism) -> None:
     for field, allowed, needed in (
         ("kinds", get_args(Kind), True),
         ("axes", base.AXES, True),
-        ("needs_fields", base.NEEDED_FIELDS, False),
-        ("reads_fields", base.NEEDED_FIELDS, False),
+        ("reads", base.READS, False),
     ):
         values: Any = getattr(mechanism, field, None)
         is_valid = isinstance(values, tuple) and set(values) <= set(allowed) and (values or not needed)
         _require(field, values, is_valid, f"must be a tuple of {', '.join(allowed)}")
-    _check_hooks(mechanism)
-
-
-def _check_hooks(mechanism: Mechanism) -> None:
-    """A hook is called at its stage only, so the stage must match the overridden hooks."""
-    overridden = [name for name in HOOKS if getattr(type(mechanism), name) is not getattr(Mechanism, name)]
-    for name in overridden:
-        stages = ", ".join(stage.name for stage in HOOKS[name])
-        # A mechanism of FRFs at any stage may act on curves as well
-        is_valid = mechanism.stage in HOOKS[name] or (name == "on_curve" and "frf" in mechanism.kinds)
-        _require("stage", mechanism.stage.name, is_valid, f"must be {stages}, since {name} is overridden")
-    if not overridden and mechanism.moves_predictions:
-        raise required("law", f"must be in one of the hooks {', '.join(HOOKS)}; none is overridden")
-    curves = bool({"indentation", "compression"} & set(mechanism.kinds))
-    allowed = "must hold indentation or compression where on_curve is overridden, and only there"
-    _require("kinds", mechanism.kinds, curves == ("on_curve" in overridden), allowed)
-    moves = any(name != "pickup" for name in overridden)
-    _require("moves_predictions", mechanism.moves_predictions, mechanism.moves_predictions is moves, f"must be {moves}")
 
 
 def _check_parameter(mechanism: Mechanism, parameter: Any) -> None:
@@ -164,9 +132,12 @@ def _check_parameter(mechanism: Mechanism, parameter: Any) -> None:
             )
     heavy = parameter.moves_covariance and isinstance(parameter.prior, HeavyTailed)
     require("prior", not heavy, "must be Normal(mean, sd) or Uniform() where it does not act on the mean")
-    allowed = ("line_variance",) if mechanism.stage is Stage.ADDED_CHARGE else ("mean", "gain_spread")
-    require("acts_on", parameter.acts_on in allowed, f"must be {' or '.join(allowed)}")
-    require("acts_on", parameter.moves_covariance != mechanism.moves_predictions, "must fit moves_predictions")
+    acts_on, where = "gain_spread", "act is not overridden"
+    if mechanism.moves_predictions:
+        acts_on, where = "mean", "act is overridden"
+    if mechanism.stage is Stage.ADDED_CHARGE:
+        acts_on, where = "line_variance", "the stage is ADDED_CHARGE"
+    require("acts_on", parameter.acts_on == acts_on, f"must be {acts_on} where {where}")
     require(
         "scale", parameter.scale == "log" or not parameter.moves_covariance, "must be log: it does not act on the mean"
     )
@@ -191,12 +162,16 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     model = _result_of(field, lambda: _model(mechanism, campaign, kind))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
+    values = []
     for fit, label in points:
         with np.errstate(all="ignore"):
             answer = _result_of(f"{field} at {label}", partial(model.predict, fit))
         numbers = [answer.value, answer.slopes, *([] if answer.pickup is None else [answer.pickup])]
         if not all(np.isfinite(part).all() for part in numbers):
             raise not_finite(f"{field} at {label}", None, "gives numbers that are not finite")
+        values.append(answer.value)
+    same = count > 0 and mechanism.moves_predictions and all(np.array_equal(value, values[0]) for value in values)
+    _require(field, None, not same, "must change the recordings: act sets what is listed for its stage")
     if isinstance(model, FrfModel):
         _check_several_points(model, np.array([fit for fit, _ in points]), field)
 
@@ -207,8 +182,8 @@ def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
         batch = _result_of(f"{field} at several points", lambda: model.respond(fits))
         singles = joined([_result_of(field, partial(model.respond, fit[None])) for fit in fits])
     real = np.isrealobj(batch.level.value)
-    _require(f"{field}, level", None, real, "must be real: a complex factor belongs in on_lines")
-    allowed = "must be what each point gives alone: hooks must treat the last axis as rows and keep those before it"
+    _require(f"{field}, level", None, real, "must be real: a complex factor belongs at the stage LINES")
+    allowed = "must be what each point gives alone: act must treat the last axis as rows and keep those before it"
     for batch_part, single_part in ((batch.level, singles.level), (batch.lines, singles.lines)):
         if batch_part is not None and single_part is not None:
             same = batch_part.value.shape == single_part.value.shape and np.allclose(

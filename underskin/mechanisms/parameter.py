@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -155,10 +155,6 @@ class Parameter:
         if min(fit - low, high - fit) > _AT_BOUND * (high - low) or beyond in (*self.closed, self.limit):
             return None
         return "low" if at_low else "high"
-
-    def up_to(self, high: float) -> Parameter:
-        """The same parameter with a lower upper bound."""
-        return replace(self, high=min(self.high, max(high, 2 * self.low)))
 
     def to_fit(self, value: float) -> float:
         """The fit coordinate of a value."""

@@ -121,8 +121,10 @@ class ActiveCatalogue(Mapping[str, Mechanism]):
 
     def bind(self, conditions: Conditions, table: SigmaTable, kind: Kind) -> None:
         """Bind the lab's mechanisms to the recordings of this diagnosis, which are of one kind."""
+        from underskin.mechanisms.declared.mechanism import DeclaredMechanism  # the models, which few callers need
+
         for name, mechanism in self._named.items():
-            if kind in mechanism.kinds:
+            if isinstance(mechanism, DeclaredMechanism) and kind in mechanism.kinds:
                 self._named[name] = mechanism.bind(conditions, table)
 
     def replace(self, mechanism: Mechanism) -> None:
@@ -203,4 +205,4 @@ def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechan
 
 
 def _in_order(mechanisms: Iterator[Mechanism] | list[Mechanism]) -> tuple[Mechanism, ...]:
-    return tuple(sorted(mechanisms, key=lambda mechanism: (mechanism.stage.position, mechanism.order, mechanism.name)))
+    return tuple(sorted(mechanisms, key=lambda mechanism: mechanism.rank))

@@ -16,12 +16,12 @@ row costs one product of `basis` with them. Both transforms are 1 at k = 0: that
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from underskin.autodiff import Differentiated
-from underskin.physics.chebyshev import ChebyshevInterval
 from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
@@ -42,7 +42,7 @@ _STIFFNESS: _Law = ((1.0, 0.0, 4, False),)
 
 @dataclass(frozen=True)
 class ContactRows:
-    """Contacts (rows,) with derivatives by the given quantity (P or α), U, ν and the slip of the glue line.
+    """Contacts (rows,) with derivatives by P, U, ν and the slip of the glue line.
 
     NaN where there is none: below pull-off, or beyond a/h = LARGEST_A_OVER_H.
 
@@ -65,6 +65,46 @@ class ContactRows:
     stiffness: Differentiated
 
 
+class ChebyshevInterval:
+    """Interpolation of smooth functions on [0, end] at Chebyshev points; the error falls geometrically with them.
+
+    Source: Trefethen, Approximation Theory and Approximation Practice (2013), ch. 3.
+
+    Parameters
+    ----------
+    end : float
+        Upper end of the interval.
+    count : int
+        Number of points.
+
+    Attributes
+    ----------
+    nodes : ndarray, (count,)
+        The interpolation points, all inside (0, end).
+    """
+
+    def __init__(self, end: float, count: int) -> None:
+        self.end = end
+        self.nodes = end / 2 * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
+        transform = self.basis(self.nodes).T * (2 / count)
+        transform[0] /= 2
+        self._transform = transform
+        self._derivative = chebyshev.chebder(np.eye(count)) * (2 / end)
+
+    def basis(self, x: Floats) -> Floats:
+        """Chebyshev polynomials at x (rows,): (rows, count). A function is `basis(x) @ coefficients`."""
+        return np.asarray(chebyshev.chebvander(2 / self.end * x - 1, len(self.nodes) - 1), dtype=float)
+
+    def coefficients(self, values: Floats) -> Floats:
+        """Coefficients (count, ...) of the interpolant from values at the nodes (count, ...)."""
+        return np.tensordot(self._transform, values, 1)
+
+    def derivative(self, coefficients: Floats) -> Floats:
+        """Coefficients (count, ...) of the derivative of the interpolant; the last is 0."""
+        shorter = np.tensordot(self._derivative, coefficients, 1)
+        return np.concatenate([shorter, np.zeros_like(coefficients[:1])])
+
+
 class CurveGrid:
     """The part common to all layers: the Chebyshev points in α and the modes' transforms at given wave numbers.
 
@@ -83,6 +123,12 @@ class CurveGrid:
     def curves(self, layer: Layer) -> "ContactCurves":
         """The contact curves of one layer."""
         return ContactCurves(self, layer)
+
+
+@lru_cache(maxsize=64)
+def curves_of(layer: Layer) -> "ContactCurves":
+    """The contact curves of one layer where no stress is needed."""
+    return CurveGrid(np.zeros(0)).curves(layer)
 
 
 @cache
@@ -143,26 +189,6 @@ class ContactCurves:
 
         laws = (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)
         return ContactRows(Differentiated(alpha, slopes), *map(rows, laws))
-
-    def at_radius(self, alpha: Floats, root_adhesion: Floats) -> ContactRows:
-        """Contacts of given radii, stable or not.
-
-        Parameters
-        ----------
-        alpha : ndarray, (rows,)
-            a/h, above 0 and up to LARGEST_A_OVER_H.
-        root_adhesion : ndarray, (rows,)
-            U [-].
-        """
-        at = self._evaluated(self.interval.basis(alpha))
-        unit_slopes = np.outer([1.0, 0.0, 0.0, 0.0], np.ones_like(alpha))
-
-        def rows(law: _Law) -> Differentiated:
-            value, *slopes = _law(law, alpha, root_adhesion, at)
-            return Differentiated(value, np.stack(slopes))
-
-        laws = (_LOAD, _DEPTH, _SPHERE_LOAD, _STIFFNESS)
-        return ContactRows(Differentiated(alpha, unit_slopes), *map(rows, laws))
 
     def stiffness_at(self, alpha: Floats) -> Differentiated:
         """S at a/h (rows,) from 0 to LARGEST_A_OVER_H, with derivatives by α, ν and the slip."""

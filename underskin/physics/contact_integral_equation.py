@@ -122,7 +122,7 @@ def mode_transforms(s: Floats, modes: int) -> Floats:
     -------
     ndarray, (*s.shape, modes)
     """
-    from underskin.physics.bessel_kernel import even_orders
+    from underskin.physics.contact_kernel import even_orders
 
     values = np.empty((s.size, modes))
     even_orders(np.ascontiguousarray(s, dtype=float).ravel(), values)

@@ -8,12 +8,11 @@ the contact equation over its mean, f(x) at x = r/a, where f(1) = 0 without adhe
 """
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.contact_integral_equation import ContactEquation
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
@@ -50,12 +49,9 @@ class SpherePressure:
         ndarray, (points,)
             3t² in Hertz theory.
         """
-        order = np.arange(self.shape.size)
-        series = np.zeros(2 * order.size - 1)
-        series[::2] = np.sqrt(4 * order + 1) * (-1.0) ** order * self.shape
-        v, weight = np.polynomial.legendre.leggauss(order.size)
+        v, weight = np.polynomial.legendre.leggauss(self.shape.size)
         x = np.sqrt(1 - t[:, None] ** 2 * (1 - ((1 + v) / 2) ** 2))
-        share: Floats = -(t**2) * (legendre.legval(x, legendre.legder(series)) / x @ weight) / 2
+        share: Floats = -(t**2) * (legendre.legval(x, self._derivative()) / x @ weight) / 2
         return share
 
     def hertz_parts(self) -> tuple[Floats, Floats]:
@@ -64,14 +60,18 @@ class SpherePressure:
         By parts, with G of `ring_share` and G(1)/3 = 1 in Hertz theory: p is G(1)/3 of the Hertz pressure of radius a,
         and −G'(x) x³/3 dx of that of each radius x a.
         """
-        order = np.arange(self.shape.size)
-        series = np.zeros(2 * order.size - 1)
-        series[::2] = np.sqrt(4 * order + 1) * (-1.0) ** order * self.shape
-        g = -legendre.leg2poly(legendre.legder(series))[1:]
+        g = -legendre.leg2poly(self._derivative())[1:]
         x, weight = np.polynomial.legendre.leggauss(_PARTS)
         x, weight = (1 + x) / 2, weight / 2
         shares = -polynomial.polyval(x, polynomial.polyder(g)) * x**3 * weight / 3
         return np.append(x, 1.0), np.append(shares, polynomial.polyval(1.0, g) / 3)
+
+    def _derivative(self) -> Floats:
+        """Coefficients of f' in Legendre polynomials of all orders."""
+        order = np.arange(self.shape.size)
+        series = np.zeros(2 * order.size - 1)
+        series[::2] = np.sqrt(4 * order + 1) * (-1.0) ** order * self.shape
+        return np.asarray(legendre.legder(series))
 
 
 def sphere_pressures(
@@ -99,13 +99,8 @@ def sphere_pressures(
     plane_modulus = youngs_modulus / (1 - layer.poisson_ratio**2)
     load = forces * indenter_radii / (plane_modulus * thickness**3)
     different, row = np.unique(load, return_inverse=True)
-    alpha = _grid().curves(layer).at_load(different, np.zeros_like(different)).alpha.value
+    alpha = curves_of(layer).at_load(different, np.zeros_like(different)).alpha.value
     valid = np.isfinite(alpha)
     shapes = iter(ContactEquation(alpha[valid]).solve(layer).sphere_shape.value if valid.any() else ())
     pressures = [SpherePressure(float(a) * thickness, next(shapes)) if a == a else None for a in alpha]
     return [pressures[i] for i in row]
-
-
-@cache
-def _grid() -> CurveGrid:
-    return CurveGrid(np.zeros(0))

@@ -17,12 +17,8 @@ shear at the surface it gives, with C = cosh k and H = sinh k,
 import numpy as np
 from scipy.special import j0
 
-from underskin.physics.hankel_transform import hertz_transform
+from underskin.physics.hankel_transform import hertz_transform, wave_numbers
 from underskin.units import Floats
-
-_END = 44.0  # of k, for double precision
-_POINTS = 16  # of Gauss' rule on a panel
-_PHASE = 12.0  # of the fastest oscillation over a panel, at most
 
 
 def layer_stress(poisson_ratio: float, a: Floats, r: Floats, depth: Floats) -> Floats:
@@ -44,7 +40,7 @@ def layer_stress(poisson_ratio: float, a: Floats, r: Floats, depth: Floats) -> F
     ndarray, (contacts, depths, radii)
         In units of 3F/(2πh²), compression positive [-].
     """
-    k, weight = _nodes(float(a.max() + r.max()))
+    k, weight = wave_numbers(float(a.max() + r.max()))
     free = (1 + np.outer(depth, k)) * np.exp(-np.outer(depth, k))
     added = np.where(depth[:, None] > 0, depth_transmission(poisson_ratio, k, depth) - free, 0.0)
     reflected = added * (weight * k / 3)
@@ -95,12 +91,3 @@ def depth_transmission(poisson_ratio: float, k: Floats, depth: Floats) -> Floats
 def _scaled(x: Floats) -> tuple[Floats, Floats]:
     """e^(−x) cosh x and e^(−x) sinh x."""
     return (1 + np.exp(-2 * x)) / 2, -np.expm1(-2 * x) / 2
-
-
-def _nodes(highest_frequency: float) -> tuple[Floats, Floats]:
-    """Gauss–Legendre nodes and weights on panels of [0, 44], short enough for the fastest oscillation."""
-    panels = 24 + int(np.ceil(_END * highest_frequency / _PHASE))
-    x, w = np.polynomial.legendre.leggauss(_POINTS)
-    half = _END / panels / 2
-    k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
-    return k.ravel(), np.tile(half * w, panels)

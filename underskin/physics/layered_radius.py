@@ -5,8 +5,6 @@ and interpolated by a spline. Beyond the last node α is continued as a power of
 is beyond a limit.
 """
 
-from functools import cache
-
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
@@ -46,9 +44,3 @@ class LayeredRadius:
         """d ln α/d ln P: 1/3 for small contacts, less for wide ones."""
         inside = np.minimum(alpha, LARGEST_A_OVER_H)
         return np.asarray(1 / (3 + inside * self._ratio(inside, nu=1) / self._ratio(inside)))
-
-
-@cache
-def layered_radius() -> LayeredRadius:
-    """The radius law, solved once."""
-    return LayeredRadius()

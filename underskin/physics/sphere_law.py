@@ -12,15 +12,15 @@ Finite strain makes δ larger at the same force, by a function of a/h of the lin
 """
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
 _NODES = 4001
+_SMALLEST = 1e-9  # a/h
 _WIDEST = 0.999  # of R, up to which the contact radius is tabulated
 _PARABOLOID_TO = 10.0  # of R, the same for a paraboloid, which a diverging fit may need
 PARABOLOID = 0.4  # of R: pressed less deep, a paraboloid's force is within 4 % of the sphere's
@@ -60,7 +60,7 @@ class SphereLaw:
         a = widest * np.linspace(0.0, 1.0, _NODES)
         depth, stiffness = (a * np.arctanh(a / radius) if full_sphere else a**2 / radius), 2 * a
         if thickness is not None:
-            ratio = _ratios(poisson_ratio)(a / thickness)
+            ratio = curves_of(Layer(poisson_ratio)).ratios_at(np.maximum(a / thickness, _SMALLEST))
             depth, stiffness = depth * ratio[:, 1], stiffness * ratio[:, 2]
         steps = np.diff(depth) * (stiffness[1:] + stiffness[:-1]) / 2
         force = np.append(0.0, np.cumsum(steps))
@@ -74,18 +74,3 @@ class SphereLaw:
     def __call__(self, depth: Floats) -> Floats:
         """F/E' at depths (samples,), 0 out of contact; beyond `deepest` that of the last depth."""
         return np.asarray(np.interp(np.maximum(depth, 0.0), self._depth, self._root) ** 1.5)
-
-
-class _Ratios:
-    """A layer's force, depth and stiffness over the half space's, of a/h."""
-
-    def __init__(self, poisson_ratio: float) -> None:
-        self._curves = CurveGrid(np.ones(1)).curves(Layer(poisson_ratio))
-
-    def __call__(self, alpha: Floats) -> Floats:
-        return self._curves.ratios_at(np.maximum(alpha, 1e-9))
-
-
-@lru_cache(maxsize=64)
-def _ratios(poisson_ratio: float) -> _Ratios:
-    return _Ratios(poisson_ratio)

@@ -14,6 +14,7 @@ from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
 from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Stage
+from underskin.mechanisms.laws import misalignment
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.parameter import Parameter
@@ -111,10 +112,12 @@ class AdoptedModel:
         require_fields(self.mechanisms, conditions, "the adopted model")
         values: dict[str, float] = {}
         for mechanism in mechanisms:
-            values |= mechanism.transfer(self.parameters[mechanism.name], conditions)
+            values |= self.parameters[mechanism.name]
+        if misalignment.Misalignment.name in self.parameters:
+            values |= misalignment.transfer(self.parameters[misalignment.Misalignment.name], conditions)
         inside = np.ones(len(frf_of(conditions)), dtype=bool)
         if self.law is not None:
-            law, inside = bound_to(self.law, conditions, table, tuple(CATALOGUE.values()))
+            law, inside = bound_to(self.law, conditions, table)
             if not (level and law.stage is Stage.LINES):
                 mechanisms = [*mechanisms, law]
                 values |= self.of_law
@@ -210,9 +213,9 @@ def _law(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | None
     """The law of a report, and its parameters."""
     stored = report["provenance"]["unnamed"]
     lines = np.concatenate([lines_of(recording).frequency for recording in frf_recordings(campaign)])
-    grammar = Grammar.of(campaign, lines, load_table() if table is None else table, tuple(CATALOGUE.values()), ())
+    grammar = Grammar.of(campaign, lines, load_table() if table is None else table, ())
     law = next((candidate for candidate in grammar.laws if candidate.name == stored["law"]), None)
-    if law is None or {parameter.name for parameter in law.parameters_bound} != set(stored["parameters"]):
+    if law is None or {parameter.name for parameter in law.parameters_stated} != set(stored["parameters"]):
         raise InvalidInput("diagnosis_id", stored["law"], "must be a law that this version knows")
     return {"law": law, "of_law": dict(stored["parameters"])}
 

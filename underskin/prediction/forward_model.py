@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import conflicting, not_one_of, out_of_range, required, wrong_type
-from underskin.mechanisms.base import Kind, Mechanism
+from underskin.mechanisms.base import NEEDED_FIELDS, Kind, Mechanism
 from underskin.mechanisms.models.composed import Model, forward_model
 from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
 from underskin.mechanisms.parameter import Parameter
@@ -115,7 +115,7 @@ def needed_fields(mechanisms: Sequence[Mechanism]) -> dict[str, str]:
     """Fields of an FRF's conditions needed besides sphere, preload and lines, each with the mechanism that needs it."""
     needed: dict[str, str] = {}
     for mechanism in mechanisms:
-        needed |= {name: mechanism.name for name in mechanism.needs_fields if name not in needed}
+        needed |= {name: mechanism.name for name in mechanism.reads if name in NEEDED_FIELDS and name not in needed}
     return needed
 
 

@@ -226,16 +226,6 @@ _MOST_CHARGE = 1.0  # C/N
 _LIKE_MILLI = 100.0  # N: a larger preload that is inside at 1/1000 may be in mN
 
 
-@dataclass(frozen=True)
-class RowConditions:
-    """Force, sphere and elastomer of a row in lab units."""
-
-    preload_n: float
-    indenter_radius_mm: float
-    youngs_modulus_mpa: float
-    poisson_ratio: float
-
-
 def usable(level: Floats, noise: Floats, sigma: Floats, transmitted: Transmission) -> Mask:
     """The rows inside the table's domain, at an offset within it, with a line in the band and an FRF below 1 C/N."""
     return transmitted.inside & np.isfinite(sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
@@ -249,13 +239,13 @@ def reasons(
     contact_model: ContactModel,
 ) -> Iterator[Finding]:
     """Why each recording is not `usable`; `level`: its averaged FRF [C/N], NaN without a line in the band."""
+    rt_over_h = np.broadcast_to(transmitted.rt_over_h, level.shape)
+    numbers = np.stack([transmitted.small_strain_a_over_h, rt_over_h, transmitted.load_parameter], axis=-1).tolist()
     for row, recording in enumerate(recorded):
         if skin.poisson_ratio != INCOMPRESSIBLE or not transmitted.inside[row]:
             assert skin.youngs_modulus_mpa is not None
-            pressed = RowConditions(
-                recording.preload_n, recording.indenter_radius_mm, skin.youngs_modulus_mpa, skin.poisson_ratio
-            )
-            limit = beyond(pressed, [float(part[row]) for part in _numbers(transmitted)], contact_model)
+            declared = recording.indenter_radius_mm, skin.youngs_modulus_mpa, skin.poisson_ratio
+            limit = beyond(contact_model, numbers[row], recording.preload_n, *declared)
             yield Finding(Reason.BEYOND_TABLE, recording.id, "preload_n", {"limit": limit})
         elif not np.isfinite(level[row]):
             yield Finding(Reason.NO_LINE_IN_BAND, recording.id, "frequency_hz")
@@ -266,20 +256,19 @@ def reasons(
             yield Finding(Reason.PLACE_BEYOND_TABLE, recording.id, "position_mm")
 
 
-def _numbers(transmitted: Transmission) -> tuple[Floats, Floats, Floats]:
-    return (
-        transmitted.small_strain_a_over_h,
-        np.broadcast_to(transmitted.rt_over_h, transmitted.a_over_h.shape),
-        transmitted.load_parameter,
-    )
-
-
-def beyond(pressed: RowConditions, numbers: Sequence[float], contact_model: ContactModel) -> str:
-    """Which of ν and of `numbers` (a/h, rT/h and L) is outside the table's domain, in words with F, R and E."""
-    if pressed.poisson_ratio != INCOMPRESSIBLE:
-        return f"Poisson's ratio = {pressed.poisson_ratio:g}: the table is of incompressible elastomer, 0.5"
+def beyond(
+    contact_model: ContactModel,
+    numbers: Sequence[float],
+    force: float,
+    radius: float,
+    modulus: float,
+    poisson_ratio: float,
+) -> str:
+    """Which of ν and of `numbers` (a/h, rT/h and L) is outside the table's domain, in words with F [N], R [mm] and E
+    [MPa]."""
+    if poisson_ratio != INCOMPRESSIBLE:
+        return OTHER_MODULUS.format(poisson_ratio)
     over_h, rt_over_h, load = numbers
-    force, radius, modulus = pressed.preload_n, pressed.indenter_radius_mm, pressed.youngs_modulus_mpa
     most_a, most_rt, most_load = (contact_model.domain[name][1] for name in ("a_over_h", "rt_over_h", "load_parameter"))
     row = f"F = {force:g} N, R = {radius:g} mm, E = {modulus:g} MPa, L = {load:.3g}, a/h = {over_h:.3g}"
     if rt_over_h > most_rt:  # first, since no force changes it

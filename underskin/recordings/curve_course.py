@@ -24,7 +24,7 @@ from underskin.recordings.campaign import (
     IndentationRecording,
     SkinDescription,
 )
-from underskin.units import Floats, Indices
+from underskin.units import Floats, Indices, Mask
 
 _BEYOND_NOISE = 3.0  # standard deviations; a false jump only ends a mean early
 
@@ -125,6 +125,30 @@ def touch(displacement: Floats, snap_in: int) -> float:
     before = displacement[max(snap_in - 2, 0) : snap_in + 1]
     steps = np.diff(before)
     return float(before[-2] + 0.5 * max(min(steps), 0.0)) if len(before) > 1 else float(displacement[0])
+
+
+def snap_in_interval(displacement: Floats, force: Floats, time: Floats | None) -> tuple[float, float, float] | None:
+    """The displacements [mm] of the samples before and after a snap-in, with the estimated contact point as the middle
+    one; None where no snap-in is seen."""
+    seen = curve_landmarks(displacement, force, time)
+    if not seen.snap_in:
+        return None
+    before, after = displacement[seen.snap_in - 1 : seen.snap_in + 1].tolist()
+    contact_point = touch(displacement, seen.snap_in)
+    return (before, contact_point, after) if before < contact_point < after else None
+
+
+_RETURN = 0.5  # of the range of displacement: a way back that may end a contact
+
+
+def visible_contact(displacement: Floats, force: Floats, time: Floats | None) -> Mask | None:
+    """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
+    seen = curve_landmarks(displacement, force, time)
+    number = np.arange(len(force))
+    retraction = float(displacement[seen.turn] - displacement[-1])
+    if seen.snap_in is None or (seen.pull_off is None and retraction > _RETURN * float(np.ptp(displacement))):
+        return None
+    return np.asarray((number >= seen.snap_in) & (number < (len(number) if seen.pull_off is None else seen.pull_off)))
 
 
 def foot(displacement: Floats, force: Floats) -> int | None:

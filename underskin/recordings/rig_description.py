@@ -40,7 +40,7 @@ from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.readers import channel_arithmetic, json_file, text
 from underskin.recordings.readers.calendar_times import time_zone, with_zone
-from underskin.recordings.readers.channel_arithmetic import Formula
+from underskin.recordings.readers.expressions import Expression
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.validation import mapping, named, shown
@@ -187,7 +187,7 @@ class RigDescription:
     document: Mapping[str, Any]
     curves: str | CurveChannel | None = None
     estimator: Estimator | None = None
-    derived: Mapping[str, Formula] = dataclasses.field(default_factory=dict)
+    derived: Mapping[str, Expression] = dataclasses.field(default_factory=dict)
     trim: Trim | None = None
 
     def with_recording(self, values: Mapping[str, Any]) -> "RigDescription":
@@ -279,12 +279,12 @@ def _curves(document: Any) -> str | CurveChannel | None:
     return curves
 
 
-def _derived(document: Any) -> dict[str, Formula]:
+def _derived(document: Any) -> dict[str, Expression]:
     given = mapping("derived", {} if document is None else document)
     return all_of({name: partial(_formula, name, text) for name, text in given.items()})
 
 
-def _formula(name: Any, text: Any) -> Formula:
+def _formula(name: Any, text: Any) -> Expression:
     place = f"derived.{named(name)}"
     field.name(place, name, False)
     return channel_arithmetic.parse(place, field.name(place, text, False))

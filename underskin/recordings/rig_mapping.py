@@ -267,9 +267,16 @@ class MappedBlock:
             return mapping.unit or ""
         if mapping.unit and contradicts(label, mapping.unit, channel.name, dimension):
             reason = f"is labelled {label!r}, but the rig description says {mapping.unit!r}"
-            raise self._error(
-                place, f"{reason}: correct the one that is wrong; if it is the label, add labelled: {label}"
+            stated = unit(mapping.unit)
+            of_one_dimension = stated is not None and any(
+                meaning.dimension == stated.dimension for meaning in meanings(label)
             )
+            if not (self.rig.units_checked and of_one_dimension):
+                raise self._error(
+                    place, f"{reason}: correct the one that is wrong; if it is the label, add labelled: {label}"
+                )
+            self.warnings.append(f"{place} {reason}, whose units_checked confirms it")
+            return mapping.unit
         if not mapping.unit and len(meanings(label)) > 1:
             raise self._error(
                 place, f"its unit {label!r} has several meanings: say it, as `unit` of the rig description"

@@ -13,9 +13,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from underskin.physics.sphere_law import FULL_SPHERE_OF_LOAD
-from underskin.surrogate.hdf5_format import CONTACT_SCHEMA
+from underskin.surrogate.hdf5_format import CONTACT_SCHEMA, Table
 from underskin.surrogate.sigma_table import tables_folder
-from underskin.surrogate.table_file import Table
 from underskin.units import Floats
 
 CONTACT_TABLE = "contact.h5"

@@ -7,10 +7,11 @@ all its datasets. `tables/README.md` describes the format.
 
 import hashlib
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import h5py
 import numpy as np
@@ -150,3 +151,24 @@ def _verify_values(path: Path, group: str, name: str, data: Mapping[str, Floats]
     expected = tuple(data[f"{group}/{axis}"].size for axis in axes)
     if axes and values.shape != expected:
         raise TableError(f"table {path}: {group}/{name} has shape {values.shape}, its axes {expected}. {_REMEDY}")
+
+
+class Table(ABC):
+    """A verified table: `path`, `sha256` (which names it) and the file's `attributes`."""
+
+    schema: ClassVar[str]
+
+    def __init__(self, path: Path) -> None:
+        """Read and verify the table; raises TableError with the reason."""
+        file = read_table(path, self.schema)
+        self.path = path
+        self.sha256 = file.sha256
+        self.attributes = file.attributes
+        try:
+            self._take(file.data)
+        except KeyError as error:
+            raise TableError(f"table {path} lacks the dataset {error}") from error
+
+    @abstractmethod
+    def _take(self, data: Mapping[str, Floats]) -> None:
+        """Store the datasets that the table needs, by "group/name"."""

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
-from underskin.surrogate.hdf5_format import INFLUENCE_SCHEMA
+from underskin.surrogate.hdf5_format import INFLUENCE_SCHEMA, Table
 from underskin.surrogate.sigma_table import tables_folder
-from underskin.surrogate.table_file import Table
 from underskin.units import Floats, Mask
 
 INFLUENCE_TABLE = "influence.h5"

@@ -7,14 +7,14 @@ An offset sensor averages the contact model's base profile T3(r; a/h, L) over it
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_interp_spline
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
 from underskin.surrogate.contact_model import ContactModel
+from underskin.surrogate.tensor_spline import CubicAxis
 from underskin.units import Floats
 
 _SPACING = 0.05  # of the grids in r/h and e/h; the profile turns over lengths of 0.3 h and more
-_RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
-_AT_ONCE = 500  # rows of a profile
 _SCATTER_NODES = 7  # Gauss–Hermite, in x and y
 
 
@@ -73,63 +73,37 @@ def positioned_sigma(
     largest_scatter_over_h
         Largest standard deviation of the position, over the thickness, for later calls of `scattered`.
     """
-    farthest, largest_disc = contact_model.profile_end, contact_model.domain["rt_over_h"][1]
+    largest_disc = contact_model.domain["rt_over_h"][1]
     disc_inside = rt_over_h <= largest_disc
-    rt_over_h = min(rt_over_h, largest_disc)
-    largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
-    offsets = _grid(min(largest_offset + 4 * _SPACING, farthest - rt_over_h))
-    radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
-    profile = _profiles(contact_model, radii, a_over_h, load_parameter)
-    sigma = profile @ _disc_average(radii, offsets, rt_over_h).T
+    largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h + 4 * _SPACING
+    offsets, sigma = sigma_off_centre(
+        contact_model, a_over_h, min(rt_over_h, largest_disc), load_parameter, largest_offset
+    )
     curve = CubicSpline(offsets, np.nan_to_num(sigma), axis=1, bc_type=((1, np.zeros(len(sigma))), "not-a-knot"))
     commanded = _evaluate_rows(curve, offset_over_h[:, None])[:, 0]
     inside = disc_inside & (offset_over_h <= offsets[-1]) & np.isfinite(sigma).all(axis=1)
     return PositionedSigma(np.where(inside, commanded, np.nan), offset_over_h, curve)
 
 
-def _profiles(contact_model: ContactModel, radii: Floats, a_over_h: Floats, load_parameter: Floats) -> Floats:
-    """The profiles of contacts (rows, radii), in parts, since one evaluation blocks the other threads of a server."""
-    pieces = (slice(first, first + _AT_ONCE) for first in range(0, max(len(a_over_h), 1), _AT_ONCE))
-    return np.concatenate(
-        [contact_model.profile(radii, a_over_h[piece, None], load_parameter[piece, None]) for piece in pieces]
-    )
-
-
 def sigma_off_centre(
-    contact_model: ContactModel, a_over_h: float, rt_over_h: float, load_parameter: float
+    contact_model: ContactModel,
+    a_over_h: ArrayLike,
+    rt_over_h: float,
+    load_parameter: ArrayLike,
+    largest_offset: float = np.inf,
 ) -> tuple[Floats, Floats]:
-    """Offsets e/h, from 0 to the end of the table's profile, and σ there of one contact; NaN outside the domain."""
+    """Offsets e/h (offsets,), up to the largest or to the end of the table's profile, and σ there of contacts (…,
+    offsets); NaN outside the domain."""
     farthest = contact_model.profile_end
-    offsets = _grid(farthest - rt_over_h)
-    radii = np.minimum(_grid(farthest), farthest)
-    profile = contact_model.profile(radii, a_over_h, load_parameter)
-    if not np.isfinite(profile).all():
-        return offsets, np.full(len(offsets), np.nan)
-    distance, weight = _over_disc(offsets, rt_over_h)
-    return offsets, np.einsum("r,ora->o", weight, make_interp_spline(radii, profile, k=3)(distance))
+    offsets = _grid(min(largest_offset, farthest - rt_over_h))
+    radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
+    profile = contact_model.profile(radii, np.asarray(a_over_h)[..., None], np.asarray(load_parameter)[..., None])
+    return offsets, profile @ CubicAxis(radii).disc_averages(offsets, rt_over_h).T
 
 
 def _grid(end: float) -> Floats:
     """Grid from 0 to `end`, which the last point may exceed by rounding only."""
     return _SPACING * np.arange(np.floor(end / _SPACING + 1e-9) + 1)
-
-
-def _disc_average(radii: Floats, offsets: Floats, rt_over_h: float) -> Floats:
-    """The matrix (offsets, radii) that averages a profile given at the radii over the offset disc."""
-    distance, weight = _over_disc(offsets, rt_over_h)
-    basis = make_interp_spline(radii, np.eye(len(radii)), k=3)(distance)
-    return np.einsum("r,orak->ok", weight, basis)
-
-
-def _over_disc(offsets: Floats, rt_over_h: float) -> tuple[Floats, Floats]:
-    """The distances of quadrature points on the offset disc from the contact (offsets, radial, angular), and the
-    weights of each radius."""
-    x, weight = np.polynomial.legendre.leggauss(_RADIAL)
-    s = rt_over_h * (x + 1) / 2
-    weight = weight * (x + 1) / 2 / _ANGULAR
-    angle = np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR
-    across = offsets[:, None, None]
-    return np.sqrt(across**2 + s[:, None] ** 2 + 2 * across * s[:, None] * np.cos(angle)), weight
 
 
 def _evaluate_rows(curve: CubicSpline, at: Floats) -> Floats:

@@ -7,12 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from underskin.physics import hertz
-from underskin.surrogate.contact_model import ContactModel, ContactRadius, interpolation_coefficients
-from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
-from underskin.surrogate.table_file import Table
+from underskin.surrogate.contact_model import ContactModel, ContactRadius
+from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Table
 from underskin.units import Floats
-
-__all__ = ["SIGMA_TABLE", "SigmaTable", "interpolation_coefficients", "load_table", "tables_folder"]
 
 SIGMA_TABLE = "sigma.h5"
 
@@ -27,7 +24,9 @@ class SigmaTable(ContactModel, Table):
     schema = SIGMA_SCHEMA
 
     def _take(self, data: Mapping[str, Floats]) -> None:
-        self._tabulate(data)
+        axes = data["sigma/a_over_h"], data["sigma/rt_over_h"], data["sigma/cbrt_load_parameter"]
+        rel_error = data["sigma/discretisation_error"] + data["sigma/interpolation_error"]
+        self._tabulate(axes, data["sigma/sigma"], rel_error, data["profile/r_over_h"], data["profile/profile"])
         self.fem_linear_error = data["sigma/fem_linear_error"]
 
     def radius(

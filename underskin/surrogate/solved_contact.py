@@ -20,7 +20,7 @@ from scipy.special import j0
 from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
-from underskin.physics.layered_radius import layered_radius
+from underskin.physics.layered_radius import LayeredRadius
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.surrogate.contact_model import ContactModel, ContactName, ContactRadius
 from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
@@ -40,6 +40,7 @@ class SolvedContact(ContactModel):
     def __init__(self, table: ContactTable) -> None:
         """Tabulate; takes tenths of a second."""
         self.sha256 = table.sha256
+        self._linear_radius = LayeredRadius()
         nodes, cbrt_load, _ = table.axes
         a, r = (np.sort(np.append(axis, (axis[1:] + axis[:-1]) / 2)) for axis in (nodes, table.axes[2]))
         linear, profile = linear_contact(a, _RHO, r)
@@ -47,20 +48,8 @@ class SolvedContact(ContactModel):
         added = make_interp_spline(nodes, _disc_mean(table, _RHO), k=3)(a)
         error = make_interp_spline(nodes, _disc_maximum(table, _RHO), k=1)(a)
         sigma = linear[:, :, None] + added
-        self._tabulate(
-            {
-                "sigma/a_over_h": a,
-                "sigma/rt_over_h": _RHO,
-                "sigma/cbrt_load_parameter": cbrt_load,
-                "sigma/sigma": sigma,
-                "sigma/discretisation_error": error / sigma,
-                "sigma/interpolation_error": np.full_like(sigma, _SPLINE_ERROR),
-                "profile/a_over_h": a,
-                "profile/r_over_h": r,
-                "profile/profile": profile[:, :, None]
-                + make_interp_spline(nodes, table.profile_over(r).swapaxes(1, 2), k=3)(a),
-            }
-        )
+        profile = profile[:, :, None] + make_interp_spline(nodes, table.profile_over(r).swapaxes(1, 2), k=3)(a)
+        self._tabulate((a, _RHO, cbrt_load), sigma, error / sigma + _SPLINE_ERROR, r, profile)
         self._radius_ratio = RectBivariateSpline(nodes, cbrt_load, table.contact_radius, s=0)
 
     def radius(
@@ -68,7 +57,7 @@ class SolvedContact(ContactModel):
     ) -> ContactRadius:
         """NaN where ν is not 0.5; outside the table the radius is that at small strain."""
         load = force * indenter_radius * (1 - INCOMPRESSIBLE**2) / (youngs_modulus * thickness**3)
-        a = np.where(poisson_ratio == INCOMPRESSIBLE, layered_radius().alpha(load), np.nan)
+        a = np.where(poisson_ratio == INCOMPRESSIBLE, self._linear_radius.alpha(load), np.nan)
         cbrt_load = np.cbrt(force / (indenter_radius**2 * youngs_modulus))
         inside = (a <= self.axes[0][-1]) & (cbrt_load <= self.axes[2][-1])
         ratio = np.where(inside, self._radius_ratio.ev(np.where(inside, a, 0.0), np.where(inside, cbrt_load, 0.0)), 1.0)
@@ -76,7 +65,7 @@ class SolvedContact(ContactModel):
 
     def load_over_cube(self, a_over_h: Floats) -> tuple[Floats, Floats]:
         """P/(a/h)³ and d ln a/d ln P of the linear layer's contact."""
-        return layered_radius().load_over_cube(a_over_h), layered_radius().log_slope(a_over_h)
+        return self._linear_radius.load_over_cube(a_over_h), self._linear_radius.log_slope(a_over_h)
 
 
 def contact_model(table: SigmaTable, name: ContactName) -> ContactModel:

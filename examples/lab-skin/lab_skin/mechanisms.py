@@ -2,11 +2,8 @@
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, exp
-from underskin.mechanisms import Kind, Mechanism, Normal, Parameter, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.campaign import Conditions
+from underskin.autodiff import exp
+from underskin.mechanisms import FrfState, Mechanism, Normal, Parameter, Stage, Values
 
 
 class SampleAveraging(Mechanism):
@@ -19,22 +16,20 @@ class SampleAveraging(Mechanism):
     source = "Oppenheim and Schafer, Discrete-Time Signal Processing (2010), section 2.6."
     stage = Stage.LINES
     axes = ("frequency_hz", "phase")
+    parameters_stated = (
+        Parameter(
+            name="averaging_interval",
+            unit="ms",
+            low=1e-3,
+            high=10.0,
+            prior=Normal(float(np.log(0.2)), 1.5),
+            scale="log",
+            limit=0.0,
+            reason="recorders take 1 to 20 samples a millisecond: 0.2 ms within a factor of 4.5",
+        ),
+    )
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The interval between two samples."""
-        return (
-            Parameter(
-                name="averaging_interval",
-                unit="ms",
-                low=1e-3,
-                high=10.0,
-                prior=Normal(float(np.log(0.2)), 1.5),
-                scale="log",
-                limit=0.0,
-                reason="recorders take 1 to 20 samples a millisecond: 0.2 ms within a factor of 4.5",
-            ),
-        )
-
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-        """The complex factor on each distinct line."""
-        return (1.0 + exp(values["averaging_interval"] * (-2e-3j * np.pi * design.line_frequency))) * 0.5
+    def act(self, state: FrfState, values: Values) -> None:
+        """Set the complex factor on each distinct line."""
+        turns = values["averaging_interval"] * (-2e-3j * np.pi * state.design.line_frequency)
+        state.factor = (1.0 + exp(turns)) * 0.5

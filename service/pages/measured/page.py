@@ -23,7 +23,7 @@ from service.store import Database
 from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, TableError, UnderskinError, conflicting, required, wrong_type
 from underskin.prediction.answers import other_contact
-from underskin.prediction.pressed_skin import RowConditions, beyond
+from underskin.prediction.pressed_skin import beyond
 from underskin.recordings.validation import Check, declared, not_negative
 from underskin.recordings.validation import number as finite
 from underskin.several_errors import noting
@@ -186,11 +186,11 @@ def _row(line_number: int, line: str, *, units_checked: bool) -> list[float]:
 
 def reasons(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> list[str]:
     """For each row outside the table the value and the allowed range; `document`: the request of the answer."""
-    numbers = [answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")]
+    numbers = np.stack([answer.full(name) for name in ("a_over_h", "rt_over_h", "load_parameter")], axis=-1).tolist()
     status = answer.status()
     skin = document["youngs_modulus_mpa"], document["poisson_ratio"]
     return [
-        f"row {row + 1}, " + beyond(RowConditions(force, radius, *skin), [float(part[row]) for part in numbers], table)
+        f"row {row + 1}, {beyond(table, numbers[row], force, radius, *skin)}"
         for row, (force, radius) in enumerate(zip(document["preload_n"], document["indenter_radius_mm"], strict=True))
         if status[row] != "ok"
     ]

@@ -123,7 +123,9 @@ class Inspected:
 _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
 _STRAIGHT = 3.0  # standard deviations of χ² about a straight line above which a block is split
 _LEAST_NOISE = 2e-5  # of the range of force: resolution of numbers with five digits
-_COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which changes of force are summed, standard deviations of noise
+_COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which a way is summed, standard deviations of noise
+_RADIUS_SHARE = 0.7  # of the way along a curve, that of the contact radius
+_LEAST_CONTACT = 1e-3  # of the largest force, below which a sample is out of contact
 _NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # first samples of blocks, from a jump: in
 # samples, or in steps as large as the noise of the travel, since noisy single displacements bias a non-linear law
 _SIDE_SAMPLES = 5  # samples on either side of the deepest one
@@ -142,8 +144,8 @@ def thinned(
     unsteady = roughness(columns[0])
     columns = _with_corner(_with_still_hold(columns, seen), seen.turn)
     displacement, force = columns[:2]
-    path_fraction = path_fractions(displacement, force, seen.noise)
-    even = np.searchsorted(path_fraction, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
+    path_fraction = path_fractions(displacement, force, seen, kind)
+    even = np.searchsorted(path_fraction, np.linspace(0.0, float(path_fraction[-1]), _SAMPLES, endpoint=False))
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
     unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel within the noise of force
     straight = ((force, seen.noise), (displacement, max(unsteady, unseen)))
@@ -159,6 +161,11 @@ def thinned(
     slope = np.where(held, 0.0, _slopes(means[0], means[1], unsteady / np.sqrt(counts), starts >= seen.turn))
     least = _LEAST_NOISE * float(np.ptp(force))
     deviation = np.sqrt((seen.noise**2 + (slope * unsteady) ** 2) / counts + least**2 + sag_deviation**2 + slow**2)
+    for jump in (seen.snap_in, seen.pull_off) if kind == "indentation" else ():
+        if jump is not None:  # an event: a sample during the jump may lie anywhere between
+            row = int(np.searchsorted(starts, jump, side="right")) - 1
+            near = slice(max(row - 1, 0), row + 1)
+            deviation[near] = np.hypot(deviation[near], float(np.ptp(means[1][near])))
     return means, deviation, position, counts.astype(float)
 
 
@@ -314,17 +321,48 @@ def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
     return corrected
 
 
-def path_fractions(displacement: Floats, force: Floats, noise: float) -> Floats:
-    """The position of each sample along the curve, 0 to 1: the mean of the shares of displacement, force and count.
+def path_fractions(displacement: Floats, force: Floats, seen: CurveLandmarks, kind: Kind) -> Floats:
+    """The position x of each sample along the curve, by which the error of a law is smooth; about 0 to 1.
 
-    Motion in the air is long and carries little information; force counts where it changes by more than its noise.
+    Of a sphere mostly the way of its contact radius a, over twice the largest one: laws of contact idealise by a/R and
+    a/h, and a surface or tip that is not smooth shows while the contact is small. Of a cylinder the way of its force.
+    Shares of displacement and of samples give the air and a hold a length.
     """
-    coarse = np.linspace(0, len(force) - 1, min(len(force), _COARSE)).round().astype(int)
-    steps = np.maximum(np.abs(np.diff(force[coarse])) - _BEYOND_NOISE * noise, 0.0)
-    changed = np.interp(np.arange(len(force)), coarse, np.concatenate([[0.0], np.cumsum(steps)]))
-    moved = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(displacement)))])
-    parts = [part / part[-1] for part in (moved, changed, np.arange(len(force), dtype=float)) if part[-1] > 0]
-    return np.asarray(sum(parts) / len(parts))
+    if kind == "indentation":
+        share, changed, whole = _RADIUS_SHARE, np.abs(np.diff(_contact_radius(displacement, force, seen))), 2.0
+    else:
+        coarse = _evenly(len(force))
+        steps = np.maximum(np.abs(np.diff(force[coarse])) - _BEYOND_NOISE * seen.noise, 0.0)
+        changed = np.diff(np.interp(np.arange(len(force)), coarse, np.concatenate([[0.0], np.cumsum(steps)])))
+        share, whole = 1 / 3, float(changed.sum())
+    moved = np.abs(np.diff(displacement))
+    parts = (
+        (share, changed, whole),
+        ((1 - share) / 2, moved, float(moved.sum())),
+        ((1 - share) / 2, np.ones(len(moved)), float(len(moved))),
+    )
+    ways = [(weight, weight * np.cumsum(steps) / unit) for weight, steps, unit in parts if unit > 0]
+    total = sum(way for _, way in ways) / sum(weight for weight, _ in ways) if ways else np.zeros(len(moved))
+    return np.concatenate([[0.0], total])
+
+
+def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -> Floats:
+    """The contact radius over the largest one by Hertz's depth (samples,), 0 in the air."""
+    largest = float(np.abs(force).max())
+    without = np.flatnonzero(force <= max(_BEYOND_NOISE * seen.noise, _LEAST_CONTACT * largest))
+    before, after = without[without < seen.turn], without[without > seen.turn]
+    first = seen.snap_in if seen.snap_in is not None else (before[-1] + 1 if len(before) else 0)
+    end = seen.pull_off if seen.pull_off is not None else (after[0] if len(after) else len(force))
+    lowest = float(displacement[first:end].min())
+    depth = np.maximum(displacement - lowest, 0.0)
+    depth[:first], depth[end:] = 0.0, 0.0
+    coarse = _evenly(len(force))
+    return np.sqrt(np.interp(np.arange(len(force)), coarse, depth[coarse]) / (float(depth.max()) or 1.0))
+
+
+def _evenly(samples: int) -> Indices:
+    """At most `_COARSE` of the samples, evenly: the way along them does not grow with their noise."""
+    return np.linspace(0, samples - 1, min(samples, _COARSE)).round().astype(np.intp)
 
 
 COLLAPSED_HZ = 30.0  # frequency of a collapsed line; models without frequency do not use it

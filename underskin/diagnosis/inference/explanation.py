@@ -35,9 +35,11 @@ from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, Plateau
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.laws.adhesion import Adhesion
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.parameter import Parameter
+from underskin.mechanisms.unlisted.laws import UnlistedLaw
 from underskin.recordings.campaign import curves_of
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
@@ -111,7 +113,7 @@ class _Grid:
         parameters = {name: hypothesis.model.parameters[slices[name]] for name in self.new_names}
         varied = sum(not parameter.starts for of_mechanism in parameters.values() for parameter in of_mechanism)
         quantiles = _QUANTILES.get(varied, (0.5,))
-        if any(hypothesis.lines.mechanisms[name].begins_at_guesses for name in self.new_names):
+        if any(isinstance(hypothesis.lines.mechanisms[name], UnlistedLaw) for name in self.new_names):
             quantiles = (0.5,)
         axes = [
             [parameter.to_fit(value) for value in parameter.starts] or [parameter.quantile(q) for q in quantiles]
@@ -182,12 +184,12 @@ def _starts_of_curves(
     ranked = _cheapest(lowest[:grid_count])[:_CONTACT_POINT_STARTS]
     candidates = lowest[np.append(np.sort(ranked), np.arange(grid_count, len(lowest)))]
     is_single = len(fitter.hypotheses[0].model.names) == 1
-    moves_contact = is_single and any(fitter.lines.mechanisms[name].moves_contact_points for name in new_names)
+    moves_contact = is_single and Adhesion.name in new_names
     if fitter.lines.kind == "indentation" and (moves_contact or starting_point.nuisances is None):
         candidates = _with_contact_points(
             fitter, _with_softer_moduli(fitter, candidates) if moves_contact else candidates
         )
-    begins_at_guesses = any(fitter.lines.mechanisms[name].begins_at_guesses for name in new_names)
+    begins_at_guesses = any(isinstance(fitter.lines.mechanisms[name], UnlistedLaw) for name in new_names)
     count = _STARTS_FROM_PARENT if starting_point.parent is not None and not begins_at_guesses else _STARTS
     starts = candidates.points[np.sort(_cheapest(candidates)[:count])]
     if new_names and starting_point.parent is not None and starting_point.nuisances is not None:

@@ -29,6 +29,7 @@ from underskin.diagnosis.inference.least_squares import LeastSquares, between_sa
 from underskin.diagnosis.inference.products import FrfProducts, Products, joined
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
+from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModels
 from underskin.units import Floats, Indices, Mask
 
@@ -377,10 +378,12 @@ class Fitter:
             zip(self.hypotheses, mechanism_fits, parents, strict=True)
         ):
             count, mechanisms = self.counts[number], hypothesis.mechanism_parameter_count
-            nuisances = [parameter.start for parameter in hypothesis.model.parameters[mechanisms:]]
+            nuisances = np.array([parameter.start for parameter in hypothesis.model.parameters[mechanisms:]])
             if parent is not None:
-                nuisances = parent.fit[len(parent.fit) - (count - mechanisms) :].tolist()
+                nuisances = parent.fit[len(parent.fit) - (count - mechanisms) :]
             rows = owner == number
+            # Bounds may differ from the parent's: where the contact sticks, a snap-in confines its beginning.
+            nuisances = np.clip(nuisances, self.low[number, mechanisms:count], self.high[number, mechanisms:count])
             fit[rows, :mechanisms], fit[rows, mechanisms:count] = values, nuisances
         shared = [GAIN_PRIOR.middle, 0.0]
         if self.has_position_scatter:
@@ -509,7 +512,8 @@ class Fitter:
     def _between_samples(self, at: Evaluated) -> Self:
         """With contact points confined to the interval between samples that they are in, where adhesion moves them."""
         (hypothesis,) = self.hypotheses
-        if not any(self.lines.mechanisms[name].moves_contact_points for name in hypothesis.model.names):
+        assert isinstance(hypothesis.model, CurveModel)
+        if not hypothesis.model.hidden_jumps:
             return self
         held = copy(self)
         held.low, held.high = (

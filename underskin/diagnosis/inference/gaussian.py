@@ -90,7 +90,7 @@ class Gaussian:
         """∫ L(q) N(q; μ, diag variance) dq as a likelihood of μ; for variances (…, quantities) a stack (…)."""
         loosened = np.eye(self.linear.shape[-1]) + self.precision * variance[..., None, :]
         shrunk = np.linalg.inv(loosened)
-        linear = shrunk @ self.linear
+        linear = np.einsum("...pq,...q->...p", shrunk, self.linear)
         square = (self.linear * variance * linear).sum(axis=-1)
         return Gaussian(shrunk @ self.precision, linear, self.height + 0.5 * (square - np.linalg.slogdet(loosened)[1]))
 

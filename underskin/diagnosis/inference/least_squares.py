@@ -8,7 +8,6 @@ is fitted again between the samples where it fits best.
 """
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -17,9 +16,8 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
 from underskin.diagnosis.noise import START_GAIN, USUAL_DRIFT
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.recordings.campaign import CurveConditions, CurveRecording, curves_of
-from underskin.recordings.curve_course import curve_landmarks, touch
-from underskin.units import Floats, Mask
+from underskin.recordings.campaign import curves_of
+from underskin.units import Floats
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
 _TOLERANCE, _OF_STARTS = 1e-4, 1e-3  # of the sum of squares, and the same for starting points
@@ -56,21 +54,11 @@ class LeastSquares:
         self._precision, self._centre = np.sqrt(priors[:, 0]), priors[:, 1]
         travels = [curve.displacement_mm for curve in curves_of(lines.campaign)]
         self._approach = [_distinct(travel[: int(travel.argmax()) + 1]) for travel in travels]
-        self._has_jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
-        curves = curves_of(lines.campaign) if self._has_jumps else []
-        self._snap_in_intervals = [_snap_in_interval(curve) for curve in curves]
-        contacts = [_visible_contact(curve) for curve in curves]
-        visible = [contact for contact in contacts if contact is not None]
-        self._visible_contact = np.concatenate(visible) if visible and len(visible) == len(contacts) else None
+        self._has_jumps = model.hidden_jumps
 
     def fitted(self, start: Floats) -> tuple[Floats, float]:
         """The fit coordinates (parameters,) from a start, and half the sum of squares there."""
         initial, low, high = np.append(start, np.zeros(len(self._spans))), self._low.copy(), self._high.copy()
-        for index, interval in zip(self._model.contact_points.tolist(), self._snap_in_intervals, strict=False):
-            if interval is not None and low[index] < interval[0] < interval[2] < high[index]:
-                low[index], initial[index], high[index] = interval
-        if self._visible_contact is not None:  # first with the contact fixed to where the jumps show it
-            initial, _ = self._minimised(initial, low, high, self._visible_contact)
         x, cost = self._minimised(initial, low, high)
         if self._has_jumps:
             other, less = self._minimised(*self._between_samples(x))
@@ -99,28 +87,27 @@ class LeastSquares:
         moved[indices], low[indices], high[indices] = fits[best, indices], lower[best, curves], upper[best, curves]
         return moved, low, high
 
-    def _minimised(self, start: Floats, low: Floats, high: Floats, held: Mask | None = None) -> tuple[Floats, float]:
-        """Fit coordinates and gains from a start, and half the sum of squares there; samples `held` are in contact."""
+    def _minimised(self, start: Floats, low: Floats, high: Floats) -> tuple[Floats, float]:
+        """Fit coordinates and gains from a start, and half the sum of squares there."""
         count = len(low)
         gains = np.full(len(start) - count, 0.5)
         margin = _INSIDE * (high - low)
         initial = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
         bounds = np.append(low, -gains), np.append(high, gains)
         unit = np.append(_units(self._model, self._precision), np.ones(len(gains)))
-        functions = partial(self._residuals, held=held), partial(self._jacobian, held=held)
-        return _solved(*functions, initial, bounds, unit, _OF_STARTS)
+        return _solved(self._residuals, self._jacobian, initial, bounds, unit, _OF_STARTS)
 
-    def _residuals(self, x: Floats, held: Mask | None) -> Floats:
+    def _residuals(self, x: Floats) -> Floats:
         count = len(self._low)
         fit, gain = x[:count], x[count:]
-        force = self._model.forces(fit[None], held)[0]
+        force = self._model.forces(fit[None])[0]
         residuals = (self._measured - (1 + gain[self._recording]) * force) / self._unit
         return np.concatenate([self._projected(residuals), (fit - self._centre) * self._precision, gain / START_GAIN])
 
-    def _jacobian(self, x: Floats, held: Mask | None) -> Floats:
+    def _jacobian(self, x: Floats) -> Floats:
         count = len(self._low)
         fit, gain = x[:count], x[count:]
-        force, slopes = (part[0] for part in self._model.forces_and_slopes(fit[None], held))
+        force, slopes = (part[0] for part in self._model.forces_and_slopes(fit[None]))
         by_fit = -(slopes * (1 + gain[self._recording])) / self._unit
         by_gain = np.where(self._recording == np.arange(len(gain))[:, None], -force / self._unit, 0.0)
         rows = np.concatenate([self._projected(by_fit), self._projected(by_gain)]).T
@@ -140,33 +127,6 @@ def _distinct(travel: Floats) -> Floats:
     """The distinct displacements in order, to within rounding."""
     values = np.unique(travel)
     return values[np.append(True, np.diff(values) > _SAME * np.ptp(values))]
-
-
-def _snap_in_interval(curve: CurveConditions) -> tuple[float, float, float] | None:
-    """The displacements [mm] of the samples before and after a snap-in, with the estimated contact point as the middle
-    one; None where no snap-in is seen."""
-    seen = (
-        curve_landmarks(curve.displacement_mm, curve.force_n, curve.time_s)
-        if isinstance(curve, CurveRecording)
-        else None
-    )
-    if seen is None or not seen.snap_in:
-        return None
-    before, after = curve.displacement_mm[seen.snap_in - 1 : seen.snap_in + 1].tolist()
-    contact_point = touch(curve.displacement_mm, seen.snap_in)
-    return (before, contact_point, after) if before < contact_point < after else None
-
-
-def _visible_contact(curve: CurveConditions) -> Mask | None:
-    """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
-    if not isinstance(curve, CurveRecording):
-        return None
-    seen = curve_landmarks(curve.displacement_mm, curve.force_n, curve.time_s)
-    number = np.arange(len(curve.force_n))
-    retraction = float(curve.displacement_mm[seen.turn] - curve.displacement_mm[-1])
-    if seen.snap_in is None or (seen.pull_off is None and retraction > _RETURN * float(np.ptp(curve.displacement_mm))):
-        return None
-    return (number >= seen.snap_in) & (number < (len(number) if seen.pull_off is None else seen.pull_off))
 
 
 def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, float]:

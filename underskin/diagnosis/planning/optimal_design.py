@@ -137,10 +137,8 @@ def _nothing_to_plan(surviving: Sequence[Answer], varied: Collection[str]) -> Ne
     names = [answer.names for answer in surviving]
     listed = [mechanisms for mechanisms in names if set(mechanisms) <= set(CATALOGUE)]
     axes = [{axis for name in mechanisms for axis in CATALOGUE[name].axes if axis in varied} for mechanisms in listed]
-    return NextRecordings(
-        names,
-        differ_on={axis for rival_axes in axes for axis in rival_axes if any(axis not in other for other in axes)},
-    )
+    common = set.intersection(*axes) if axes else set()
+    return NextRecordings(names, differ_on=set().union(*axes) - common)
 
 
 def _outlook(
@@ -152,26 +150,23 @@ def _outlook(
     together = Conditions(campaign.name, campaign.skin, (*campaign.recordings, *allowed))
     count = len(campaign.recordings)
     inside = np.ones(len(allowed), dtype=bool)
-    rivals, predictions = [], []
+    rivals = []
     for answer in surviving:
-        if answer.explanation is None:
+        explanation = answer.explanation
+        if explanation is None:
             continue
         try:
-            model = compose(answer.explanation.names, together, problem.table, "frf")
+            model = compose(explanation.names, together, problem.table, "frf")
         except Unsupported:
             continue
-        if len(model.parameters) != len(answer.explanation.point.fit):
-            continue
-        prediction = model.predict(answer.explanation.point.fit)
-        inside &= prediction.inside[count:] & (np.abs(prediction.value[count:]) > 0)
-        rivals.append(answer)
-        predictions.append(prediction)
+        if len(model.parameters) == len(explanation.point.fit):
+            prediction = model.predict(explanation.point.fit)
+            inside &= prediction.inside[count:] & (np.abs(prediction.value[count:]) > 0)
+            rivals.append((answer, explanation, prediction))
     rows = count + np.flatnonzero(inside)
     line = float(np.median(np.add.reduceat(problem.lines.deviation**-2.0, problem.lines.first)) ** -0.5)
     responses, unknown, scatter = [], [], []
-    for answer, prediction in zip(rivals, predictions, strict=True):
-        explanation = answer.explanation
-        assert explanation is not None
+    for _, explanation, prediction in rivals:
         levels, value = explanation.best.levels, prediction.value[rows]
         slopes = (prediction.slopes[explanation.best.hypothesis.mean_indices][:, rows] / value).real
         responses.append(np.log(np.abs(value)))
@@ -180,9 +175,9 @@ def _outlook(
         if prediction.position_slopes is not None:
             variance += levels.position**2 * (np.abs(prediction.position_slopes[:, rows] / value) ** 2).sum(axis=0)
         scatter.append(variance)
-    prior = np.array([answer.probability for answer in rivals])
+    prior = np.array([answer.probability for answer, *_ in rivals])
     outlook = _Outlook(np.array(responses), unknown, np.array(scatter), prior / prior.sum())
-    return rivals, outlook, [candidate for candidate, good in zip(allowed, inside, strict=True) if good]
+    return [answer for answer, *_ in rivals], outlook, [allowed[index] for index in np.flatnonzero(inside).tolist()]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,10 +49,8 @@ class RigLimits:
     @property
     def given(self) -> bool:
         """Whether the user gave any limit."""
-        return any(
-            value is not None
-            for value in (self.preload_n, self.indenter_radius_mm, self.dynamic_force_n, self.dwell_s, self.offset_mm)
-        )
+        limits = (self.preload_n, self.indenter_radius_mm, self.dynamic_force_n, self.dwell_s, self.offset_mm)
+        return any(limit is not None for limit in limits)
 
 
 def inferred(conditions: Conditions, limits: RigLimits) -> RigLimits:
@@ -100,6 +98,17 @@ def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]
     sensor = max(dict.fromkeys(sensors), key=sensors.count)
     position = next((declared.x_mm, declared.y_mm) for declared in conditions.skin.sensors if declared.id == sensor)
     cycles = [recording.load_cycles for recording in recordings if recording.load_cycles is not None]
+    assert limits.preload_n is not None
+    low, high = limits.preload_n
+    between = (float(f"{force:.2g}") for force in np.geomspace(low, high, _PRELOADS))
+    settings = itertools.product(
+        sorted({low, *(force for force in between if low <= force <= high), high}),
+        limits.indenter_radius_mm or (),
+        limits.dynamic_force_n or (),
+        limits.dwell_s or (None,),
+        limits.offset_mm or (0.0,),
+    )
+    possible = [setting for setting in settings if setting[2] < setting[0]]  # dynamic force and preload
     return [
         FrfConditions(
             id=f"candidate {index}",
@@ -113,21 +122,5 @@ def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]
             position_mm=(position[0] + round(offset, 3), position[1]),
             frequency_hz=np.array([COLLAPSED_HZ]),
         )
-        for index, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))
+        for index, (force, sphere, amplitude, dwell, offset) in enumerate(possible)
     ]
-
-
-def _settings(limits: RigLimits) -> Iterator[tuple[float, float, float, float | None, float]]:
-    assert limits.preload_n is not None
-    forces = sorted({float(f"{force:.2g}") for force in np.geomspace(*limits.preload_n, _PRELOADS)})
-    inside = [force for force in forces if limits.preload_n[0] <= force <= limits.preload_n[1]]
-    forces = sorted({*inside, *limits.preload_n})
-    for force, sphere, amplitude, dwell, offset in itertools.product(
-        forces,
-        limits.indenter_radius_mm or (),
-        limits.dynamic_force_n or (),
-        limits.dwell_s or (None,),
-        limits.offset_mm or (0.0,),
-    ):
-        if amplitude < force:
-            yield force, sphere, amplitude, dwell, offset

@@ -31,6 +31,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.findings.lacking import Lacking
 from underskin.mechanisms.base import Mechanism, Stage
+from underskin.mechanisms.laws import contact_creep, strain_stiffening
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.expressions import CurveLaw
@@ -237,7 +238,7 @@ class Facts:
                 value, factor = numbers.product(explanation, [index, *factors])
                 modulus |= numbers.with_ends(value, value / factor, value * factor, digits=6)
             modulus |= {"unit": "MPa", **numbers.scaled(modulus, declared)}
-        hiding = may_hide(mechanisms, campaign, mechanisms.named)
+        hiding = may_hide(campaign, mechanisms.named)
         return numbers.with_hidden(modulus, hidden_factors(hiding, explanation.names))
 
     @cached_property
@@ -300,12 +301,14 @@ class Facts:
     @property
     def meanings(self) -> list[str]:
         """The joint meaning of each mechanism's parameters, where a single value does not show it."""
-        values = {
-            mechanism["name"]: {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+        meanings = [
+            _MEANINGS[mechanism["name"]](
+                {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+            )
             for mechanism in self.mechanisms
-        }
-        mechanisms = self.problem.lines.mechanisms
-        return [meaning for name, parameters in values.items() if (meaning := mechanisms[name].told(parameters))]
+            if mechanism["name"] in _MEANINGS
+        ]
+        return [meaning for meaning in meanings if meaning]
 
     @cached_property
     def by_kind(self) -> list[dict[str, Any]]:
@@ -443,6 +446,10 @@ class Facts:
 
 
 _FACTOR = "modulus_factor"  # of modulus_error
+_MEANINGS = {
+    contact_creep.ContactCreep.name: contact_creep.meaning,
+    strain_stiffening.StrainStiffening.name: strain_stiffening.meaning,
+}
 
 
 def _is_of_depth(mechanism: Mechanism) -> bool:

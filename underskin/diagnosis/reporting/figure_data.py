@@ -87,7 +87,7 @@ def shown_curves(
             measured = measured - landmarks.zero
             jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
         snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
-        along = path_fractions(sample_mm, measured, landmarks.noise)
+        along = path_fractions(sample_mm, measured, landmarks, problem.kind)
         shown = _thinned(along, [landmarks.turn, *(at for at in jumps if at is not None)])
         predicted = {"before": before_curves[index], "after": after_curves[index]}
         curves.append(

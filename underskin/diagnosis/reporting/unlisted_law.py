@@ -64,7 +64,7 @@ class LeadingLaw:
             return None
         values = {
             parameter.name: parameter.from_fit(at)
-            for parameter, at in zip(law.parameters_bound, explanation.coordinates(law.name), strict=True)
+            for parameter, at in zip(law.parameters_stated, explanation.coordinates(law.name), strict=True)
         }
         return cls(law, values, explanation)
 
@@ -151,7 +151,7 @@ class LeadingLaw:
         span = spans(self.explanation)[self.law.name]
         here = self.change(x)
         slopes = []
-        for parameter in self.law.parameters_bound:
+        for parameter in self.law.parameters_stated:
             at = parameter.to_fit(self.values[parameter.name]) + _STEP
             slopes.append((self.change(x, {**self.values, parameter.name: parameter.from_fit(at)}) - here) / _STEP)
         covariance = covariance_of(self.explanation, range(span.start, span.stop))
@@ -241,7 +241,7 @@ def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[di
     turn = half_width / max(size, 1e-12) * period / (2 * np.pi)
     amplitude = with_ends(size, max(size - half_width, 0.0), size + half_width)
     return [
-        {"name": "amplitude", "unit": law.parameters_bound[0].unit, **amplitude},
+        {"name": "amplitude", "unit": law.parameters_stated[0].unit, **amplitude},
         {"name": "start", "unit": law.axis.unit, **with_ends(start, start - turn, start + turn)},
     ]
 
@@ -320,7 +320,7 @@ def _log_factor(leading: LeadingLaw, law: RecordingLaw, base: int, at: float) ->
     design = leading.explanation.best.hypothesis.frf_model.design
     moved = law.on(replace(law.axis, values=dict.fromkeys(design.ids, at), range=leading.ends), law.tables)
     seeds = {name: Differentiated(np.array([[value]]), np.zeros((0, 1, 1))) for name, value in leading.values.items()}
-    factor: Floats = np.broadcast_to(moved.on_recordings(design, seeds).value, (1, len(design.ids)))
+    factor: Floats = np.broadcast_to(moved.factor(design.ids, seeds).value, (1, len(design.ids)))
     return float(np.log(max(float(factor[0, base]), 1e-12)))
 
 

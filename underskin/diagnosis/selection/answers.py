@@ -25,6 +25,7 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import parameter_slices
+from underskin.diagnosis.noise import DISCREPANCY, USUAL
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.priors import (
     declared_laws,
@@ -218,10 +219,8 @@ class Search:
         Of nothing, all sets of known mechanisms, and none of these, the most probable leads, and of sets the most
         probable one: what many sets share is no reason to say that no known mechanism describes it.
         """
-        named: list[tuple[Explanation, float]] = []
-        unlisted = list(self.weighed_laws)
-        for fitted, weight in self.weighed:
-            (named if fitted.names or remainder(fitted) is None else unlisted).append((fitted, weight))
+        named, unlisted = list(self.weighed), list(self.weighed_laws)
+        unlisted += [(fitted, weight + self._log_odds_of_discrepancy(fitted)) for fitted, weight in self.weighed]
         log_unlisted = np.logaddexp.reduce([weight for _, weight in unlisted]) if unlisted else -np.inf
         if named:
             named = [(fitted, weight) for (fitted, _), weight in zip(named, without_occam(named), strict=True)]
@@ -234,6 +233,15 @@ class Search:
         answers = list(map(Answer, [*(fitted for fitted, _ in named), None], probabilities.tolist()))
         answers = [part for answer in answers for part in self._by_curves_alone(answer)]
         return leading_first(sorted(answers, key=lambda answer: -answer.probability))
+
+    def _log_odds_of_discrepancy(self, fitted: Explanation) -> float:
+        """Log odds that the smooth error beside a set is of a law that is missing, and not the idealisation of its own;
+        −∞ of FRFs."""
+        if not fitted.best.hypothesis.lines.curves:
+            return -math.inf
+        log_size = math.log(fitted.best.levels.smooth)
+        beneath = self.log_prior_beneath(fitted) - self.log_prior(fitted)
+        return beneath + float(DISCREPANCY.log_density(log_size) - USUAL.log_density(log_size))
 
     def _with_companions(self, named: Sequence[tuple[Explanation, float]]) -> list[tuple[Explanation, float]]:
         """Of indentations: the sets with one mechanism more than one of these that gain evidence, but less than shows.

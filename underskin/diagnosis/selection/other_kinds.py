@@ -11,7 +11,7 @@ hide whatever the curves look like (friction at the platens). The thickness of i
 declared wrongly, which FRFs tell (`thickness_error`), and must not be absorbed by the modulus.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,10 +23,13 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.gaussian import Gaussian, moments
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence, log_prior
-from underskin.mechanisms.base import Kind, Unsupported, Values
+from underskin.mechanisms.base import Kind, Mechanism, Unsupported, Values
+from underskin.mechanisms.laws import platen_friction, strain_stiffening
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.thickness_error import ThicknessError
 from underskin.mechanisms.models.composed import Model
+from underskin.mechanisms.models.composition import fit_coordinates
+from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import ActiveCatalogue
@@ -36,6 +39,7 @@ from underskin.units import Floats, to_si
 
 (UNKNOWN_THICKNESS,) = ThicknessError.parameters_stated
 THICKNESS_ERROR = ThicknessError.name
+PLATEN_FRICTION, STRAIN_STIFFENING = platen_friction.PlatenFriction.name, strain_stiffening.StrainStiffening.name
 THICKNESS = (LayeredContact.name, UNKNOWN_THICKNESS.name)
 
 
@@ -43,20 +47,13 @@ class LayerOfUnknownThickness(LayeredContact):
     """`layered_contact` of indentations with the thickness over the declared one as a parameter."""
 
     parameters_stated = (UNKNOWN_THICKNESS,)
+    parameters = Mechanism.parameters  # those stated
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:  # noqa: ARG002
-        """The thickness over the declared one."""
-        return self.parameters_stated
-
-    def follows_from_declared(self, conditions: Conditions, kind: Kind) -> bool:  # noqa: ARG002
-        """Its thickness is free."""
-        return False
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
+    def act(self, state: Contacts | Curve, values: Values) -> None:
         """Contact with a layer of that thickness."""
-        super().on_curve(curve, values)
-        if curve.thickness is not None:
-            curve.thickness = curve.thickness * values[UNKNOWN_THICKNESS.name]
+        super().act(state, values)
+        if state.thickness is not None:
+            state.thickness = state.thickness * values[UNKNOWN_THICKNESS.name]
 
 
 _BETWEEN_SPECIMENS = 0.02  # sd of the logarithm of the modulus from piece to piece of one elastomer
@@ -119,9 +116,8 @@ class OtherKind:
         """Curves with the modulus free (`free_modulus_problem`), and the explanations that a search found for them."""
         self.kind, self.problem = kind, problem
         self._explanations = {frozenset(explanation.names): explanation for explanation in explanations}
-        mechanisms, conditions = problem.lines.mechanisms, problem.lines.campaign
-        self.supported = tuple(name for name in mechanisms.named if self._supports(name))
-        self._may_hide = may_hide(mechanisms, conditions, self.supported)
+        self.supported = tuple(name for name in problem.lines.mechanisms.named if self._supports(name))
+        self._may_hide = may_hide(problem.lines.campaign, self.supported)
         self.posteriors: dict[frozenset[str], CurvePosterior] = {}
 
     def _supports(self, name: str) -> bool:
@@ -147,7 +143,7 @@ class OtherKind:
         self, posterior: CurvePosterior, names: frozenset[str], shared: Sequence[str]
     ) -> CurvePosterior:
         """Widened where a law extrapolates the modulus to no strain, by a part of how much the law reduces it."""
-        plain = [name for name in names if not self.problem.lines.mechanisms[name].extrapolates_modulus]
+        plain = [name for name in names if name != STRAIN_STIFFENING]
         if len(plain) == len(names):
             return posterior
         reduction = float(posterior.mean[0] - self.posterior(plain, shared).mean[0])  # hidden mechanisms cancel
@@ -195,12 +191,10 @@ class OtherKind:
         return self._explanations[names]
 
 
-def may_hide(
-    mechanisms: ActiveCatalogue, conditions: Conditions, names: Iterable[str]
-) -> Mapping[str, Sequence[float]]:
+def may_hide(conditions: Conditions, names: Collection[str]) -> Mapping[str, Sequence[float]]:
     """Mechanisms that an apparent modulus may hide, with logarithms of the factor by which it may be too large."""
-    hidden = {name: mechanisms[name].hidden_in_modulus(conditions) for name in names}
-    return {name: values for name, values in hidden.items() if values}
+    hidden = platen_friction.hidden_in_modulus(conditions) if PLATEN_FRICTION in names else ()
+    return {PLATEN_FRICTION: hidden} if hidden else {}
 
 
 def hidden_factors(hiding: Mapping[str, Sequence[float]], shown: Collection[str]) -> tuple[tuple[float, float], ...]:
@@ -273,7 +267,10 @@ def _quantities(
             )
             for index, parameter in zip(range(span.start, span.stop), parameters[span], strict=True)
         }
-        for key, quantity in lines.mechanisms[name].shared_parameters(lines.kind, seeds).items():
+        shared_values = fit_coordinates(lines.mechanisms[name].parameters_stated, seeds)
+        if name == STRAIN_STIFFENING:
+            shared_values = strain_stiffening.shared_parameters(lines.kind, seeds)
+        for key, quantity in shared_values.items():
             quantities.append((name, key))
             values.append(float(quantity.value[0]))
             rows.append(quantity.slopes[:, 0])

@@ -8,6 +8,7 @@ import math
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
+from underskin.mechanisms.laws.layered_contact import LayeredContact
 
 # "Nothing missing" includes all mechanisms that do not show, hence every other campaign.
 PRIORS = {"nothing_missing": 0.6, "one": 0.252, "two": 0.1, "three": 0.012, "four": 0.001, "none_of_these": 0.035}
@@ -26,11 +27,10 @@ def least_evidence(explanation: Explanation) -> float:
 
 def declared_laws(lines: Lines) -> frozenset[str]:
     """The mechanisms that follow from declared facts: no guesses, with equal prior odds inside every hypothesis."""
-    return frozenset(
-        name
-        for name, mechanism in lines.mechanisms.named.items()
-        if lines.kind in mechanism.kinds and mechanism.follows_from_declared(lines.campaign, lines.kind)
-    )
+    layered = lines.mechanisms.named.get(LayeredContact.name)
+    if layered is None or lines.kind not in layered.kinds or lines.campaign.skin.thickness_mm is None:
+        return frozenset()
+    return frozenset() if layered.parameters(lines.campaign, lines.kind) else frozenset({layered.name})
 
 
 def guess_count(explanation: Explanation) -> int:

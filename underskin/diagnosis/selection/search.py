@@ -26,6 +26,7 @@ from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence
 from underskin.mechanisms.base import Kind, Stage, Unsupported
+from underskin.mechanisms.laws.adhesion import Adhesion
 from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
@@ -157,13 +158,8 @@ class _Sets:
         best = min(self.explanations.values(), key=lambda fitted: fitted.best.cost)
         if smooth_error_gain(best) < _SMOOTH_ERROR:
             return
-        mechanisms = self.problem.lines.mechanisms
         requests = [
-            Request(
-                pair.names,
-                nuisances=None if any(mechanisms[name].moves_contact_points for name in pair.names) else best.point,
-            )
-            for pair in pairs
+            Request(pair.names, nuisances=None if Adhesion.name in pair.names else best.point) for pair in pairs
         ]
         for request, fitted in zip(requests, self.problem.explain(requests, best.best.cost), strict=True):
             names = frozenset(request.names)

@@ -32,7 +32,6 @@ from underskin.diagnosis.selection.gain_residual import GainResidual
 from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.axes import Axis
 from underskin.mechanisms.unlisted.expressions import CurveLaw, Extent, curve_laws, of_samples
 from underskin.mechanisms.unlisted.forms import Shape
@@ -62,7 +61,7 @@ class Score:
     @property
     def guess(self) -> Floats:
         """The law's fit coordinates where it gains most."""
-        count = len(self.law.parameters_bound) - len(self.law.amplitudes)
+        count = len(self.law.parameters_stated) - len(self.law.amplitudes)
         return np.concatenate([self.amplitudes * prior_deviations(self.law), self.shape_values[:count]])
 
 
@@ -209,7 +208,7 @@ def grid_values(parameters: Sequence[Parameter], grid: Floats) -> dict[str, Diff
 
 def prior_deviations(law: UnlistedLaw) -> Floats:
     """Standard deviations of the priors of a law's amplitudes (amplitudes,)."""
-    priors = [parameter.prior for parameter in law.parameters_bound[: len(law.amplitudes)]]
+    priors = [parameter.prior for parameter in law.parameters_stated[: len(law.amplitudes)]]
     return np.array([prior.sd for prior in priors if isinstance(prior, Normal)])
 
 
@@ -401,8 +400,7 @@ def _screening(problem: FittingProblem, null: Explanation, best: Explanation) ->
     if problem.kind != "frf":
         return None
     named = problem.lines.mechanisms.named
-    catalogue = tuple(CATALOGUE.values())
-    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, catalogue, named)
+    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, named)
     return Screening(problem, grammar) if grammar.laws else None
 
 

@@ -1,37 +1,48 @@
 """Campaigns of one skin diagnosed together: which mechanisms act in all of them, and which from some date on.
 
-Each campaign with FRFs is first diagnosed alone, which gives its noise, findings and candidate sets of mechanisms; then
-one set per campaign is chosen for all together (course.py). Curves of campaigns without FRFs are of the same material
-and count once, with the first campaign of FRFs that has a result. Changes of the sensors' d33 between campaigns are
-corrected for the mechanisms (sensors.py).
+Each campaign with FRFs is first diagnosed alone, which gives its noise, findings and candidate sets of mechanisms;
+then one set per campaign is chosen for all together (histories.py). Curves of campaigns without FRFs are of the same
+material and count once, with the first campaign of FRFs that has a result. Changes of the sensors' d33 between
+campaigns are corrected for the mechanisms (sensors.py).
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.facts import DiagnosisResult
-from underskin.diagnosis.reporting.report import reported
-from underskin.diagnosis.several.course import Shared, values
+from underskin.diagnosis.reporting.report import Reported, reported
+from underskin.diagnosis.several.histories import (
+    CampaignFits,
+    SharedParameters,
+    causes,
+    d33_uncertainties,
+    p_described,
+    parameter_values,
+    periods,
+    set_histories,
+)
+from underskin.diagnosis.several.joint_report import SkinOverDates, together_document
+from underskin.diagnosis.several.population import STATED
 from underskin.diagnosis.several.sensors import (
     CampaignDates,
-    SensorsOfCampaign,
-    Values,
-    corrected,
-    d33_changes,
-    date_of,
+    Change,
+    Sensor,
+    SensorsOverDates,
+    failures,
+    faults_of,
     in_order,
     sensors_of,
+    used_recordings,
+    without_steps,
 )
-from underskin.diagnosis.several.together_report import together_report, used_recordings
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
-from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -73,52 +84,83 @@ def diagnose_together(
     _check(with_frf, of_curves)
     refuse_copies(with_frf)
     ordered = in_order(with_frf)
-    document = _report(ordered, of_curves, table, name, without, progress)
+    document = _document(name, ordered, of_curves, table, without, progress)
     return {**document, "campaign": name, "campaigns": [campaign.name for campaign in (*ordered, *of_curves)]}
 
 
-def _report(
+def _document(
+    name: str,
     with_frf: Sequence[Campaign],
     of_curves: Sequence[Campaign],
     table: SigmaTable,
-    name: str,
     without: Collection[str],
     progress: Callable[[float], None],
 ) -> dict[str, Any]:
     """The report on campaigns with FRFs in their order, with the curves of others; of a single usable one its own."""
-    ordered, results = list[Campaign](), list[DiagnosisResult]()
+    campaigns, results = list[Campaign](), list[DiagnosisResult]()
     for index, campaign in enumerate(with_frf):
         counted = any(result.search is not None for result in results)
-        ordered.append(campaign if counted else with_curves(campaign, of_curves))
-        results.append(diagnose(ordered[-1], table, without=without))
+        campaigns.append(campaign if counted else with_curves(campaign, of_curves))
+        results.append(diagnose(campaigns[-1], table, without=without))
         progress((index + 1) / (len(with_frf) + 1))
-    outliers = [_outlying_sensors(result) for result in results]
-    results = _with_changed_sensors(ordered, results, outliers, table, without)
-    reports = [reported(result) for result in results]
+    suspected = [_outlying_sensors(result) for result in results]
+    # Single sensors that changed since the previous campaign are no physics of the skin
+    alone = [_sensors_alone(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
+    steps = SensorsOverDates(alone, np.arange(len(alone), dtype=float), [0.0] * len(alone), suspected).steps
+    for index, campaign in enumerate(campaigns):
+        as_before = without_steps(campaign, steps, index)
+        if as_before is not campaign:
+            results[index] = diagnose(as_before, table, without=without)
+    reports = {campaign.name: reported(result) for campaign, result in zip(campaigns, results, strict=True)}
     usable = [index for index, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
-        lacking = (report.document for index, report in enumerate(reports) if index not in usable)
-        return next(lacking, reports[0].document)
-    dated = CampaignDates([ordered[index].name for index in usable], [date_of(ordered[index]) for index in usable])
-    return together_report(name, ordered, results, reports, usable, dated, outliers, table)
+        documents = [report.document for report in reports.values()]
+        return next((document for index, document in enumerate(documents) if index not in usable), documents[0])
+    campaigns, results = [campaigns[index] for index in usable], [results[index] for index in usable]
+    skin = _skin_over_dates(campaigns, results, [suspected[index] for index in usable], reports, table)
+    return together_document(name, skin)
 
 
-def _with_changed_sensors(
+def _skin_over_dates(
     campaigns: Sequence[Campaign],
     results: Sequence[DiagnosisResult],
-    outliers: Sequence[frozenset[str]],
+    suspected: Sequence[frozenset[str]],
+    reports: Mapping[str, Reported],
     table: SigmaTable,
-    without: Collection[str],
-) -> list[DiagnosisResult]:
-    """The results, diagnosed again where single sensors changed since the previous campaign, which is no physics of the
-    skin."""
-    sensors = [_sensors(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = d33_changes(sensors, outliers, [0.0] * len(sensors), np.arange(len(sensors), dtype=float))
-    again = []
+) -> SkinOverDates:
+    """Of campaigns with results in their order; `suspected` are the sensors whose level stands apart in each,
+    `reports` those of all campaigns, usable or not."""
+    fits = [CampaignFits.of(result) for result in results]
+    histories = set_histories(fits)
+    leader, acting, dates = histories[0], periods(fits, histories), CampaignDates.of(campaigns)
+    sensors: list[dict[str, Sensor]] = []
     for index, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
-        as_before = corrected(campaign, single, index)
-        again.append(result if as_before is campaign else diagnose(as_before, table, without=without))
-    return again
+        here = [period for period in acting if index in period.campaigns]
+        values = {period.mechanism: parameter_values(period.parameters, period.mean) for period in here}
+        described = fits[index].p_unlisted <= STATED  # else no known mechanism explains its levels
+        sensors.append(sensors_of(campaign, values, table, used_recordings(result)) if described else {})
+    over_dates = SensorsOverDates(sensors, dates.times, d33_uncertainties(fits, leader), suspected)
+
+    def with_causes(change: Change) -> Change:
+        if change.sensor is not None:
+            return change
+        size = float(np.log1p(change.value))
+        return replace(change, causes=causes(fits[change.since], leader.sets[change.since], size, change.uncertainty))
+
+    array = over_dates.array
+    return SkinOverDates(
+        dates=dates,
+        reports=reports,
+        provenance=results[-1].provenance,
+        p_unlisted=[campaign.p_unlisted for campaign in fits],
+        p_described=p_described(fits),
+        histories=histories,
+        periods=acting,
+        sensors=sensors,
+        failures=failures([faults_of(campaign, result) for campaign, result in zip(campaigns, results, strict=True)]),
+        changes=[with_causes(change) for change in over_dates.changes],
+        array=None if array is None else replace(array, change=with_causes(array.change)),
+    )
 
 
 def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:
@@ -126,16 +168,12 @@ def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:
     return frozenset(str(finding.arguments["sensor"]) for finding in result.findings if finding.reason in reasons)
 
 
-def _sensors(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:
+def _sensors_alone(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> dict[str, Sensor]:
     """The sensors of a campaign under its own answer, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
-    strengths: Values = {} if leader is None else {name: _strengths_of(leader, name) for name in leader.names}
-    return sensors_of(campaign, strengths, table, used_recordings(result))
-
-
-def _strengths_of(explanation: Explanation, name: str) -> dict[str, float]:
-    shared = Shared.of(explanation, [name], skin=False)
-    return values(shared.parameters, shared.mean)
+    shared = {} if leader is None else {name: SharedParameters.of(leader, [name]) for name in leader.names}
+    values = {name: parameter_values(of_name.parameters, of_name.mean) for name, of_name in shared.items()}
+    return sensors_of(campaign, values, table, used_recordings(result))
 
 
 def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaign]]:
@@ -158,20 +196,14 @@ def curves_once(campaigns: Sequence[Campaign], seen: set[bytes]) -> list[Campaig
     distinct = []
     for campaign in campaigns:
         curves = {
-            recording.id: _curve(recording)
+            recording.id: recording.displacement_mm.tobytes() + recording.force_n.tobytes()
             for recording in campaign.recordings
             if not isinstance(recording, FrfRecording)
         }
         remaining = tuple(recording for recording in campaign.recordings if curves.get(recording.id) not in seen)
-        distinct.append(
-            replace(campaign, recordings=remaining) if len(remaining) < len(campaign.recordings) else campaign
-        )
+        distinct.append(replace(campaign, recordings=remaining))
         seen |= set(curves.values())
     return distinct
-
-
-def _curve(recording: CurveRecording) -> bytes:
-    return recording.displacement_mm.tobytes() + recording.force_n.tobytes()
 
 
 def refuse_copies(campaigns: Sequence[Campaign]) -> None:

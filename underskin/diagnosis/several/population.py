@@ -13,31 +13,80 @@ thickness are relative to the declared ones, so that skins that are declared to 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 
 import numpy as np
+from scipy.special import expit, logit
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.fit import GAIN
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import curvature_of_prior, parameter_slices
+from underskin.diagnosis.noise import Plateau
 from underskin.diagnosis.reporting.numbers import mixture_quantile
-from underskin.diagnosis.several.course import Bench, Candidate
+from underskin.diagnosis.several.histories import CampaignFits
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.units import Floats, Indices
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
+from underskin.units import Floats
 
 _P_ANY_DEPARTS = 0.5  # prior probability that any skin of a fleet departs
-_NODES, _STRIDES = 12, 2.7  # of the grid of ln τ, and its half-width in standard deviations
 _PRUNE_NATS = 12.0  # nats behind the best set of departing skins beyond which a set is dropped
 _MOST_SETS = 200  # with equally many departing skins
 _NEGLIGIBLE = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals
-_LEVELS = (0.5, 0.025, 0.975)
-
 STATED = 0.5  # least probability of a stated departure, and of a stated error of the values declared for all skins
 REGULAR = ""  # the departure of a skin that does not depart
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The prior of τ of one quantity: ln τ is normal about ln `usual` with standard deviation ln `factor`; τ is known
+    where the factor is 1."""
+
+    usual: float
+    factor: float
+
+    @property
+    def nodes(self) -> list[tuple[float, float]]:
+        """Values of τ with their log weights, to 2.7 standard deviations."""
+        if self.factor == 1:
+            return [(self.usual, 0.0)]
+        deviations = np.linspace(-2.7, 2.7, 12).tolist()
+        return [(self.usual * self.factor**deviation, -0.5 * deviation**2) for deviation in deviations]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that skins of a batch share, and the standard deviations of its logarithm: of the batch's mean about
+    the declared value, of a regular skin in its own fit, of a departing skin, and from skin to skin."""
+
+    departure: str
+    name: str
+    unit: str
+    declared: float
+    about_batch: float
+    far: float
+    spread: Spread
+
+
+def _far(error: str) -> float:
+    return curvature_of_prior(CATALOGUE[error].parameters_stated[0])[0] ** -0.5
+
+
+D33, LOG_D33_PC_PER_N = "d33", float(np.log(15.0))
+# Pieces of one cure and of one poled film differ by some percent; a mould sets the thickness. An amplifier's other
+# range changes d33 by half; E and h depart as the priors of the mechanisms have it.
+QUANTITIES = (
+    Quantity("modulus_error", "youngs_modulus", "MPa", 0.02, 0.1, _far("modulus_error"), Spread(0.03, 2.0)),
+    Quantity("thickness_error", "thickness", "mm", 0.01, 0.01, _far("thickness_error"), Spread(0.01, 1.0)),
+    Quantity(D33, "d33", "pC/N", 1.5, 1.5, 0.4, Spread(0.03, 2.0)),
+)
+DEPARTURES = tuple(quantity.departure for quantity in QUANTITIES)
+ERRORS = DEPARTURES[:2]
+_BEYOND = 2.0  # deviations from the batch beyond which a regular fit is no approximation
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,44 +109,35 @@ class Batch:
     precision: Floats
 
 
-@dataclass(frozen=True)
-class Spread:
-    """The prior of τ of one quantity: ln τ is normal about ln `usual` with standard deviation ln `factor`; τ is known
-    where the factor is 1."""
-
-    usual: float
-    factor: float
-
-    @property
-    def nodes(self) -> list[tuple[float, float]]:
-        """Values of τ with their log weights."""
-        if self.factor == 1:
-            return [(self.usual, 0.0)]
-        deviations = np.linspace(-_STRIDES, _STRIDES, _NODES).tolist()
-        return [(self.usual * self.factor**deviation, -0.5 * deviation**2) for deviation in deviations]
-
-
 @dataclass(frozen=True, eq=False)
 class Populations:
     """`mean` and `spread` τ of the batch (quantities,); `of_skins`: median and ends of the 95 % interval (3, skins,
-    quantities); `departures`: their probabilities by name, for each skin; `batches`: the probability of each prior of
-    μ; `joint`: the probability of the departures of all skins together, by their names."""
+    quantities); `batches`: the probability of each prior of μ; `joint`: the probability of the departures of all skins
+    together, by their names."""
 
     mean: Floats
     spread: Floats
     of_skins: Floats
-    departures: tuple[dict[str, float], ...]
     batches: Floats
     joint: Mapping[tuple[str, ...], float]
 
-    @property
+    @cached_property
+    def departures(self) -> list[dict[str, float]]:
+        """Their probabilities by name, for each skin."""
+        of_skins: list[dict[str, float]] = [{REGULAR: 0.0} for _ in next(iter(self.joint))]
+        for names, share in self.joint.items():
+            for of_skin, name in zip(of_skins, names, strict=True):
+                of_skin[name] = of_skin.get(name, 0.0) + share
+        return of_skins
+
+    @cached_property
     def stated(self) -> tuple[str, ...]:
         """The departure of each skin: the most probable one of skins that more probably depart than not."""
         return tuple(
             REGULAR
-            if probabilities[REGULAR] >= 1 - STATED
-            else max((departure for departure in probabilities if departure != REGULAR), key=probabilities.__getitem__)
-            for probabilities in self.departures
+            if of_skin[REGULAR] >= 1 - STATED
+            else max((departure for departure in of_skin if departure != REGULAR), key=of_skin.__getitem__)
+            for of_skin in self.departures
         )
 
 
@@ -108,60 +148,39 @@ def log_odds_of_departure(skins: int) -> float:
 
 def populations(skins: Sequence[Sequence[State]], batches: Sequence[Batch], spreads: Sequence[Spread]) -> Populations:
     """From the states of each skin, the regular one first, the priors of μ, and those of τ (quantities,)."""
-    assert all(states and states[0].departure == REGULAR for states in skins)
-    return _Fleet(skins, batches, spreads).populations
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """A part of the posterior: the states of all skins, one prior of μ, the relevant spreads (spreads,), and their
-    probabilities.
-    """
-
-    states: tuple[int, ...]
-    batch: Batch
-    spread_indices: Indices
-    weights: Floats
+    return _Fleet(skins, batches, spreads).populations()
 
 
 class _Fleet:
     def __init__(self, skins: Sequence[Sequence[State]], batches: Sequence[Batch], spreads: Sequence[Spread]) -> None:
         self.skins, self.batches = skins, batches
-        nodes = list(product(*(spread.nodes for spread in spreads)))
-        self.spreads = np.array([[value for value, _ in node] for node in nodes])  # (spreads, quantities)
-        shares = np.array([sum(share for _, share in node) for node in nodes])
+        nodes = np.array(list(product(*(spread.nodes for spread in spreads))))
+        self.spreads, shares = nodes[..., 0], nodes[..., 1].sum(axis=1)  # (spreads, quantities), (spreads,)
         self.log_shares = shares - np.logaddexp.reduce(shares)
         # Likelihoods of μ by each skin in each state, (spreads,) each
         self.likelihoods = [
             [state.likelihood.of_mean(self.spreads**2 + state.variance) for state in states] for states in skins
         ]
 
-    def mean_likelihood(self, states: Sequence[int], without: int | None = None) -> Gaussian:
+    def _of_mean(self, states: Sequence[int], without: int | None = None) -> Gaussian:
         """The likelihood of μ by the skins in these states, leaving out one."""
-        likelihoods = [
-            of_skin[state]
-            for number, (of_skin, state) in enumerate(zip(self.likelihoods, states, strict=True))
-            if number != without
-        ]
-        return sum(likelihoods[1:], likelihoods[0])
+        pairs = enumerate(zip(self.likelihoods, states, strict=True))
+        first, *others = (of_skin[state] for number, (of_skin, state) in pairs if number != without)
+        return sum(others, first)
 
-    def log_weights(self, states: Sequence[int]) -> Floats:
+    def _log_weights(self, states: Sequence[int]) -> Floats:
         """Log weights of each prior of μ and each spread (batches, spreads)."""
-        odds = log_odds_of_departure(len(self.skins))
-        prior = sum(
-            odds - np.log(len(skin_states) - 1) for skin_states, state in zip(self.skins, states, strict=True) if state
-        )
-        likelihood = self.mean_likelihood(states)
-        log_integrals = [
-            batch.log_prior + likelihood.log_integral(batch.centre, batch.precision) for batch in self.batches
-        ]
-        return np.asarray(np.array(log_integrals) + self.log_shares + prior)
+        odds, likelihood = log_odds_of_departure(len(self.skins)), self._of_mean(states)
+        departs = zip(self.skins, states, strict=True)
+        prior = sum(odds - np.log(len(skin_states) - 1) for skin_states, state in departs if state)
+        integrals = [batch.log_prior + likelihood.log_integral(batch.centre, batch.precision) for batch in self.batches]
+        return np.array(integrals) + self.log_shares + prior
 
-    @cached_property
-    def log_weights_by_states(self) -> dict[tuple[int, ...], Floats]:
+    def _log_weights_by_states(self) -> dict[tuple[int, ...], Floats]:
         """The relevant states of all skins, with their log weights."""
-        current = {none: self.log_weights(none) for none in [(0,) * len(self.skins)]}
-        all_weights = dict(current)
+        none = (0,) * len(self.skins)
+        current = {none: self._log_weights(none)}
+        all_weights, best = dict(current), -np.inf
         for _ in range((len(self.skins) - 1) // 2):
             longer = {
                 (*states[:number], other, *states[number + 1 :])
@@ -170,92 +189,91 @@ class _Fleet:
                 if not states[number]
                 for other in range(1, len(skin_states))
             }
-            weights = {states: self.log_weights(states) for states in sorted(longer)}
+            weights = {states: self._log_weights(states) for states in sorted(longer)}
             totals = {states: float(np.logaddexp.reduce(values, axis=None)) for states, values in weights.items()}
-            best = max(
-                float(np.logaddexp.reduce(values, axis=None)) for values in (*all_weights.values(), *weights.values())
-            )
+            best = max(best, float(np.logaddexp.reduce(all_weights[none], axis=None)), *totals.values())
             ranked = sorted(totals, key=lambda states: -totals[states])[:_MOST_SETS]
             current = {states: weights[states] for states in ranked if totals[states] > best - _PRUNE_NATS}
             all_weights |= current
         return all_weights
 
-    @cached_property
     def populations(self) -> Populations:
-        log_weights = np.array(list(self.log_weights_by_states.values()))  # (sets, batches, spreads)
-        share = np.exp(log_weights - np.logaddexp.reduce(log_weights, axis=None))
-        of_sets = share.sum(axis=(1, 2))
-        departs = tuple(
-            {
-                state.departure: float(
-                    of_sets[[states[number] == index for states in self.log_weights_by_states]].sum()
-                )
-                for index, state in enumerate(skin_states)
-            }
-            for number, skin_states in enumerate(self.skins)
-        )
-        parts = [
-            _Part(states, batch, spread_indices, of_batch[spread_indices])
-            for states, of_batches in zip(self.log_weights_by_states, share, strict=True)
-            for batch, of_batch in zip(self.batches, of_batches, strict=True)
-            if len(spread_indices := np.flatnonzero(of_batch > _NEGLIGIBLE))
+        """Sums over all relevant states, priors of μ and spreads."""
+        log_weights = self._log_weights_by_states()
+        log_share = np.array(list(log_weights.values()))  # (sets, batches, spreads)
+        share = np.exp(log_share - np.logaddexp.reduce(log_share, axis=None))
+        weights, mean, spread, centres, deviations = [], [], [], [], []
+        for states, of_batches in zip(log_weights, share, strict=True):
+            for batch, of_spreads in zip(self.batches, of_batches, strict=True):
+                nodes = np.flatnonzero(of_spreads > _NEGLIGIBLE)
+                if len(nodes):
+                    weights.append(of_spreads[nodes])
+                    spread.append(self.spreads[nodes])
+                    mean.append(self._of_mean(states).posterior(batch.centre, batch.precision)[0][nodes])
+                    by_skin = [self._of_skin(number, states, batch) for number in range(len(self.skins))]
+                    centres.append(np.array([at[nodes] for at, _ in by_skin]))  # (skins, spreads, quantities)
+                    deviations.append(np.array([sd[nodes] for _, sd in by_skin]))
+        weight = np.concatenate(weights) / sum(part.sum() for part in weights)
+        skins = list(zip(np.concatenate(centres, axis=1), np.concatenate(deviations, axis=1), strict=True))
+        of_skins = [
+            [[mixture_quantile(level, weight, *column) for column in zip(at.T, sd.T, strict=True)] for at, sd in skins]
+            for level in (0.5, 0.025, 0.975)
         ]
-        weights = np.concatenate([part.weights for part in parts])
-        weights /= weights.sum()
-        mean = np.concatenate([self._mean(part) for part in parts])
-        spread = np.concatenate([self.spreads[part.spread_indices] for part in parts])
-        of_skins = np.array([self._of_skin(number, parts, weights) for number in range(len(self.skins))])
+        joint = {
+            tuple(skin_states[state].departure for skin_states, state in zip(self.skins, states, strict=True)): of_set
+            for states, of_set in zip(log_weights, share.sum(axis=(1, 2)).tolist(), strict=True)
+        }
         return Populations(
-            weights @ mean,
-            np.sqrt(weights @ spread**2),
-            of_skins.transpose(1, 0, 2),
-            departs,
+            weight @ np.concatenate(mean),
+            np.sqrt(weight @ np.concatenate(spread) ** 2),
+            np.array(of_skins),
             share.sum(axis=(0, 2)),
-            {
-                tuple(
-                    skin_states[state].departure for skin_states, state in zip(self.skins, states, strict=True)
-                ): float(share_of_set)
-                for states, share_of_set in zip(self.log_weights_by_states, of_sets, strict=True)
-            },
+            joint,
         )
 
-    def _mean(self, part: _Part) -> Floats:
-        return self.mean_likelihood(part.states).posterior(part.batch.centre, part.batch.precision)[0][
-            part.spread_indices
-        ]
-
-    def _of_skin(self, number: int, parts: Sequence[_Part], weights: Floats) -> Floats:
-        """Median and ends of the 95 % interval of its quantities (3, quantities)."""
-        middles, deviations = [], []
-        for part in parts:
-            state = self.skins[number][part.states[number]]
-            other_specimens = self.mean_likelihood(part.states, number)
-            mean, covariance = (
-                moment[part.spread_indices]
-                for moment in other_specimens.posterior(part.batch.centre, part.batch.precision)
-            )
-            variance = self.spreads[part.spread_indices] ** 2 + state.variance
-            before = np.linalg.inv(covariance + variance[:, None] * np.eye(variance.shape[1]))
-            after = np.linalg.inv(before + state.likelihood.precision)
-            towards = state.likelihood.linear + np.einsum("spq,sq->sp", before, mean)
-            middles.append(np.einsum("spq,sq->sp", after, towards))
-            deviations.append(np.sqrt(np.diagonal(after, axis1=1, axis2=2)))
-        middle, deviation = np.concatenate(middles), np.concatenate(deviations)
-        columns = list(zip(middle.T, deviation.T, strict=True))
-        return np.array([[mixture_quantile(level, weights, *column) for column in columns] for level in _LEVELS])
+    def _of_skin(self, number: int, states: Sequence[int], batch: Batch) -> tuple[Floats, Floats]:
+        """Mean and standard deviation of one skin's quantities (spreads, quantities)."""
+        state = self.skins[number][states[number]]
+        of_mean = self._of_mean(states, number) + Gaussian.of(batch.centre, np.diag(batch.precision), 0.0)
+        by_others = of_mean.of_mean(self.spreads**2 + state.variance)
+        flat = np.zeros(self.spreads.shape[1])
+        mean, covariance = (by_others + state.likelihood).posterior(flat, flat)
+        return mean, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
 
 
-MODULUS, THICKNESS, D33 = "modulus_error", "thickness_error", "d33"
-ERRORS = (MODULUS, THICKNESS)
-QUANTITIES = {MODULUS: "youngs_modulus", THICKNESS: "thickness", D33: "d33"}  # by departure
-_ABOUT_BATCH = (0.1, 0.01)  # deviations of ln E and ln h of regular skins about the batch's
-_FAR_IN_D33 = 0.4  # an amplifier's other range
-FAR = (*(curvature_of_prior(CATALOGUE[name].parameters_stated[0])[0] ** -0.5 for name in ERRORS), _FAR_IN_D33)
-# Deviations of ln E, ln h and ln d33 of departing skins, those of E and h from the priors of the mechanisms
-D33_PRIOR = (float(np.log(15.0)), 1.5)
-_BEYOND = 2.0  # deviations from the batch beyond which a regular fit is no approximation
+@dataclass(frozen=True)
+class Bench:
+    """The prior of the gain scatter's logarithm, and the probability of positioning scatter."""
 
-Likelihoods = dict[tuple[frozenset[str], str], Gaussian]  # by set and departure
+    gain: Plateau
+    p_position_scatter: float
+
+
+_FROM_SKIN_TO_SKIN = 0.2  # deviation of the logarithm of the gain scatter on one bench
+_LEAST_PROBABILITY = 0.02  # of positioning scatter, and of none
+
+
+def benches(candidates: Sequence[CampaignFits]) -> list[Bench]:
+    """The scatters of each skin by those of the other skins on the same bench, of which there must be at least one.
+
+    A few recordings do not determine them: with too little gain scatter intervals are too narrow, and with a wrong
+    positioning scatter all d33 are biased.
+    """
+    leaders = [candidate.search.fit_behind(candidate.search.answers[0]) for candidate in candidates]
+    log_gains = np.array([leader.point.covariance[GAIN] for leader in leaders])
+    recordings = np.array([leader.best.hypothesis.lines.recordings for leader in leaders])
+    precision = 1 / (_FROM_SKIN_TO_SKIN**2 + 0.5 / np.maximum(recordings - 1, 1))
+    ends = (_LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
+    usual = logit(1 - NO_POSITION_SCATTER)
+    log_odds = logit(np.clip([leader.p_position_scatter for leader in leaders], *ends)) - usual
+    priors = []
+    for number in range(len(candidates)):
+        others = np.arange(len(candidates)) != number
+        total = precision[others].sum()
+        mean, sd = precision[others] @ log_gains[others] / total, np.hypot(_FROM_SKIN_TO_SKIN, total**-0.5)
+        p_position_scatter = np.clip(expit(usual + log_odds[others].sum()), *ends)
+        priors.append(Bench(Plateau.normal(float(mean), float(sd)), float(p_position_scatter)))
+    return priors
 
 
 class FleetSkin:
@@ -263,31 +281,32 @@ class FleetSkin:
 
     def __init__(
         self,
-        candidate: Candidate,
-        sets: Sequence[frozenset[str]],
+        candidate: CampaignFits,
         bench: Bench,
-        centre: tuple[float, float] = (0.0, 0.0),
+        sets: Sequence[frozenset[str]],
+        centre: tuple[float, float],
     ) -> None:
         """Fit all sets; `bench` has the priors of the scatters, `centre` is ln of the batch's E and thickness over the
         declared ones."""
         self.candidate = candidate
-        self._centre = centre
+        self._centre, self._bench = np.array([*centre, LOG_D33_PC_PER_N]), bench
         skin = candidate.problem.lines.campaign.skin
         assert skin.youngs_modulus_mpa is not None  # FRFs have no model without them
         assert skin.thickness_mm is not None
         self.declared: Floats = np.log([skin.youngs_modulus_mpa, skin.thickness_mm, 1.0])  # (quantities,)
         tried = set(candidate.problem.lines.mechanisms.named) - set(candidate.search.unsupported)
         self.errors = tuple(name for name in ERRORS if name in tried)
-        self.departures = (*self.errors, D33)
-        self._fitted = self._fits(tuple(dict.fromkeys(candidate.supported(names) for names in sets)), bench)
+        self._states = (REGULAR, *self.errors, D33)
+        self._fitted: dict[tuple[frozenset[str], str], Gaussian] = {}  # by set and departure
+        self._fit(list(dict.fromkeys(candidate.supported(names) for names in sets)))
 
     def log_evidence(self, names: frozenset[str], skins: int) -> float:
         """Of a set, over the regular state and all departures, as one of `skins`."""
         supported = self.candidate.supported(names)
-        odds = log_odds_of_departure(skins) - float(np.log(len(self.departures)))
+        odds = log_odds_of_departure(skins) - float(np.log(len(self.errors) + 1))
         weights = [
             self._log_integral(self._fitted[supported, departure], departure) + odds * (departure != REGULAR)
-            for departure in (REGULAR, *self.departures)
+            for departure in self._states
             if (supported, departure) in self._fitted
         ]
         return float(np.logaddexp.reduce(weights)) if weights else -np.inf
@@ -297,89 +316,75 @@ class FleetSkin:
         likelihood = self._fitted.get((frozenset(), error))
         if likelihood is None:
             return None
-        row = ERRORS.index(error)
+        row = DEPARTURES.index(error)
         mean, covariance = likelihood.posterior(*self._prior(error))
         return float(mean[row]), float(covariance[row, row])
 
     def states(self, log_shares: Mapping[frozenset[str], float]) -> list[State]:
         """The states under sets of mechanisms of these prior log probabilities, the regular one first."""
         states = []
-        for departure in (REGULAR, *self.departures):
+        for departure in self._states:
             components = [
                 (share, self._fitted[supported, departure])
                 for names, share in log_shares.items()
                 if np.isfinite(share) and ((supported := self.candidate.supported(names)), departure) in self._fitted
             ]
             if components:
-                states.append(
-                    State(
-                        departure,
-                        Gaussian.mixture(components, *self._prior(departure)),
-                        self._departure_variance(departure),
-                    )
-                )
+                likelihood = Gaussian.mixture(components, *self._prior(departure))
+                states.append(State(departure, likelihood, _departure_variance(departure)))
         return states
-
-    def _departure_variance(self, departure: str) -> Floats:
-        return np.array([far**2 * (departure == name) for name, far in zip(QUANTITIES, FAR, strict=True)])
 
     def _prior(self, departure: str) -> tuple[Floats, Floats]:
         """Prior centre and precision of the quantities."""
-        centre = np.array([*self._centre, D33_PRIOR[0]])
-        return centre, 1 / (np.array([*_ABOUT_BATCH, D33_PRIOR[1]]) ** 2 + self._departure_variance(departure))
+        about_batch = np.array([quantity.about_batch for quantity in QUANTITIES])
+        return self._centre, 1 / (about_batch**2 + _departure_variance(departure))
 
     def _log_integral(self, likelihood: Gaussian, departure: str) -> float:
         return likelihood.log_integral(*self._prior(departure)).item()
 
-    def _fits(self, sets: Sequence[frozenset[str]], bench: Bench) -> Likelihoods:
-        """Likelihoods of the sets and departures that can be fitted."""
-        likelihoods: Likelihoods = {}
-        lines, table = self.candidate.problem.lines, self.candidate.problem.table
+    def _fit(self, sets: Sequence[frozenset[str]]) -> None:
+        """Find the likelihoods of the sets and departures that can be fitted."""
+        alone = self.candidate.problem
         for departure in (REGULAR, *self.errors):
             held = tuple(name for name in self.errors if name != departure)
-
-            def about_batch(model: Model, lines: Lines, held: Sequence[str] = held) -> Gaussian:
-                return self._about_batch(model, lines, held)
-
-            problem = FittingProblem(lines, table, about_batch, bench.gain)
+            problem = FittingProblem(alone.lines, alone.table, partial(self._about_batch, held), self._bench.gain)
             for names, fit in zip(sets, _explained(problem, [{*names, *self.errors} for names in sets]), strict=True):
                 if fit is not None:
                     components = [
-                        (_log_share(fit, evidence, bench), self._likelihood(fit, evidence, held))
+                        (self._log_share(fit, evidence), self._likelihood(fit, evidence, held))
                         for _, evidence in fit.fits
                     ]
-                    likelihoods[names, departure] = Gaussian.mixture(components, *self._prior(departure))
+                    self._fitted[names, departure] = Gaussian.mixture(components, *self._prior(departure))
         for names in sets:
-            self._replace_far_regular(likelihoods, names)
-            if (names, REGULAR) in likelihoods:
-                likelihoods[names, D33] = likelihoods[names, REGULAR]
-        return likelihoods
+            if (names, REGULAR) in self._fitted:
+                self._fitted[names, REGULAR] = self._fitted[names, D33] = self._regular(names)
 
-    def _replace_far_regular(self, likelihoods: Likelihoods, names: frozenset[str]) -> None:
-        """Replace the regular fit, which is held near the batch, by a departing one where the skin is far from the
-        batch.
+    def _regular(self, names: frozenset[str]) -> Gaussian:
+        """The regular fit, which is held near the batch; where the skin is far from the batch, a departing one.
 
-        There its quadratic is no approximation: its likelihood would grow without limit.
+        There the quadratic of the regular fit is no approximation: its likelihood would grow without limit.
         """
-        others = [name for name in self.errors if (names, name) in likelihoods]
-        if (names, REGULAR) not in likelihoods or not others:
-            return
+        regular = self._fitted[names, REGULAR]
+        others = [name for name in self.errors if (names, name) in self._fitted]
         centre, precision = self._prior(REGULAR)
-        mean, _ = likelihoods[names, REGULAR].posterior(centre, precision)
-        if (np.abs(mean - centre) * np.sqrt(precision))[: len(ERRORS)].max() > _BEYOND:
-            nearest = max(others, key=lambda name: self._log_integral(likelihoods[names, name], name))
-            likelihoods[names, REGULAR] = likelihoods[names, nearest]
+        mean, _ = regular.posterior(centre, precision)
+        if not others or (np.abs(mean - centre) * np.sqrt(precision))[: len(ERRORS)].max() <= _BEYOND:
+            return regular
+        return self._fitted[names, max(others, key=lambda name: self._log_integral(self._fitted[names, name], name))]
 
-    def _about_batch(self, model: Model, lines: Lines, held: Sequence[str]) -> Gaussian:
+    def _about_batch(self, held: Sequence[str], model: Model, lines: Lines) -> Gaussian:
         """The likelihood that `held` E and thickness are near the batch's, times that by recordings of other kinds."""
         other_kinds = self.candidate.problem.other_kinds
         slices = parameter_slices(model.names, lines)
-        rows = [ERRORS.index(name) for name in held]
         matrix = np.eye(len(model.parameters))[[slices[name].start for name in held]]
-        centre, precision = np.array(self._centre)[rows], np.diag(np.array(_ABOUT_BATCH)[rows] ** -2.0)
-        about = Gaussian.of(centre, precision, 0.0).over(matrix, np.zeros(len(rows)))
+        about = self._near_batch([DEPARTURES.index(name) for name in held]).over(matrix, np.zeros(len(held)))
         from_others = None if other_kinds is None else other_kinds(model, lines)
         return about if from_others is None else from_others + about
+
+    def _near_batch(self, rows: Sequence[int]) -> Gaussian:
+        """The likelihood that these quantities are near the batch's."""
+        precision = np.diag([QUANTITIES[row].about_batch ** -2.0 for row in rows])
+        return Gaussian.of(self._centre[list(rows)], precision, 0.0)
 
     def _likelihood(self, fit: Explanation, best: Evidence, held: Sequence[str]) -> Gaussian:
         """The likelihood of the quantities by one fit: the posterior divided by the priors, of errors and usual
@@ -388,33 +393,31 @@ class FleetSkin:
         names = [parameter.name for parameter in fit.model.parameters]
         matrix = np.zeros((len(QUANTITIES), len(names)))
         centre, variance, log_evidence = np.zeros(len(QUANTITIES)), np.zeros(len(QUANTITIES)), best.log_evidence
-        for row, (error, quantity) in enumerate(QUANTITIES.items()):
-            of_error = [slices[error].start] if error in self.errors else []
-            for index in (names.index(quantity), *of_error):
+        for row, quantity in enumerate(QUANTITIES):
+            of_error = [slices[quantity.departure].start] if quantity.departure in self.errors else []
+            for index in (names.index(quantity.name), *of_error):
                 matrix[row, index] = 1.0
-                precision, middle = curvature_of_prior(fit.model.parameters[index])
-                if index in of_error and error in held:
-                    about, batch_precision = self._centre[row], _ABOUT_BATCH[row] ** -2
-                    both = 1 / precision + 1 / batch_precision
-                    log_evidence += 0.5 * (np.log(both * batch_precision) + (about - middle) ** 2 / both)
-                    precision, middle = (
-                        precision + batch_precision,
-                        (precision * middle + batch_precision * about) / (precision + batch_precision),
-                    )
-                centre[row] += middle
-                variance[row] += 1 / precision
+                precision, middle = (np.array([part]) for part in curvature_of_prior(fit.model.parameters[index]))
+                prior_variance = 1 / precision
+                if index in of_error and quantity.departure in held:
+                    about = self._near_batch([row])
+                    log_evidence -= about.log_integral(middle, precision).item()
+                    middle, prior_variance = about.posterior(middle, precision)
+                centre[row] += middle.item()
+                variance[row] += prior_variance.item()
         by_fit = matrix[:, best.hypothesis.mean_indices]
         mean = matrix @ best.point.fit
         return Gaussian.from_posterior(log_evidence, mean, by_fit @ best.covariance @ by_fit.T, centre, 1 / variance)
 
+    def _log_share(self, fit: Explanation, evidence: Evidence) -> float:
+        """Log prior of a fit with or without positioning scatter, where there are both."""
+        share = self._bench.p_position_scatter
+        share = share if evidence.hypothesis.has_position_scatter else 1 - share
+        return float(np.log(share)) if len(fit.fits) > 1 else 0.0
 
-def _log_share(fit: Explanation, evidence: Evidence, bench: Bench) -> float:
-    """Log prior of a fit with or without positioning scatter, where there are both."""
-    if len(fit.fits) == 1:
-        return 0.0
-    return float(
-        np.log(bench.p_position_scatter if evidence.hypothesis.has_position_scatter else 1 - bench.p_position_scatter)
-    )
+
+def _departure_variance(departure: str) -> Floats:
+    return np.array([quantity.far**2 * (departure == quantity.departure) for quantity in QUANTITIES])
 
 
 def _explained(problem: FittingProblem, sets: Sequence[set[str]]) -> list[Explanation | None]:

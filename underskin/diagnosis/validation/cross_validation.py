@@ -9,8 +9,9 @@ noise floor is its expectation from noise alone for a new recording: gain, posit
 sensors' gains where the sensor was not in the training data.
 """
 
+import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ _LEAST_SAMPLES = 6  # beyond the highest force, for a hold or an unloading branc
 _LEAST_RECORDINGS = 3  # that must remain
 _MOST_RIVALS = 10  # sets among which the choice is repeated
 _EVIDENCE_MARGIN = 15.0  # of these behind the best one [nats]
+_MOST_EXPLANATIONS = 4  # laws, and sets of mechanisms, among which the choice is repeated
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,9 @@ class PredictionScore:
     noise: float = 0.0  # Σ E|y − m|² from noise alone
     log_score: float = 0.0  # Σ log predictive density of the recordings' levels, relative
     recordings: int = 0
-    pickup: float = 0.0  # the part of `noise` from mains pick-up
 
     def __add__(self, other: "PredictionScore") -> "PredictionScore":
-        return PredictionScore(
-            *(value + increment for value, increment in zip(astuple(self), astuple(other), strict=True))
-        )
+        return PredictionScore(*map(operator.add, astuple(self), astuple(other)))
 
     @property
     def rmse_percent(self) -> float:
@@ -78,15 +77,9 @@ def rows_of_groups(lines: Lines) -> dict[str, Mask]:
     """The rows of each group that can be left out, with enough recordings remaining."""
     if lines.curves:
         return _curve_parts(lines)
-    recordings = frf_of(lines.campaign)
-    columns: dict[str, list[Any]] = {
-        "preload_n": [recording.preload_n for recording in recordings],
-        "indenter_radius_mm": [recording.indenter_radius_mm for recording in recordings],
-        "sensor": [recording.sensor for recording in recordings],
-        "recorded_at": [
-            None if recording.recorded_at is None else str(recording.recorded_at)[:10] for recording in recordings
-        ],
-    }
+    recordings, names = frf_of(lines.campaign), ("preload_n", "indenter_radius_mm", "sensor", "recorded_at")
+    columns: dict[str, list[Any]] = {name: [getattr(recording, name) for recording in recordings] for name in names}
+    columns["recorded_at"] = [None if time is None else str(time)[:10] for time in columns["recorded_at"]]
     rows_by_group = {
         f"{name} {largest}": np.array([value == largest for value in column])[lines.recording]
         for name, column in columns.items()
@@ -132,30 +125,24 @@ def _curve_parts(lines: Lines) -> dict[str, Mask]:
     return {f"force above {100 * _HIGH_FORCE:.0f} % of the highest": force > _HIGH_FORCE * highest}
 
 
-def thirds(lines: Lines, column: Floats) -> dict[str, Mask]:
-    """The rows of every third recording along an axis (recordings,), three times: interpolation.
+def _groups_along_law(problem: FittingProblem, law: Explanation) -> dict[str, Mask]:
+    """The rows of every third recording along the axis of an unlisted law, three times: interpolation.
 
-    Of few recordings every third line.
+    Of curves every third of nine stretches, of few recordings every third line.
     """
-    names = ("from the first", "from the second", "from the third")
-    if lines.recordings < _LEAST_RECORDINGS + len(names):
-        line = np.arange(len(lines.value)) - lines.first[lines.recording]
-        rows_by_name = {f"every third line {name}": line % len(names) == third for third, name in enumerate(names)}
-        return {name: rows for name, rows in rows_by_name.items() if rows.any() and not rows.all()}
-    rank = np.argsort(np.argsort(column, kind="stable"), kind="stable")
-    return {
-        f"every third recording {name}": (rank % len(names) == third)[lines.recording]
-        for third, name in enumerate(names)
-    }
-
-
-def stretches(lines: Lines) -> dict[str, Mask]:
-    """The rows of every third of nine stretches of each curve, three times: interpolation."""
-    counts = np.bincount(lines.recording)
+    lines = problem.lines
     row = np.arange(len(lines.value)) - lines.first[lines.recording]
-    third = (_STRETCHES * row // counts[lines.recording]) % 3
-    names = ("from the first", "from the second", "from the third")
-    return {f"every third stretch {name}": third == index for index, name in enumerate(names)}
+    if lines.curves:
+        what, third = "stretch", _STRETCHES * row // np.bincount(lines.recording)[lines.recording] % 3
+    elif lines.recordings < _LEAST_RECORDINGS + 3:
+        what, third = "line", row % 3
+    else:
+        leading, ids = law_of(problem, law), [recording.id for recording in lines.campaign.recordings]
+        column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids))
+        rank = np.argsort(np.argsort(column, kind="stable"), kind="stable")
+        what, third = "recording", (rank % 3)[lines.recording]
+    groups = {f"every third {what} from the {name}": third == n for n, name in enumerate(("first", "second", "third"))}
+    return {name: rows for name, rows in groups.items() if rows.any() and not rows.all()}
 
 
 def hold_out(
@@ -165,43 +152,25 @@ def hold_out(
     log_prior: Callable[[Explanation], float],
     rows_by_group: Mapping[str, Mask],
 ) -> list[HeldOut]:
-    """Predict each group from the rest; `ranked` are the sets fitted to all rows, the best first."""
-    weights = [explanation.log_evidence + log_prior(explanation) for explanation in ranked]
-    rivals = [
-        explanation
-        for explanation, weight in zip(ranked, weights, strict=True)
-        if weight > weights[0] - _EVIDENCE_MARGIN
-    ][:_MOST_RIVALS]
-    predictions = (
-        _hold_out_group(problem, name, rows, rivals, null, log_prior) for name, rows in rows_by_group.items()
-    )
-    return [prediction for prediction in predictions if prediction is not None]
+    """Predict each group from the rest; `ranked` are the sets fitted to all rows, the best first. Groups without which
+    the null hypothesis is not supported are left out."""
 
+    def weight(explanation: Explanation) -> float:
+        return explanation.log_evidence + log_prior(explanation)
 
-def _hold_out_group(
-    problem: FittingProblem,
-    name: str,
-    rows: Mask,
-    rivals: Sequence[Explanation],
-    null: Explanation,
-    log_prior: Callable[[Explanation], float],
-) -> HeldOut | None:
-    """Predict one group from the rest; None where the rest does not support the null hypothesis."""
-    training = FittingProblem(problem.lines.part(~rows), problem.table, problem.other_kinds)
-    candidates = {explanation.names: explanation for explanation in (null, *rivals)}
-    fits = {
-        explanation.names: explanation
-        for explanation in training.refit(list(candidates.values()))
-        if explanation is not None
-    }
-    if null.names not in fits:
-        return None
-    chosen = max(fits.values(), key=lambda explanation: explanation.log_evidence + log_prior(explanation))
-    held_out_lines = problem.lines.part(rows)
-    before, after = (
-        _predict(training, fits[names], problem, rows, held_out_lines) for names in (null.names, chosen.names)
-    )
-    return HeldOut(name, chosen.names, before, after)
+    least = max(map(weight, ranked[:1]), default=0.0) - _EVIDENCE_MARGIN
+    rivals = [explanation for explanation in ranked if weight(explanation) > least][:_MOST_RIVALS]
+    candidates = list({explanation.names: explanation for explanation in (null, *rivals)}.values())
+    predictions = []
+    for name, rows in rows_by_group.items():
+        training = FittingProblem(problem.lines.part(~rows), problem.table, problem.other_kinds)
+        fits = {fit.names: fit for fit in training.refit(candidates) if fit is not None}
+        if null.names in fits:
+            chosen = max(fits.values(), key=weight)
+            part = problem.lines.part(rows)
+            before, after = (_predict(training, fit, problem, rows, part) for fit in (fits[null.names], chosen))
+            predictions.append(HeldOut(name, chosen.names, before, after))
+    return predictions
 
 
 def _predict(
@@ -226,10 +195,9 @@ def _predict(
     position_variance = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
     noise = noise + position_variance[recording] * np.abs(prediction.value[rows]) ** 2
     noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
-    pickup_noise = 2 * prediction.pickup_variance[rows]
-    noise = noise + pickup_noise
+    noise = noise + 2 * prediction.pickup_variance[rows]
     square = np.abs(held_out_lines.value - value) ** 2
-    return replace(_score(held_out_lines.first, square, noise, np.abs(value) ** 2), pickup=float(pickup_noise.sum()))
+    return _score(held_out_lines.first, square, noise, np.abs(value) ** 2)
 
 
 def _predict_curves(
@@ -258,17 +226,14 @@ def _score(first: Indices, square: Floats, noise: Floats, size: Floats) -> Predi
 
 def total(groups: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
     """Before and after, over all groups."""
-    zero = PredictionScore()
-    return sum((group.before for group in groups), zero), sum((group.after for group in groups), zero)
+    before, after = (group.before for group in groups), (group.after for group in groups)
+    return sum(before, PredictionScore()), sum(after, PredictionScore())
 
 
 def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
     """Of the recordings that the explanation was fitted to."""
     all_rows = np.ones(len(problem.lines.value), dtype=bool)
     return _predict(problem, explanation, problem, all_rows, problem.lines)
-
-
-_MOST_EXPLANATIONS = 4  # laws, and sets of mechanisms, among which the choice is repeated
 
 
 def held_out(
@@ -283,16 +248,6 @@ def held_out(
         [*laws[:_MOST_EXPLANATIONS], *ranked[:_MOST_EXPLANATIONS]], key=result.log_weight, reverse=True
     )
     return hold_out(problem, ranked_together, null, result.log_prior, _groups_along_law(problem, law))
-
-
-def _groups_along_law(problem: FittingProblem, law: Explanation) -> dict[str, Mask]:
-    """The rows of thirds along the axis of an unlisted law; of curves stretches."""
-    if problem.lines.curves:
-        return stretches(problem.lines)
-    leading = law_of(problem, law)
-    ids = [recording.id for recording in problem.lines.campaign.recordings]
-    column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)
-    return thirds(problem.lines, column)
 
 
 def nearest_law_findings(problem: FittingProblem, result: Search, null: Explanation) -> list[Finding]:

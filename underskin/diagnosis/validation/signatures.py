@@ -36,10 +36,11 @@ from underskin.diagnosis.selection.priors import SHOWS, least_evidence, log_prio
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind, Stage, Unsupported
+from underskin.mechanisms.laws.contact_creep import ContactCreep
+from underskin.mechanisms.laws.strain_stiffening import StrainStiffening
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording, samples_of
 from underskin.recordings.usual_scatter import USUAL_GAIN
 from underskin.surrogate.sigma_table import SigmaTable
@@ -66,9 +67,8 @@ class Signatures:
         self.mechanisms: list[str] = []
         self.percent: list[float] = []
         self._values: list[tuple[Array, Lines]] = []  # of curves, whose smooth error depends on the explanation
-        self._products_by_smooth: dict[float, tuple[Floats, Floats]] = {}
-        rows = None if problem.lines.curves else _Rows(problem, self._base.value, 0.0)
-        parts = [] if rows is None else self._split_nuisances(rows)
+        rows = _Rows(problem, self._base.value, 0.0)
+        parts = [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
         for name, mechanism in problem.lines.mechanisms.named.items():
             if problem.kind not in mechanism.kinds:
                 continue
@@ -84,60 +84,42 @@ class Signatures:
             for value in model.values(shapes) if isinstance(model, FrfModel) else model.forces(shapes):
                 self.mechanisms.append(name)
                 self.percent.append(self._size(value, hypothesis.lines))
-                if rows is None:
+                if problem.lines.curves:
                     self._values.append((value, hypothesis.lines))
                 else:
                     parts.append(rows.split_change(value, hypothesis.lines))
-        if rows is not None:
-            self._products_by_smooth[0.0] = rows.products(parts)
+        self._products_by_smooth: dict[float, tuple[Floats, Floats]] = (
+            {} if problem.lines.curves else {0.0: rows.products(parts)}
+        )
 
     def _size(self, value: Array, lines: Lines) -> float:
         """The relative change on the rows of these lines: 100 · √(Σ|change|² / Σ|base|²)."""
         base = self._base.value if len(value) == len(self._base.value) else self._base.value[lines.recording]
         return 100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum()))
 
-    def _split_nuisances(self, rows: "_Rows") -> list[Split]:
-        return [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
-
-    @property
-    def nuisances(self) -> list[str]:
-        """The parameters of the base model, by name."""
-        return [parameter.name for parameter in self._fitter.hypotheses[0].model.parameters]
-
     @property
     def typical(self) -> dict[str, int]:
         """Index of each mechanism's typical signature: its first."""
         return {name: self.mechanisms.index(name) for name in self.mechanisms}
 
-    def projected_information(self, levels: NoiseLevels) -> tuple[Floats, Floats]:
-        """The information on the signatures (signatures, signatures) under this noise, the nuisances projected out.
-
-        And the same without projection.
-        """
-        information, shared, nuisance_information = self._information_blocks(levels)
-        return information - shared @ np.linalg.solve(nuisance_information, shared.T), information
-
-    def project_out_parameters(self, levels: NoiseLevels) -> Floats:
-        """The change of the nuisances that absorbs each signature, in fit coordinates (nuisances, signatures)."""
-        _, shared, nuisance_information = self._information_blocks(levels)
-        return np.asarray(np.linalg.solve(nuisance_information, shared.T))
-
-    def _information_blocks(self, levels: NoiseLevels) -> tuple[Floats, Floats, Floats]:
-        """The information on the signatures, on signatures and nuisances, and on the nuisances with their priors."""
+    def projection(self, levels: NoiseLevels) -> "Projection":
+        """The information on the signatures under this noise, and what the nuisances d33, E and h absorb of them."""
         nuisances = self._fitter.hypotheses[0].model.parameters
-        information = self._information(levels)
-        count = len(nuisances)
-        prior = np.diag(
-            [parameter.prior.sd**-2 if isinstance(parameter.prior, Normal) else 0.0 for parameter in nuisances]
-        )
-        return information[count:, count:], information[count:, :count], information[:count, :count] + prior
+        full, count = self._information(levels), len(nuisances)
+        precision = [parameter.prior.sd**-2 if isinstance(parameter.prior, Normal) else 0.0 for parameter in nuisances]
+        shared = full[count:, :count]
+        absorbed = np.linalg.solve(full[:count, :count] + np.diag(precision), shared.T)
+        d33 = [index for index, parameter in enumerate(nuisances) if parameter.name == "d33"]
+        information = full[count:, count:]
+        return Projection(information, information - shared @ absorbed, np.asarray(absorbed[d33], dtype=float))
 
     def _products(self, smooth: float) -> tuple[Floats, Floats]:
         """Re u*J and Re JᵀJ of the nuisances and the signatures; of curves with a smooth error of that share."""
         if smooth not in self._products_by_smooth:
             rows = _Rows(self._problem, self._base.value, smooth)
-            parts = self._split_nuisances(rows) + [rows.split_change(*signature) for signature in self._values]
-            self._products_by_smooth[smooth] = rows.products(parts)
+            slopes = [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
+            changes = [rows.split_change(*signature) for signature in self._values]
+            self._products_by_smooth[smooth] = rows.products([*slopes, *changes])
         return self._products_by_smooth[smooth]
 
     def _information(self, levels: NoiseLevels) -> Floats:
@@ -155,6 +137,21 @@ class Signatures:
         )
         along, square = self._products(levels.smooth if fitter.lines.curves else 0.0)
         return likelihood.information(along / levels.level**2, square / levels.level**2)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """The `information` (signatures, signatures) on signatures, the same with the nuisances `projected` out, and the
+    error of ln d33 by each (1, signatures); without d33, as of curves, (0, signatures)."""
+
+    information: Floats
+    projected: Floats
+    d33_shifts: Floats
+
+    @property
+    def chi2(self) -> Floats:
+        """χ² by which each signature would show (signatures,)."""
+        return np.diag(self.projected)
 
 
 class _Rows:
@@ -235,29 +232,18 @@ class Power:
 
 
 def power(signatures: Signatures, explanation: Explanation, supported: int) -> list[Power]:
-    """Detection limits of the mechanisms that can show in these recordings, the lowest first.
-
-    Parameters
-    ----------
-    signatures
-        Of the recordings' design.
-    explanation
-        The answer's, whose noise levels are used.
-    supported
-        Number of mechanisms that the campaign supports, among which the prior is shared.
-    """
+    """Detection limits of the mechanisms that can show in these recordings, the lowest first, at the noise levels of
+    the answer's `explanation`; `supported` is the number of mechanisms among which the prior is shared."""
     if not signatures.mechanisms:
         return []
-    chi2 = np.diag(signatures.projected_information(explanation.best.levels)[0])
+    chi2 = signatures.projection(explanation.best.levels).chi2
     least = least_chi2(supported, least_evidence(explanation))
-    visible = []
-    for name in dict.fromkeys(signatures.mechanisms):
-        typical = signatures.mechanisms.index(name)
-        if chi2[typical] <= 0:
-            continue
-        percent = signatures.percent[typical] * float(np.sqrt(least / chi2[typical]))
-        if percent < _LARGEST:
-            visible.append(Power(name, percent))
+    limits = [
+        Power(name, signatures.percent[index] * float(np.sqrt(least / chi2[index])))
+        for name, index in signatures.typical.items()
+        if chi2[index] > 0
+    ]
+    visible = (limit for limit in limits if limit.smallest_visible_percent < _LARGEST)
     return sorted(visible, key=lambda limit: limit.smallest_visible_percent)
 
 
@@ -301,22 +287,16 @@ def hidden_shifts(
     """
     if problem.lines.curves or not signatures.mechanisms:
         return []
-    levels = explanation.best.levels
-    chi2 = np.diag(signatures.projected_information(levels)[0])
-    shifts = _d33_shifts(signatures, levels)
+    projection = signatures.projection(explanation.best.levels)
     least = least_chi2(supported, least_evidence(explanation))
+    mechanisms = problem.lines.mechanisms
     return [
-        HiddenShift(name, float(shifts[index]), problem.lines.mechanisms[name].stage is Stage.DECLARED)
+        HiddenShift(name, float(projection.d33_shifts[0, index]), mechanisms[name].stage is Stage.DECLARED)
         for name, index in signatures.typical.items()
         if name not in explanation.names
-        and chi2[index] < least
-        and not other_kinds & {*problem.lines.mechanisms[name].kinds}
+        and projection.chi2[index] < least
+        and not other_kinds & {*mechanisms[name].kinds}
     ]
-
-
-def _d33_shifts(signatures: Signatures, levels: NoiseLevels) -> Floats:
-    """The error of ln d33 by each signature (signatures,)."""
-    return signatures.project_out_parameters(levels)[signatures.nuisances.index("d33")]
 
 
 _LEAST_CHI2 = 9.0
@@ -345,17 +325,14 @@ class Confounding:
 
 def confounding(signatures: Signatures) -> list[Confounding]:
     """Mechanisms that the design cannot tell apart; those that the campaign does not support are not listed."""
-    mechanisms = signatures.mechanisms
+    mechanisms, first = signatures.mechanisms, signatures.typical
     if not mechanisms:
         return []
-    projected, unprojected = signatures.projected_information(
-        NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, smooth=TYPICAL)
-    )
-    chi2 = np.maximum(np.diag(projected), 0.0)
-    first = {name: mechanisms.index(name) for name in mechanisms}  # a mechanism's first signature is the typical one
+    projection = signatures.projection(NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, smooth=TYPICAL))
+    chi2 = np.maximum(projection.chi2, 0.0)
     confounded = []
     for name, index in first.items():
-        if unprojected[index, index] < _LEAST_CHI2:
+        if projection.information[index, index] < _LEAST_CHI2:
             confounded.append(Confounding(name, "noise", Likeness.NOISE))
         elif chi2[index] < _LEAST_CHI2:
             confounded.append(Confounding(name, "d33", Likeness.TAKEN_UP))
@@ -367,7 +344,7 @@ def confounding(signatures: Signatures) -> list[Confounding]:
         ):
             typical_index = first[typical]
             rivals = [index for index, name in enumerate(mechanisms) if name == imitator and chi2[index] >= _LEAST_CHI2]
-            cosine = projected[typical_index, rivals] / np.sqrt(chi2[typical_index] * chi2[rivals])
+            cosine = projection.projected[typical_index, rivals] / np.sqrt(chi2[typical_index] * chi2[rivals])
             distance = (1 - cosine**2) * np.minimum(chi2[typical_index], chi2[rivals])
             if (np.abs(cosine) > _CONFOUNDED_COSINE).any() or (distance < _LEAST_CHI2).any():
                 confounded.append(Confounding(first_name, second_name, why))
@@ -415,8 +392,7 @@ def without_seating(
     None where they do, and where `names` has no stiffening, or a law that needs a curve's whole history, such as
     relaxation, which cannot be fitted to the shortened curves.
     """
-    imitated = [name for name in names if name in CATALOGUE and CATALOGUE[name].imitated_by_seating]
-    if not imitated or any(CATALOGUE[name].needs_history for name in names):
+    if StrainStiffening.name not in names or ContactCreep.name in names:
         return None
     if not all(_is_pressed(recording) for recording in campaign.recordings):
         return None
@@ -425,12 +401,12 @@ def without_seating(
         return None
     problem = FittingProblem(rows, table)
     (stiffening_fit,) = problem.explain([Request(tuple(names))])
-    (plain_fit,) = problem.explain([Request(tuple(name for name in names if name not in imitated))])
+    (plain_fit,) = problem.explain([Request(tuple(name for name in names if name != StrainStiffening.name))])
     assert stiffening_fit is not None
     assert plain_fit is not None
     if stiffening_fit.log_evidence - plain_fit.log_evidence > SHOWS:
         return None
-    arguments = {"percent": 100 * _SEATING_SHARE, "mechanisms": " and ".join(imitated)}
+    arguments = {"percent": 100 * _SEATING_SHARE, "mechanisms": StrainStiffening.name}
     return problem, Finding(Reason.SEATING, "", "displacement_mm", arguments)
 
 

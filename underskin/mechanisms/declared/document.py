@@ -27,19 +27,20 @@ import numpy as np
 
 from underskin.errors import FileError, InvalidInput, out_of_range
 from underskin.mechanisms.declared.mechanism import (
+    CONSTANTS,
     FREQUENCY,
     DeclaredMechanism,
     DeclaredOfCurves,
     DeclaredOfLines,
     DeclaredOfRecordings,
-    Expression,
     read,
-    together,
+    value_of,
 )
 from underskin.mechanisms.parameter import Normal, Parameter, Prior, Uniform
 from underskin.mechanisms.unlisted.vocabulary import OF_CURVES, OF_SAMPLES, ActsOn
 from underskin.recordings import validation
 from underskin.recordings.readers import json_file, plain_yaml
+from underskin.recordings.readers.expressions import Expression
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.validation import named, shown
 from underskin.units import Array, Floats
@@ -195,7 +196,7 @@ def _line(lines: Mapping[str, int], field: str) -> int | None:
     """The line of a field in the document, or of the nearest field above it."""
     if not lines:
         return None
-    field_path = re.split(r"[,\s]", field)[0]
+    field_path = field.split()[0]
     while field_path and field_path not in lines:
         field_path = field_path.rpartition(".")[0]
     return lines.get(field_path, 1)
@@ -335,12 +336,12 @@ def _evaluated(
     numbers = {name: np.float64(value) for name, value in values.items()}  # which may be divided by 0
     columns = np.broadcast_to(positions, (len(axes), np.shape(positions)[-1]))
     with np.errstate(all="ignore"):
-        result = np.asarray(law({**numbers, **dict(zip(axes, columns, strict=True))}))
+        result = np.asarray(value_of(law, {**numbers, **dict(zip(axes, columns, strict=True))}))
     return np.asarray(result + np.zeros(columns.shape[1]))
 
 
 def _used(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
-    names = together(laws)
+    names = {name for law in laws for name in law.names} - set(CONSTANTS)
     for name in (*axes, *parameters):
         if name not in names:
             field = "axes" if name in axes else f"parameters.{name}"

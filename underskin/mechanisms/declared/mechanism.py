@@ -1,97 +1,55 @@
 """Mechanisms that a file declares.
 
-Expressions are read by a whitelist over the syntax tree and evaluated with derivatives. Allowed are numbers, names, + −
-* / **, `pi`, `i` (√−1), and the functions of FUNCTIONS with one or two arguments. No attribute, index, comparison,
-string, keyword or other call is accepted, and no code is compiled or executed.
+Laws are expressions of numbers, names, + − * / **, `pi`, `i` (√−1), and the functions of FUNCTIONS, evaluated with
+derivatives.
 
 A declared mechanism acts on FRFs by expressions over its axes, or on indentation curves by an expression over depth,
 force or time of each sample.
 """
 
 import ast
+from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import partial
+from operator import add, mul, sub, truediv
+from typing import Any, ClassVar
 
 import numpy as np
 
 from underskin.autodiff import Differentiated, chain, constant, exp, log, where
-from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
+from underskin.mechanisms.models.contact_state import FrfState
+from underskin.mechanisms.models.curve_state import Curve, SampleLaw, Samples, numbers
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unlisted.axes import every_axis
 from underskin.mechanisms.unlisted.laws import LevelTables, log_of, log_positive
 from underskin.mechanisms.unlisted.vocabulary import ActsOn
 from underskin.recordings.campaign import Conditions, IndentationConditions, curves_of
+from underskin.recordings.readers import expressions
+from underskin.recordings.readers.expressions import Expression, Grammar
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Array, Floats
 from underskin.weak_cache import cached_while_alive
 
-LONGEST, _MOST_NODES, _LARGEST = 500, 200, 1e12
 Value = Differentiated | Array | complex
+_LONGEST = 500  # characters
 CONSTANTS: Mapping[str, np.float64 | np.complex128] = {"pi": np.float64(np.pi), "i": np.complex128(1j)}
 
 
-@dataclass(frozen=True)
-class Expression:
-    """A parsed expression. Attributes: `text`; `names` of parameters and axes in it."""
-
-    text: str
-    names: frozenset[str]
-    _tree: ast.expr
-
-    def __call__(self, values: Mapping[str, Value]) -> Value:
-        """The value for these values of the names."""
-        return _value(self._tree, values)
+def read(text: object, field: str, names: Collection[str]) -> Expression:
+    """Parse a law in these names; raises InvalidInput that names the field, the term and what is allowed."""
+    functions = {name: count for name, (count, _) in FUNCTIONS.items()}
+    allowed = {*names, *CONSTANTS}
+    form = "must be a law of numbers, names, + − * / ** and functions"
+    return expressions.read(text, field, Grammar(form, _LONGEST, allowed, functions, (ast.Pow, ast.UAdd)))
 
 
-def read(text: str, field: str, allowed: Collection[str]) -> Expression:
-    """Parse an expression in the allowed names; raises InvalidInput that names field, position and what is allowed."""
-    if not isinstance(text, str) or not text.strip() or len(text) > LONGEST:
-        raise InvalidInput(field, text, f"must be an expression of 1 to {LONGEST} characters")
-    try:
-        tree = ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        location = f" at column {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
-        raise InvalidInput(field, text, f"cannot be read as an expression{location}") from None
-    nodes = list(ast.walk(tree.body))
-    if len(nodes) > _MOST_NODES:
-        raise InvalidInput(field, text, "is too long to be a law: take several")
-    called_functions = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
-    for node in nodes:
-        _check(node, field, allowed, called_functions)
-    names = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called_functions}
-    return Expression(text.strip(), frozenset(names - set(CONSTANTS)), tree.body)
-
-
-def _check(node: ast.AST, field: str, allowed_names: Collection[str], called_functions: Collection[int]) -> None:
-    """Raise InvalidInput for every node that is not on the whitelist."""
-    if isinstance(node, ast.expr_context | ast.operator | ast.unaryop):
-        allowed = isinstance(node, ast.Load | ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow | ast.USub | ast.UAdd)
-        if not allowed:
-            raise InvalidInput(field, type(node).__name__, "may use + − * / ** only")
-        return
-    location = f"{field}, column {getattr(node, 'col_offset', 0) + 1}"
-    if isinstance(node, ast.Constant):
-        number = type(node.value) in (int, float) and abs(node.value) <= _LARGEST  # type: ignore[arg-type]
-        if not number:
-            raise InvalidInput(location, repr(node.value)[:40], "must be a number of usual size")
-    elif isinstance(node, ast.Name):
-        if id(node) not in called_functions and node.id not in CONSTANTS and node.id not in allowed_names:
-            raise InvalidInput(location, node.id, f"must be one of {', '.join([*sorted(allowed_names), *CONSTANTS])}")
-    elif isinstance(node, ast.Call):
-        name = node.func.id if isinstance(node.func, ast.Name) else ""
-        if name not in FUNCTIONS or node.keywords or len(node.args) != FUNCTIONS[name][0]:
-            arguments = ", ".join(f"{key} of {count}" for key, (count, _) in FUNCTIONS.items())
-            raise InvalidInput(location, ast.unparse(node)[:40], f"must be a function with its arguments: {arguments}")
-    elif not isinstance(node, ast.BinOp | ast.UnaryOp):
-        raise InvalidInput(
-            location, type(node).__name__, "is not allowed: numbers, names, + − * / ** and functions are"
-        )
+def value_of(law: Expression, values: Mapping[str, Value]) -> Value:
+    """The value of a law for these values of the names in it."""
+    return _value(law.tree, values)
 
 
 def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
@@ -104,27 +62,27 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
             inner = _value(operand, values)
             return -inner if isinstance(op, ast.USub) else inner
         case ast.BinOp(left=left, op=op, right=right):
-            return _combined(op, _value(left, values), _value(right, values))
+            return _OPERATORS[type(op)](_value(left, values), _value(right, values))
         case ast.Call(func=ast.Name(id=name), args=args):
             return FUNCTIONS[name][1](*(_value(argument, values) for argument in args))
-    raise AssertionError(node)  # `read` accepts no other node
+    raise AssertionError(node)  # the grammar has no other node
 
 
-def _combined(op: ast.operator, a: Value, b: Value) -> Value:
-    match op:
-        case ast.Add():
-            return a + b
-        case ast.Sub():
-            return a - b
-        case ast.Mult():
-            return a * b
-        case ast.Div():
-            return a / b
+def _power(a: Value, b: Value) -> Value:
     if isinstance(b, Differentiated):
         return _exp(b * _log(a))
     if isinstance(a, Differentiated):
         return a ** float(np.asarray(b).real) if np.ndim(b) == 0 else _exp(_log(a) * b)
     return np.asarray(a, dtype=complex if np.iscomplexobj(a) else float) ** b
+
+
+_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Value]] = {
+    ast.Add: add,
+    ast.Sub: sub,
+    ast.Mult: mul,
+    ast.Div: truediv,
+    ast.Pow: _power,
+}
 
 
 def _log(x: Value) -> Value:
@@ -155,7 +113,7 @@ def _larger(a: Value, b: Value) -> Value:
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # number of arguments, function
     "exp": (1, _exp),
     "log": (1, _log),
-    "sqrt": (1, lambda x: _combined(ast.Pow(), x, 0.5)),
+    "sqrt": (1, lambda x: _power(x, 0.5)),
     "sin": (1, _by(np.sin, np.cos)),
     "cos": (1, _by(np.cos, lambda x: -np.sin(x))),
     "tanh": (1, _by(np.tanh, lambda x: 1 - np.tanh(x) ** 2)),
@@ -163,11 +121,6 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., Value]]] = {  # number of argum
     "max": (2, _larger),
     "min": (2, lambda a, b: -_larger(-a, -b)),
 }
-
-
-def together(expressions: Sequence[Expression]) -> frozenset[str]:
-    """The names in all expressions."""
-    return frozenset().union(*(expression.names for expression in expressions))
 
 
 FREQUENCY = "frequency_hz"
@@ -184,7 +137,7 @@ class Bound:
     def to(cls, conditions: Conditions, table: SigmaTable) -> "Bound":
         """Bound to the recordings of a campaign."""
         axes = {axis.name: dict(axis.values) for axis in every_axis(conditions) if not (axis.relative or axis.words)}
-        return cls(axes, LevelTables(conditions, table, ()))
+        return cls(axes, LevelTables(conditions, table))
 
 
 @cached_while_alive
@@ -217,6 +170,10 @@ class DeclaredMechanism(Mechanism):
         self.needs = f"{' and '.join(axes)} {self.needs_axes}"
         self.acts_on, self.laws, self.axes_read = acts_on, laws, axes
         self.parameters_stated = parameters
+
+    @abstractmethod
+    def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredMechanism":
+        """A copy bound to the recordings of a campaign."""
 
     @property
     def axes(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -261,7 +218,7 @@ class DeclaredOfFrf(DeclaredMechanism):
         names: dict[str, Value] = {**values, **axes}
         answers = []
         for law in self.laws:
-            value = law(names)
+            value = value_of(law, names)
             if not isinstance(value, Differentiated):
                 value = constant(np.asarray(value), len(first.slopes), first.value.shape[:-1])
             answers.append(value.spread(rows))
@@ -277,8 +234,11 @@ class DeclaredOfRecordings(DeclaredOfFrf):
 
     stage = Stage.RECORDING
 
-    def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
-        """The factor on each recording."""
+    def act(self, state: FrfState, values: Values) -> None:
+        """Set the factor on each recording."""
+        state.factor = self._factor(state.design, values)
+
+    def _factor(self, design: FrfDesign, values: Values) -> Differentiated:
         tables = (self.bound or _bound(design.conditions)).tables
         rows = tables.rows(design.ids)
         first, *second = self._evaluated(values, self._axes(design, design.ids), len(design.ids))
@@ -298,16 +258,17 @@ class DeclaredOfLines(DeclaredOfFrf):
     stage = Stage.LINES
 
     @property
-    def tells_recordings_apart(self) -> bool:  # type: ignore[override]
-        """Whether the law reads an axis of the recordings."""
-        return any(name != FREQUENCY for name in self.axes_read)
+    def reads(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The recordings, where the law reads an axis of theirs."""
+        return ("id",) if any(name != FREQUENCY for name in self.axes_read) else ()
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-        """The complex factor on each distinct line."""
+    def act(self, state: FrfState, values: Values) -> None:
+        """Set the complex factor on each distinct line."""
+        design = state.design
         ids = [design.ids[number] for number in design.contact_recording]
         axes = {name: column[design.line_contact] for name, column in self._axes(design, ids).items()}
         (factor,) = self._evaluated(values, {**axes, FREQUENCY: design.line_frequency}, len(design.line_frequency))
-        return Differentiated(factor.value.astype(complex), factor.slopes.astype(complex))
+        state.factor = Differentiated(factor.value.astype(complex), factor.slopes.astype(complex))
 
 
 _LARGEST_FACTOR = (
@@ -343,47 +304,20 @@ class DeclaredOfCurves(DeclaredMechanism):
         untimed = "time_s" in self.axes_read and any(recording.time_s is None for recording in curves)
         return "not every recording has time_s" if untimed else None
 
-    def on_curve(self, curve: Curve, values: Values) -> None:
+    def act(self, state: Curve, values: Values) -> None:
         """Add the law at these parameter values to the curve's laws."""
-        curve.laws.append(_Bound(self, {name: numbers(value) for name, value in values.items()}))
+        change = partial(self._change, {name: numbers(value) for name, value in values.items()})
+        state.laws.append(SampleLaw(self.acts_on, change))
 
-    def change(self, samples: Samples, force: Floats, values: Mapping[str, Floats]) -> Floats:
+    def _change(self, values: Mapping[str, Floats], samples: Samples, force: Floats) -> Floats:
         """The expression at samples (points, curves, samples) where the contact force is `force` [N]."""
-        axes: dict[str, Value] = {
-            "displacement_mm": 1e3 * np.maximum(samples.travel, 0.0),
-            "force_n": np.maximum(force, 0.0),
-            "time_s": self._since_the_beginning(samples),
-        }
+        axes = {name: samples.along(name, force, self.start_times or {}) for name in self.axes_read}
         with np.errstate(all="ignore"):
-            result = np.asarray(self.laws[0]({**values, **axes})) + np.zeros(np.broadcast(samples.travel, force).shape)
+            result = np.asarray(value_of(self.laws[0], {**values, **axes})) + np.zeros(
+                np.broadcast(samples.travel, force).shape
+            )
         return np.clip(
             np.nan_to_num(result, nan=_LARGEST_FACTOR, posinf=_LARGEST_FACTOR, neginf=-_LARGEST_FACTOR),
             -_LARGEST_FACTOR,
             _LARGEST_FACTOR,
         )
-
-    def _since_the_beginning(self, samples: Samples) -> Floats:
-        start_times = self.start_times or {}
-        first = [start_times.get(name, float(times[0])) for name, times in zip(samples.ids, samples.time, strict=True)]
-        return np.asarray(samples.time - np.array(first)[:, None])
-
-
-@dataclass(frozen=True)
-class _Bound:
-    """A law at values of its parameters (points, 1, 1)."""
-
-    law: DeclaredOfCurves
-    values: Mapping[str, Floats]
-
-    def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
-        """The travel [m] at which a sphere presses."""
-        if self.law.acts_on != "position":
-            return travel
-        return travel + 1e-3 * self.law.change(samples, np.zeros_like(travel), self.values)
-
-    def measured_force(self, samples: Samples, force: Floats) -> Floats:
-        """The measured force [N] where the contact force is `force`."""
-        if self.law.acts_on == "position":
-            return force
-        change = self.law.change(samples, force, self.values)
-        return force + change if self.law.acts_on == "force" else force * change

@@ -1,6 +1,6 @@
 """A law that a diagnosis found, written as the document of a declared mechanism."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -105,7 +105,7 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
         return [growing if law["acts_on"] in _ADDS else f"1 + {growing}"], {*logarithmic, "exponent"}
     if law["axis"] in OF_SAMPLES and form == "step":
         raise InvalidInput("report", form, "a step where the sphere turns back is no expression: it cannot be kept")
-    shape = _SHAPES[form](x, low, high, variant)
+    shape = _features(form, variant, x, low, high)
     if form == "power" and law["acts_on"] != "position":
         middle = float(np.sqrt(low * high))
         return [f"({x}/{middle:.6g}) ** {amplitudes[0]}"], logarithmic
@@ -117,46 +117,33 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
     return [change if law["acts_on"] in _ADDS else f"1 + {change}" for change in changes], logarithmic
 
 
-def _linear(x: str, low: float, high: float, variant: str) -> list[str]:
+_TURN = "2 * pi * ({x} - {low:.6g}) / period"
+_SHAPES: Mapping[str, tuple[str, ...]] = {  # features of a form, and of its variants
+    "linear": ("({x} - {low:.6g}) / {span:.6g}",),
+    "linear middle": ("({x} - {middle:.6g}) / {span:.6g}",),
+    "power": ("log({x} / {mean:.6g})",),
+    "exponential": ("(exp(({x} - {low:.6g}) / growth_length) - 1) / (exp({span:.6g} / growth_length) - 1)",),
+    "saturating": ("(1 - exp(-({x} - {low:.6g}) / approach)) / (1 - exp(-{span:.6g} / approach))",),
+    "threshold lost": ("(0 - {x} / {x})",),  # a constant, of a law that must hold its axis
+    "threshold above": ("max(0, {x} - onset) / ({high:.6g} - onset)",),
+    "threshold": ("max(0, onset - {x}) / (onset - {low:.6g})",),
+    "step": ("step({x} - {edge:.6g})",),
+    "periodic": (f"sin({_TURN})", f"cos({_TURN})"),
+    "peak": ("1 / (1 + (({x} - centre) / width) ** 2)",),
+}
+
+
+def _features(form: str, variant: str, x: str, low: float, high: float) -> list[str]:
+    """The features of a form over an axis, each times an amplitude."""
     if variant == EVERYWHERE:
         raise InvalidInput(
             "report", "linear", "what is the same in all recordings is a mechanism of the catalogue already"
         )
-    zero = (low + high) / 2 if variant == "middle" else low
-    return [f"({x} - {zero:.6g}) / {high - low:.6g}"]
-
-
-def _threshold(x: str, low: float, high: float, variant: str) -> list[str]:
-    if variant == "lost":
-        return [f"(0 - {x} / {x})"]  # a constant, of a law that must hold its axis
-    if variant == "above":
-        return [f"max(0, {x} - onset) / ({high:.6g} - onset)"]
-    return [f"max(0, onset - {x}) / (onset - {low:.6g})"]
-
-
-def _exponential(x: str, low: float, high: float, _: str) -> list[str]:
-    return [f"(exp(({x} - {low:.6g}) / growth_length) - 1) / (exp({high - low:.6g} / growth_length) - 1)"]
-
-
-def _saturating(x: str, low: float, high: float, _: str) -> list[str]:
-    return [f"(1 - exp(-({x} - {low:.6g}) / approach)) / (1 - exp(-{high - low:.6g} / approach))"]
-
-
-def _periodic(x: str, low: float, _: float, __: str) -> list[str]:
-    angle = f"2 * pi * ({x} - {low:.6g}) / period"
-    return [f"sin({angle})", f"cos({angle})"]
-
-
-_SHAPES: Mapping[str, Callable[[str, float, float, str], list[str]]] = {
-    "linear": _linear,
-    "power": lambda x, low, high, _: [f"log({x} / {float(np.sqrt(low * high)):.6g})"],
-    "exponential": _exponential,
-    "saturating": _saturating,
-    "threshold": _threshold,
-    "step": lambda x, _, __, edge: [f"step({x} - {float(edge):.6g})"],
-    "periodic": _periodic,
-    "peak": lambda x, *_: [f"1 / (1 + (({x} - centre) / width) ** 2)"],
-}
+    features = _SHAPES.get(f"{form} {variant}", _SHAPES[form])
+    edge = float(variant) if form == "step" else 0.0
+    numbers = {"low": low, "high": high, "span": high - low, "middle": (low + high) / 2, "edge": edge}
+    mean = float(np.sqrt(low * high)) if low > 0 else 0.0
+    return [feature.format(x=x, mean=mean, **numbers) for feature in features]
 
 
 def _over_frequency(variant: str, middle: float) -> str:

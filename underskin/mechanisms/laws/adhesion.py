@@ -1,6 +1,6 @@
 """The mechanism `adhesion`."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -56,10 +56,11 @@ class Adhesion(Mechanism):
     order = 20
     kinds = ("frf", "indentation")
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "force_n")
-    moves_contact_points = True
     parameters_stated = (_OF_FRF,)
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
+    ) -> tuple[Parameter, ...]:
         """The work of adhesion, and of separation where an indentation has a way back."""
         if kind == "frf":
             return self.parameters_stated
@@ -83,14 +84,11 @@ class Adhesion(Mechanism):
             (work, max(share * pull_off, work)) for work in (snap_in, 0.5 * pull_off, pull_off) for share in (1.0, 1.8)
         ]
 
-    def on_material(self, contacts: Contacts, values: Values) -> None:
+    def act(self, state: Contacts | Curve, values: Values) -> None:
         """Make it stick."""
-        contacts.work_of_adhesion = values["work_of_adhesion"]
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
-        """Make it stick."""
-        curve.work_of_adhesion = values["work_of_adhesion"]
-        curve.work_of_separation = values.get("work_of_separation")
+        state.work_of_adhesion = values["work_of_adhesion"]
+        if isinstance(state, Curve):
+            state.work_of_separation = values.get("work_of_separation")
 
 
 def _comes_back(recording: IndentationConditions) -> bool:

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, chain, log
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.recordings.campaign import Conditions, frf_of
 
@@ -32,7 +32,7 @@ class Ageing(Mechanism):
     order = 10
     axes = ("load_cycles",)
     needs = "load_cycles of every recording, not all the same"
-    needs_fields = ("load_cycles",)
+    reads = ("load_cycles",)
     parameters_stated = (
         Parameter("loss", "-", 0.0, 0.95, HeavyTailed(0.0, 0.3), "linear", limit=0.0, shown=0.15, reason=_LOSS),
         Parameter("onset", "cycles", 1.0, 1e6, Normal(6.9, 2.0), "log", limit=None, shown=1000.0, reason=_ONSET),
@@ -47,14 +47,14 @@ class Ageing(Mechanism):
             return f"recording {lacking[0]!r} has no load_cycles"
         return "load_cycles is the same in all recordings" if len(set(cycles.values())) == 1 else None
 
-    def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """The factor on each recording."""
         remaining = 1.0 - values["saturation"]
         power = values["saturation"] / remaining
-        age = log(1.0 + remaining * (design.load_cycles / values["onset"]))
+        age = log(1.0 + remaining * (state.design.load_cycles / values["onset"]))
         # (1 − e^(−p x))/p = x · mean_decay(p x)
         lost = age * _mean_decay(power * age) / (np.log(10.0) * _mean_decay(np.log(10.0) * power))
-        return _positive(1.0 - values["loss"] * lost)
+        state.factor = _positive(1.0 - values["loss"] * lost)
 
 
 def _mean_decay(x: Differentiated) -> Differentiated:

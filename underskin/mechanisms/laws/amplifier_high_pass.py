@@ -1,9 +1,7 @@
 """The mechanism `amplifier_high_pass`."""
 
-from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "charge amplifiers have corners of 0.01 to some Hz, 0.5 Hz within a factor of 4.5; probes up to some hundred"
@@ -26,6 +24,6 @@ class AmplifierHighPass(Mechanism):
         Parameter("corner", "Hz", 1e-3, 1e3, HeavyTailed(-0.7, 1.5), "log", limit=0.0, shown=1.0, reason=_REASON),
     )
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """1/(1 − i corner/f)."""
-        return 1.0 / (1.0 - values["corner"] * (1j / design.line_frequency))
+        state.factor = 1.0 / (1.0 - values["corner"] * (1j / state.design.line_frequency))

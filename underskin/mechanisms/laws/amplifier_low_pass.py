@@ -1,13 +1,13 @@
 """The mechanism `amplifier_low_pass`."""
 
 import math
+from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
-from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import HeavyTailed, Parameter, Uniform
 from underskin.recordings.campaign import Conditions, FrfConditions
 from underskin.weak_cache import cached_while_alive
@@ -45,16 +45,19 @@ class AmplifierLowPass(Mechanism):
         ),
     )  # fmt: skip
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
+    ) -> tuple[Parameter, ...]:
         """The corner, up to five times the highest line, and the order."""
         corner, order = self.parameters_stated
-        return corner.up_to(_BEYOND * _highest_hz(conditions)), order
+        highest = max(_BEYOND * _highest_hz(conditions), 2 * corner.low)
+        return replace(corner, high=min(corner.high, highest)), order
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """The filter's transfer function."""
         second = values["order"] - 1.0
-        ratio = design.line_frequency / values["low_pass_corner"]
-        return 1.0 / (1.0 + (1.0 + second * _DAMPING) * ratio * 1j - second * ratio * ratio)
+        ratio = state.design.line_frequency / values["low_pass_corner"]
+        state.factor = 1.0 / (1.0 + (1.0 + second * _DAMPING) * ratio * 1j - second * ratio * ratio)
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign

@@ -26,7 +26,6 @@ class CompressibleLayer(Mechanism):
     kinds = ("frf", "indentation")
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
     needs = "a skin declared with poisson_ratio 0.5"
-    figure = ("preload_n", "position_mm")
     parameters_stated = (
         Parameter("poisson_ratio", "-", 0.30, 0.5, Uniform(), "linear", limit=0.5, shown=0.4, reason=_REASON),
     )
@@ -37,10 +36,6 @@ class CompressibleLayer(Mechanism):
             return f"the skin is declared compressible already (poisson_ratio {conditions.skin.poisson_ratio:g})"
         return None
 
-    def on_material(self, contacts: Contacts, values: Values) -> None:
+    def act(self, state: Contacts | Curve, values: Values) -> None:
         """Set ν."""
-        contacts.poisson_ratio = values["poisson_ratio"]
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
-        """Set ν."""
-        curve.poisson_ratio = values["poisson_ratio"]
+        state.poisson_ratio = values["poisson_ratio"]

@@ -1,7 +1,7 @@
 """The mechanism `contact_creep`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +10,14 @@ from underskin.autodiff import exp
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.models.curve_timing import time_runs_with_displacement
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.recordings.campaign import CompressionConditions, Conditions, IndentationConditions
+from underskin.recordings.campaign import CompressionConditions, Conditions, CurveConditions, IndentationConditions
 from underskin.units import Floats
 
+# Curves that add no information by their times: share of the span, of the duration; ratio of speeds
+_TURNED_BACK = 0.02  # of the span
+_UNEVEN = 0.1  # of the duration
+_LIKE_SPEEDS = 1.5
 _RETURN = 0.05  # of the range of displacement: smaller returns are noise
 _FRACTION = "from a few percent in a well cured silicone to most of the modulus in a gel"
 _CURVE_TIME = "mean of the logarithms; no shorter than the time between two samples; an instrument sees up to hours"
@@ -69,12 +72,12 @@ class ContactCreep(Mechanism):
     axes = ("dwell_s", "preload_n", "indenter_radius_mm", "time_s")
     needs = """frf: dwell_s of every recording, not all the same; curves: time_s, and two speeds, a hold or a way back;
     indentations: one way in and one back"""
-    needs_fields = ("dwell_s",)
-    needs_history = True
-    figure = ("dwell_s", "time_s")
+    reads = ("dwell_s",)
     parameters_stated = _ONE_PAIR
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
+    ) -> tuple[Parameter, ...]:
         """One Prony pair, or for indentations two: sum of the fractions, mean time, ratio of the times, and share of
         the first."""
         if kind != "indentation":
@@ -92,19 +95,6 @@ class ContactCreep(Mechanism):
             return ()
         return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
 
-    def told(self, values: Mapping[str, float]) -> str:
-        """For two pairs the relaxed percentage and time of each; of both together where the times are equal."""
-        if "time_spread" not in values:
-            return ""
-        fraction, share = values["relaxed_fraction"], values["first_share"]
-        time, spread = values["relaxation_time"], values["time_spread"]
-        fast, slow = time * math.exp(-spread * (1.0 - share)), time * math.exp(spread * share)
-        if f"{fast:.2g}" == f"{slow:.2g}":
-            return f"The force relaxes by {100 * fraction:.2g} % with {time:.2g} s."
-        shares = (fraction * share, fast), (fraction * (1.0 - share), slow)
-        first, second = (f"{100 * part:.2g} % with {time:.2g} s" for part, time in shares)
-        return f"The force relaxes by {first} and by {second}."
-
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times must be independent of the loads: dwell_s that differ, or time_s that does not follow displacement."""
         if kind != "frf":
@@ -116,7 +106,7 @@ class ContactCreep(Mechanism):
             lacking = [recording.id for recording in curves if recording.time_s is None]
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
-            if time_runs_with_displacement(curves):
+            if _time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
             return _repeated_press(conditions)
         dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
@@ -125,23 +115,33 @@ class ContactCreep(Mechanism):
             return f"recording {lacking[0]!r} has no dwell_s"
         return "dwell_s is the same in all recordings" if len(set(dwell.values())) == 1 else None
 
-    def on_material(self, contacts: Contacts, values: Values) -> None:
-        """Creep under the preload."""
-        fraction = values["relaxed_fraction"]
-        unrelaxed = 1.0 - fraction
-        times = -contacts.dwell * unrelaxed / values["relaxation_time"]
-        contacts.relaxed = 1.0 / (1.0 + fraction / unrelaxed * (1.0 - exp(times)))
-        contacts.modulus = contacts.modulus * contacts.relaxed
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
-        """Relax the force."""
+    def act(self, state: Contacts | Curve, values: Values) -> None:
+        """Creep under the preload; relax the force of a curve."""
         fraction, time = values["relaxed_fraction"], values["relaxation_time"]
-        if "time_spread" not in values:
-            curve.relaxation = ((fraction, time),)
-            return
-        spread, share = values["time_spread"], values["first_share"]
-        fast, slow = time * exp(-spread * (1.0 - share)), time * exp(spread * share)
-        curve.relaxation = (fraction * share, fast), (fraction * (1.0 - share), slow)
+        if isinstance(state, Contacts):
+            unrelaxed = 1.0 - fraction
+            state.relaxed = 1.0 / (1.0 + fraction / unrelaxed * (1.0 - exp(-state.dwell * unrelaxed / time)))
+            state.modulus = state.modulus * state.relaxed
+        elif "time_spread" not in values:
+            state.relaxation = ((fraction, time),)
+        else:
+            spread, share = values["time_spread"], values["first_share"]
+            fast, slow = time * exp(-spread * (1.0 - share)), time * exp(spread * share)
+            state.relaxation = (fraction * share, fast), (fraction * (1.0 - share), slow)
+
+
+def meaning(values: Mapping[str, float]) -> str:
+    """For two pairs the relaxed percentage and time of each; of both together where the times are equal."""
+    if "time_spread" not in values:
+        return ""
+    fraction, share = values["relaxed_fraction"], values["first_share"]
+    time, spread = values["relaxation_time"], values["time_spread"]
+    fast, slow = time * math.exp(-spread * (1.0 - share)), time * math.exp(spread * share)
+    if f"{fast:.2g}" == f"{slow:.2g}":
+        return f"The force relaxes by {100 * fraction:.2g} % with {time:.2g} s."
+    shares = (fraction * share, fast), (fraction * (1.0 - share), slow)
+    first, second = (f"{100 * part:.2g} % with {time:.2g} s" for part, time in shares)
+    return f"The force relaxes by {first} and by {second}."
 
 
 def _times(conditions: Conditions) -> list[Floats]:
@@ -167,3 +167,25 @@ def _presses_again(displacement: Floats) -> bool:
     returned = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
     after = displacement[returned[0] :] if len(returned) else displacement[:1]
     return bool((after - np.minimum.accumulate(after)).max() > least)
+
+
+def _time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
+    """Whether no law of time can be identified: all curves move one way at the same constant speed.
+
+    Recordings without time_s are ignored.
+    """
+    speeds = []
+    for recording in recordings:
+        if recording.time_s is None:
+            continue
+        moved = np.abs(recording.displacement_mm - recording.displacement_mm[0])
+        elapsed = recording.time_s - recording.time_s[0]
+        span, duration = float(moved.max()), float(elapsed[-1])
+        if span <= 0 or duration <= 0:
+            return False
+        turned = float((np.maximum.accumulate(moved) - moved).max())
+        uneven = float(np.abs(moved / span - elapsed / duration).max())
+        if turned > _TURNED_BACK * span or uneven > _UNEVEN:
+            return False
+        speeds.append(span / duration)
+    return bool(speeds) and max(speeds) < _LIKE_SPEEDS * min(speeds)

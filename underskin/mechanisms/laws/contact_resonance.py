@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, constant
+from underskin.autodiff import constant
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts, layer_curves, press, stiffness
-from underskin.mechanisms.models.frf_design import FrfDesign, frf_design
+from underskin.mechanisms.models.contact_state import Contacts, FrfState, press, stiffness
+from underskin.mechanisms.models.frf_design import frf_design
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
-from underskin.physics.contact_curves import CurveGrid
+from underskin.physics.contact_curves import curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.recordings.campaign import Conditions, FrfRecording
 from underskin.recordings.frf.estimation import lines_of, resonance
@@ -39,7 +39,7 @@ class ContactResonance(Mechanism):
     stage = Stage.LINES
     order = 10
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
-    needs_stiffness = True
+    reads = ("stiffness",)
     parameters_stated = (
         Parameter("tip_mass", "g", 0.01, 2000.0, HeavyTailed(0.7, 1.8), "log", limit=0.0, shown=2.0, reason=_MASS),
         Parameter("damping_ratio", "-", 1e-3, 1.0, Normal(-3.0, 1.0), "log", limit=None, shown=0.05, reason=_DAMPING),
@@ -50,12 +50,13 @@ class ContactResonance(Mechanism):
         broader one, from which a fit finds a sharp resonance at other contacts' frequencies."""
         return _resonance_guesses(conditions)
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """The tip's transfer function."""
-        assert contacts.stiffness is not None
-        natural = (contacts.stiffness * (1e3 / values["tip_mass"])) ** 0.5
+        stiffness_at, design = state.contacts.stiffness, state.design
+        assert stiffness_at is not None
+        natural = (stiffness_at * (1e3 / values["tip_mass"])) ** 0.5
         ratio = 2 * np.pi * design.line_frequency / natural[design.line_contact]
-        return 1.0 / (1.0 - ratio * ratio + 2j * values["damping_ratio"] * ratio)
+        state.factor = 1.0 / (1.0 - ratio * ratio + 2j * values["damping_ratio"] * ratio)
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
@@ -80,7 +81,7 @@ def _resonance_guesses(conditions: Conditions) -> list[tuple[float, float]]:
         thickness=constant(thickness, 0, (1,)),
         poisson_ratio=constant(skin.poisson_ratio, 0, (1,)),
     )
-    curves = layer_curves(CurveGrid(np.zeros(1)), Layer(skin.poisson_ratio))
+    curves = curves_of(Layer(skin.poisson_ratio))
     spring = stiffness(contacts, press(contacts, None), curves).value[0]
     contact_of = design.point_contact[design.point]
     masses = [1e3 * spring[contact_of[index]] / (2 * np.pi * peak.frequency) ** 2 for index, peak in resonances]

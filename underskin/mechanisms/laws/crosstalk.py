@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.models.frf_design import frf_design
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.campaign import Conditions
@@ -28,9 +28,7 @@ class Crosstalk(Mechanism):
     order = 10
     axes = ("position_mm", "sensor")
     needs = "at least two sensors, and presses within three thicknesses of a neighbour"
-    needs_neighbours = True
-    needs_fields = ("sensor",)
-    figure = ("position_mm",)
+    reads = ("sensor",)
     parameters_stated = (
         Parameter("fraction", "-", 0.0, 0.6, HeavyTailed(0.0, 0.15), "linear", limit=0.0, shown=0.1, reason=_REASON),
     )
@@ -45,6 +43,6 @@ class Crosstalk(Mechanism):
             return "no recording presses within three thicknesses of a sensor's neighbour (position_mm)"
         return None
 
-    def neighbour_fraction(self, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """The fraction."""
-        return values["fraction"]
+        state.factor = values["fraction"]

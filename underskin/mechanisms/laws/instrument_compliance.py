@@ -1,6 +1,7 @@
 """The mechanism `instrument_compliance`."""
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -45,7 +46,9 @@ class InstrumentCompliance(Mechanism):
         ),
     )
 
-    def parameters(self, conditions: Conditions, kind: Kind = "indentation") -> tuple[Parameter, ...]:
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "indentation", others: Collection[Mechanism] = ()
+    ) -> tuple[Parameter, ...]:
         """The stiffness, expected for the spheres of the recordings."""
         radii = [
             recording.indenter_radius_mm
@@ -57,6 +60,6 @@ class InstrumentCompliance(Mechanism):
         usual = Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)
         return tuple(replace(parameter, prior=usual) for parameter in self.parameters_stated)
 
-    def on_curve(self, curve: Curve, values: Values) -> None:
+    def act(self, state: Curve, values: Values) -> None:
         """Let the stage give."""
-        curve.stage_stiffness = 1e3 * values["stage_stiffness"]
+        state.stage_stiffness = 1e3 * values["stage_stiffness"]

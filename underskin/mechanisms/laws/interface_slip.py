@@ -25,13 +25,12 @@ class InterfaceSlip(Mechanism):
     stage = Stage.MATERIAL
     order = 20
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
-    figure = ("preload_n", "position_mm")
     parameters_stated = (
         Parameter(
             "glue_stiffness", "-", 0.01, 50.0, HeavyTailed(-0.3, 1.5), "log", limit=math.inf, shown=0.3, reason=_REASON
         ),
     )
 
-    def on_material(self, contacts: Contacts, values: Values) -> None:
+    def act(self, state: Contacts, values: Values) -> None:
         """Set the slip, 1/(1 + κ)."""
-        contacts.slip = 1.0 / (1.0 + values["glue_stiffness"])
+        state.slip = 1.0 / (1.0 + values["glue_stiffness"])

@@ -1,7 +1,7 @@
 """The mechanism `layered_contact`."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection
 
 import numpy as np
 
@@ -38,9 +38,10 @@ class LayeredContact(Mechanism):
     kinds = ("frf", "indentation")
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "frf: a declared thickness_mm; indentations: nothing, but only a declared one tells it from stiffening"
-    figure = ("preload_n", "force_n")
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
+    ) -> tuple[Parameter, ...]:
         """None; of indentations on a skin without a declared thickness, this."""
         if kind != "indentation" or conditions.skin.thickness_mm is not None:
             return ()
@@ -52,29 +53,16 @@ class LayeredContact(Mechanism):
             ),
         )
 
-    def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
-        """A declared thickness replaces one estimated from curves."""
-        declared = conditions.skin.thickness_mm is not None
-        return {name: value for name, value in values.items() if not (declared and name == _THICKNESS)}
-
-    def follows_from_declared(self, conditions: Conditions, kind: Kind) -> bool:
-        """Where the skin's thickness is declared."""
-        return conditions.skin.thickness_mm is not None
-
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A thickness is needed, or curves that tell it."""
         lacking = kind == "frf" and conditions.skin.thickness_mm is None
         return "skin.thickness_mm is not given" if lacking else None
 
-    def on_material(self, contacts: Contacts, values: Values) -> None:
+    def act(self, state: Contacts | Curve, values: Values) -> None:
         """Press the layer."""
-        contacts.layered = True
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
-        """Press the layer."""
-        curve.layered = True
+        state.layered = True
         if _THICKNESS in values:
-            curve.thickness = 1e-3 * values[_THICKNESS]
+            state.thickness = 1e-3 * values[_THICKNESS]
 
 
 def _contact_radius_mm(conditions: Conditions) -> float:

@@ -6,7 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.models.frf_design import FrfDesign, Pickup, frequencies
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Conditions, FrfRecording, frf_of
@@ -46,8 +47,6 @@ class MainsPickup(Mechanism):
     order = 10
     axes = ("frequency_hz", "dynamic_force_n")
     needs = "a line within 3 Hz of 50 or 60 Hz"
-    moves_predictions = False
-    figure = ("mains",)
     parameters_stated = (
         _of_lines("pickup_charge", "pC", 1e-4, 1e3, Normal(-3.0, 1.5), limit=0.0, shown=0.05, reason=_CHARGE),
         _of_lines("pickup_width", "Hz", 0.2, 6.0, Normal(0.4, 0.6), limit=None, shown=1.5, reason=_WIDTH),
@@ -63,9 +62,9 @@ class MainsPickup(Mechanism):
                 return None
         return "no line lies within 3 Hz of 50 or 60 Hz (frequency_hz)"
 
-    def pickup(self, conditions: Conditions, design: FrfDesign) -> Pickup:
-        """On the lines within reach of the mains that stand out, each by its nearest harmonic."""
-        return _pickup(conditions, design)
+    def act(self, state: FrfState, values: Values) -> None:
+        """Add charge on the lines within reach of the mains that stand out, each by its nearest harmonic."""
+        state.pickup = _pickup(state.design.conditions, state.design)
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign

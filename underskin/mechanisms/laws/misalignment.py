@@ -4,13 +4,13 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from underskin.autodiff import Differentiated
 from underskin.errors import conflicting
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState
+from underskin.mechanisms.models.frf_design import LARGEST_OFFSET_MM
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.campaign import Conditions, frf_of, offsets
 
-_LARGEST_MM = 2.0
 _REASON = "a tip centred by eye is off by some tenths of a millimetre to a millimetre"
 
 
@@ -30,40 +30,47 @@ class Misalignment(Mechanism):
     order = 10
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
     needs = "nothing; where every press is centred and nothing tells its direction, its length alone is a parameter"
-    largest_offset = 1e-3 * _LARGEST_MM * np.sqrt(2)
-    figure = ("preload_n", "position_mm")
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The offset's two components, or its length where its direction cannot be determined."""
-        return self.parameters_with((), conditions, kind)
-
-    def parameters_with(
-        self, others: Collection[Mechanism], conditions: Conditions, kind: Kind
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
-        """As `parameters`; the charge of neighbours, which lie in known directions, determines the direction too."""
-        directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
-        figure_values, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
+        """The offset's two components, or its length where its direction cannot be determined: by presses off centre,
+        or by the charge of neighbours, which lie in known directions."""
+        directed = offsets(conditions).any() or any(other.stage is Stage.NEIGHBOURS for other in others)
+        figure_values, low = ({"offset": 0.7}, 0.0)
+        if directed:
+            figure_values, low = {"offset_x": 0.6, "offset_y": 0.3}, -LARGEST_OFFSET_MM
         return tuple(
             Parameter(
-                name, "mm", low, _LARGEST_MM, HeavyTailed(0.0, 0.7), "linear", limit=0.0, shown=value, reason=_REASON
+                name,
+                "mm",
+                low,
+                LARGEST_OFFSET_MM,
+                HeavyTailed(0.0, 0.7),
+                "linear",
+                limit=0.0,
+                shown=value,
+                reason=_REASON,
             )
             for name, value in figure_values.items()
         )
 
-    def transfer(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
-        """Centred presses need only the offset's length; without a direction no other press can be predicted."""
-        if "offset" not in values:
-            return {**values, "offset": float(np.hypot(values["offset_x"], values["offset_y"]))}
-        off_centre = offsets(conditions).any(axis=1)
-        if off_centre.any():
-            recording = frf_of(conditions)[int(np.argmax(off_centre))]
-            reason = "the adopted model knows how far presses miss it, not in which direction"
-            allowed = f"must be the sensor's centre: {reason}"
-            raise conflicting(f"recordings[{recording.id}].position_mm", recording.position_mm, allowed)
-        return values
-
-    def offset(self, values: Values) -> tuple[Differentiated, Differentiated]:
-        """The offset [m]."""
+    def act(self, state: FrfState, values: Values) -> None:
+        """Shift the contacts."""
         if "offset" in values:
-            return 1e-3 * values["offset"], 0.0 * values["offset"]
-        return 1e-3 * values["offset_x"], 1e-3 * values["offset_y"]
+            state.shift = 1e-3 * values["offset"], 0.0 * values["offset"]
+        else:
+            state.shift = 1e-3 * values["offset_x"], 1e-3 * values["offset_y"]
+
+
+def transfer(values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
+    """Centred presses need only the offset's length; without a direction no other press can be predicted."""
+    if "offset" not in values:
+        return {**values, "offset": float(np.hypot(values["offset_x"], values["offset_y"]))}
+    off_centre = offsets(conditions).any(axis=1)
+    if off_centre.any():
+        recording = frf_of(conditions)[int(np.argmax(off_centre))]
+        reason = "the adopted model knows how far presses miss it, not in which direction"
+        allowed = f"must be the sensor's centre: {reason}"
+        raise conflicting(f"recordings[{recording.id}].position_mm", recording.position_mm, allowed)
+    return values

@@ -46,10 +46,6 @@ class ModulusError(Mechanism):
             return "skin.youngs_modulus_mpa is not declared, and so free already"
         return None
 
-    def on_declared(self, contacts: Contacts, values: Values) -> None:
+    def act(self, state: Contacts | Curve, values: Values) -> None:
         """Scale the modulus."""
-        contacts.modulus = contacts.modulus * values["modulus_factor"]
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
-        """Scale the modulus."""
-        curve.modulus = curve.modulus * values["modulus_factor"]
+        state.modulus = state.modulus * values["modulus_factor"]

@@ -1,16 +1,9 @@
 """The mechanism `moving_contact_edge`."""
 
-import numpy as np
-
-from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import Parameter, Uniform
-from underskin.units import Array, Floats
 
-_NODES, _MORE_NODES = 3, 6  # of the quadrature; the three are exact for charges of the fourth degree in the force
-_LARGE = 0.4  # of the preload: a dynamic force beyond which three nodes err by more than 1e-4 of σ
-_SMALL = 1e-3  # of the preload: a dynamic force used for the limit of 0; the error is of second order
-_LEAST_FORCE = 1e-6  # of the preload, for a sphere that has left the skin
 _REASON = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
 
 
@@ -32,22 +25,12 @@ class MovingContactEdge(Mechanism):
     stage = Stage.LOAD_INCREMENT
     order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "dynamic_force_n")
-    reads_fields = ("dynamic_force_n",)
     parameters_stated = (
         Parameter(
             "mobile_fraction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON, closed=(1.0,)
         ),
     )
 
-    def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array]:
-        """The first harmonic's quadrature; a weight is of σ, so it holds the force at its node."""
-        amplitude = np.maximum(dynamic_force, _SMALL * force)
-        nodes = _NODES if (amplitude < _LARGE * force).all() else _MORE_NODES
-        s = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)[:, None]
-        s = s[np.abs(s[:, 0]) > 1e-9]  # the middle one of three has no weight
-        forces = np.maximum(force + amplitude * s, _LEAST_FORCE * force)
-        return forces, 2 / nodes * s * forces / amplitude
-
-    def mobility(self, values: Values) -> Differentiated:
-        """The mobile fraction."""
-        return values["mobile_fraction"]
+    def act(self, state: FrfState, values: Values) -> None:
+        """The share of the first harmonic: the mobile fraction."""
+        state.factor = values["mobile_fraction"]

@@ -28,22 +28,25 @@ class PlatenFriction(Mechanism):
     order = 20
     kinds = ("compression",)
     axes = ("sample_height_mm", "sample_diameter_mm")
-    figure = ("displacement_mm",)
     parameters_stated = (
         Parameter("friction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=0.5, reason=_REASON, closed=(1.0,)),
     )
 
-    def hidden_in_modulus(self, conditions: Conditions) -> Sequence[float]:
-        """Of samples of one shape."""
-        shapes = [
-            (0.25 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2
-            for recording in conditions.recordings
-            if isinstance(recording, CompressionConditions)
-        ]
-        if not shapes or max(shapes) > _LEAST_SHAPE_RATIO * min(shapes):
-            return ()
-        return [float(np.log1p(2 * friction * np.mean(shapes))) for friction in _FRICTIONS]
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
+    def act(self, state: Curve, values: Values) -> None:
         """Let the platens hold."""
-        curve.platen_friction = values["friction"]
+        state.platen_friction = values["friction"]
+
+
+def hidden_in_modulus(conditions: Conditions) -> Sequence[float]:
+    """Equally probable logarithms of the factor by which friction may raise the apparent modulus.
+
+    Empty where samples of several shapes separate the two.
+    """
+    shapes = [
+        (0.25 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2
+        for recording in conditions.recordings
+        if isinstance(recording, CompressionConditions)
+    ]
+    if not shapes or max(shapes) > _LEAST_SHAPE_RATIO * min(shapes):
+        return ()
+    return [float(np.log1p(2 * friction * np.mean(shapes))) for friction in _FRICTIONS]

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, chain
+from underskin.autodiff import chain
 from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 
 _SLOPE = "the paper's array, 14 to 22 pC/N from 1 to 3 N, needs 5 to 6 per MPa; ceramics about -0.01"
@@ -49,8 +50,8 @@ class PreloadDependentD33(Mechanism):
         ),
     )
 
-    def on_d33(self, mean_stress: Differentiated, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """1 + β T0/(1 + |T0|/Ts)."""
-        stress = 1e-6 * mean_stress
+        stress = 1e-6 * state.mean_stress
         size = chain(np.abs(stress.value), (np.sign(stress.value), stress))
-        return 1.0 + values["stress_coefficient"] * stress / (1.0 + size / values["saturation_stress"])
+        state.factor = 1.0 + values["stress_coefficient"] * stress / (1.0 + size / values["saturation_stress"])

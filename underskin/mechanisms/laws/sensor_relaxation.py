@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, exp
+from underskin.autodiff import exp
 from underskin.mechanisms.base import Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 
 _REFERENCE = 30.0  # Hz
@@ -43,8 +42,9 @@ class SensorRelaxation(Mechanism):
         ),
     )
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """(iω/ω_ref)^(−n) (1 + s/(1 + iω/ω_s))."""
-        power = exp(-np.log(1j * design.line_frequency / _REFERENCE) * values["exponent"])
-        step = values["step"] / (1.0 + 1j * design.line_frequency / values["step_frequency"])
-        return power * (1.0 + step)
+        frequency = state.design.line_frequency
+        power = exp(-np.log(1j * frequency / _REFERENCE) * values["exponent"])
+        step = values["step"] / (1.0 + 1j * frequency / values["step_frequency"])
+        state.factor = power * (1.0 + step)

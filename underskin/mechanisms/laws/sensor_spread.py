@@ -24,7 +24,6 @@ class SensorSpread(Mechanism):
     order = 20
     axes = ("sensor",)
     needs = "recordings of at least two sensors"
-    moves_predictions = False
     parameters_stated = (
         Parameter(
             "spread",

@@ -1,6 +1,6 @@
 """The mechanism `strain_stiffening`."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -116,48 +116,47 @@ class StrainStiffening(Mechanism):
     order = 40
     kinds = ("frf", "indentation", "compression")
     axes = ("preload_n", "indenter_radius_mm", "displacement_mm")
-    imitated_by_seating = True
-    extrapolates_modulus = True
-    figure = ("preload_n", "displacement_mm")
 
-    def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
+    def parameters(
+        self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
+    ) -> tuple[Parameter, ...]:
         """The stiffening coefficient, or for curves the law's constants."""
         return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
 
-    def shared_parameters(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
-        """s of 1 + s ε for the law of an indentation: the relative increase of the modulus at ε = 0.1, over ε. A
-        cylinder is strained so much more that its law gives no information on such small strains."""
-        if kind == "frf":
-            return values
-        if kind == "compression":
-            return {}
-        shortened = 1.0 - _COMPARED
-        invariant = shortened**2 + 2.0 / shortened - 3.0
-        coefficient, form, exponent = (values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
-        grown = coefficient * (3.0 * exp(exponent * (0.5 * np.log(invariant / 3.0))))
-        nonzero_form = where(np.abs(form.value) > _LEAST_FORM, form, _LEAST_FORM)
-        power = 1.0 + nonzero_form * grown
-        factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / nonzero_form)
-        return {"stiffening": (factor - 1.0) / _COMPARED}
-
-    def told(self, values: Mapping[str, float]) -> str:
-        """That a compressed sample is softer than a neo-Hookean solid, where it is."""
-        softer = values.get("second_over_first", 0.0) < 0
-        return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
-
-    def on_material(self, contacts: Contacts, values: Values) -> None:
-        """Stiffen each contact by its own strain."""
-        strain = _STRAIN * contacts.hertz_radius / contacts.indenter_radius
-        excess = values["stiffening"] * strain
-        ratio, slope = _radius_ratio(excess.value)
-        contacts.modulus = contacts.modulus * (1.0 + excess * chain(ratio, (slope, excess)))
-
-    def on_curve(self, curve: Curve, values: Values) -> None:
-        """Take the law."""
-        if "stiffening_form" in values:
-            curve.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
+    def act(self, state: Contacts | Curve, values: Values) -> None:
+        """Stiffen each contact by its own strain; a curve takes the law."""
+        if isinstance(state, Contacts):
+            strain = _STRAIN * state.hertz_radius / state.indenter_radius
+            excess = values["stiffening"] * strain
+            ratio, slope = _radius_ratio(excess.value)
+            state.modulus = state.modulus * (1.0 + excess * chain(ratio, (slope, excess)))
+        elif "stiffening_form" in values:
+            state.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:
-            curve.yeoh = values["second_over_first"], values["third_over_first"], values["stiffening_exponent"]
+            state.yeoh = values["second_over_first"], values["third_over_first"], values["stiffening_exponent"]
+
+
+def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated]:
+    """s of 1 + s ε for the law of an indentation: the relative increase of the modulus at ε = 0.1, over ε. A
+    cylinder is strained so much more that its law gives no information on such small strains."""
+    if kind == "frf":
+        return values
+    if kind == "compression":
+        return {}
+    shortened = 1.0 - _COMPARED
+    invariant = shortened**2 + 2.0 / shortened - 3.0
+    coefficient, form, exponent = (values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
+    grown = coefficient * (3.0 * exp(exponent * (0.5 * np.log(invariant / 3.0))))
+    nonzero_form = where(np.abs(form.value) > _LEAST_FORM, form, _LEAST_FORM)
+    power = 1.0 + nonzero_form * grown
+    factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / nonzero_form)
+    return {"stiffening": (factor - 1.0) / _COMPARED}
+
+
+def meaning(values: Mapping[str, float]) -> str:
+    """That a compressed sample is softer than a neo-Hookean solid, where it is."""
+    softer = values.get("second_over_first", 0.0) < 0
+    return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
 
 
 def _radius_ratio(excess: Array) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import LARGEST_STRETCH
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
@@ -19,13 +20,13 @@ class ThicknessError(Mechanism):
     stage = Stage.DECLARED
     order = 20
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
-    largest_stretch = 1.55
     parameters_stated = (
         Parameter(
-            "thickness_factor", "-", 0.65, 1.55, HeavyTailed(0.0, 0.12), "log", limit=1.0, shown=0.9, reason=_REASON
+            "thickness_factor", "-", 0.65, LARGEST_STRETCH, HeavyTailed(0.0, 0.12), "log", limit=1.0, shown=0.9,
+            reason=_REASON,
         ),
-    )
+    )  # fmt: skip
 
-    def on_declared(self, contacts: Contacts, values: Values) -> None:
+    def act(self, state: Contacts, values: Values) -> None:
         """Scale the thickness."""
-        contacts.thickness = contacts.thickness * values["thickness_factor"]
+        state.thickness = state.thickness * values["thickness_factor"]

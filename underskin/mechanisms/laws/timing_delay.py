@@ -4,10 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, exp
+from underskin.autodiff import exp
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.campaign import Conditions, FrfRecording
 from underskin.recordings.frf.estimation import common_delay, lines_of
@@ -33,7 +32,6 @@ class TimingDelay(Mechanism):
     stage = Stage.LINES
     order = 40
     axes = ("phase", "frequency_hz")
-    figure = ("phase",)
     parameters_stated = (
         Parameter(
             "delay", "µs", -_LARGEST_US, _LARGEST_US, HeavyTailed(0.0, 300.0), "linear", limit=0.0, shown=300.0,
@@ -45,9 +43,9 @@ class TimingDelay(Mechanism):
         """The delay of all recordings' phases: beyond one turn over the band no fit converges to it from afar."""
         return _delay_guess(conditions)
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+    def act(self, state: FrfState, values: Values) -> None:
         """exp(−iωt0)."""
-        return exp(-2e-6j * np.pi * design.line_frequency * values["delay"])
+        state.factor = exp(-2e-6j * np.pi * state.design.line_frequency * values["delay"])
 
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign

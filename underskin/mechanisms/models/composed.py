@@ -67,7 +67,7 @@ def forward_model(mechanisms: Sequence[Mechanism], conditions: Conditions, table
     """
     _require_kind(conditions, kind)
     if kind == "frf":
-        return FrfModel(mechanisms, conditions, table, tuple(CATALOGUE.values()))
+        return FrfModel(mechanisms, conditions, table)
     if kind == "indentation":
         return IndentationModel(mechanisms, conditions)
     return CompressionModel(mechanisms, conditions)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, variables
+from underskin.autodiff import Differentiated, log
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, required
 from underskin.mechanisms.base import Kind, Mechanism, Unsupported, Values
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
@@ -134,50 +134,39 @@ class Composition:
         self.nuisances = {parameter.name: int(starts[-1]) + index for index, parameter in enumerate(nuisances)}
         self._log = np.array([parameter.scale == "log" for parameter in self.parameters])
 
-    def values(
-        self, fit: Floats, further: int = 0, *, slopes: bool = True
-    ) -> tuple[dict[str, Values], Values, list[Differentiated]]:
-        """Each mechanism's parameters by name, and the nuisances, as values in their units with derivatives.
+    def values(self, fit: Floats) -> tuple[dict[str, Values], Values]:
+        """Each mechanism's parameters by name, and the nuisances, as values in their units without derivatives.
 
-        `fit` is (…, parameters), one or several points. `further` variables of value 0 follow, with respect to which
-        the model is differentiated as well; without `slopes` it is by these alone.
-
-        Raises InvalidInput where `fit` has another length than the parameters.
+        `fit` is (…, parameters), one or several points. Raises InvalidInput where it has another length.
         """
         count = len(self.parameters)
         if np.shape(fit)[-1:] != (count,):
             allowed = f"must hold {count} coordinates"
             raise InvalidInput("fit", np.shape(fit), allowed, code=ErrorCode.UNEQUAL_LENGTHS)
-        points = np.shape(fit)[:-1]
-        value = np.concatenate(
-            [np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit), np.zeros((*points, further))], axis=-1
-        )
-        seed_slopes = np.zeros((count + further, *points, count + further))
-        diagonal = np.arange(count + further)
-        seed_slopes[diagonal, ..., diagonal] = np.moveaxis(
-            np.concatenate([np.where(self._log, value[..., :count], 1.0), np.ones((*points, further))], axis=-1), -1, 0
-        )
-        seeds = variables(value, seed_slopes if slopes else seed_slopes[count:])
-        by_mechanism = {
-            name: {key: seeds[index] for key, index in indices.items()} for name, indices in self.indices.items()
-        }
+        value = np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit)
+        numbers = [Differentiated(value[..., [index]], np.zeros((0, *np.shape(fit)[:-1], 1))) for index in range(count)]
+        by_mechanism: dict[str, Values] = {}
         for name, indices in self.indices.items():
+            values = {key: numbers[index] for key, index in indices.items()}
             for key, index in indices.items():
                 other = self.parameters[index].relative_to
                 if other is not None:
-                    by_mechanism[name][key] = by_mechanism[name][key] * by_mechanism[name][other]
-        return (
-            dict(by_mechanism),
-            {name: seeds[index] for name, index in self.nuisances.items()},
-            seeds[count:],
-        )
+                    values[key] = values[key] * values[other]
+            by_mechanism[name] = values
+        return by_mechanism, {name: numbers[index] for name, index in self.nuisances.items()}
 
 
 def parameters_together(
     mechanisms: Sequence[Mechanism], conditions: Conditions, kind: Kind
 ) -> dict[str, tuple[Parameter, ...]]:
     """The parameters of each mechanism by its name, in a model with all of these mechanisms."""
-    return {mechanism.name: mechanism.parameters_with(mechanisms, conditions, kind) for mechanism in mechanisms}
+    return {mechanism.name: mechanism.parameters(conditions, kind, mechanisms) for mechanism in mechanisms}
+
+
+def fit_coordinates(parameters: Sequence[Parameter], values: Values) -> Values:
+    """Values of parameters as fit coordinates, by their names; those of other parameters as they are."""
+    logarithmic = {parameter.name for parameter in parameters if parameter.scale == "log"}
+    return {name: log(value) if name in logarithmic else value for name, value in values.items()}
 
 
 def kind_of(conditions: Conditions) -> Kind:

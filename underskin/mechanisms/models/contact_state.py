@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from underskin.autodiff import Differentiated, cbrt, chain, stacked
+from underskin.mechanisms.models.frf_design import FrfDesign, Pickup
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats, Indices
@@ -81,6 +82,37 @@ class Contacts:
         area = 1 - nu * nu
         x = np.cbrt(self.force / self.indenter_radius**2 / self.modulus.value * (0.75 / area) ** 2)
         return chain(x, (-x / (3 * self.modulus.value), self.modulus), (x * (4 * nu / (3 * area)), self.poisson_ratio))
+
+
+@dataclass
+class FrfState:
+    """What a law of FRFs reads beside its parameters, and what it sets, at several points of the fit coordinates.
+
+    By stage, `factor` is: LOAD_INCREMENT the share of the first harmonic in the oscillation; SENSOR a factor on d33 at
+    each of the design's points; NEIGHBOURS the share of the neighbours' charge in a sensor's; RECORDING a factor on
+    each recording; LINES a complex factor on each distinct line. At POSITION a law sets `shift`, at ADDED_CHARGE
+    `pickup`.
+    """
+
+    design: FrfDesign
+    loaded: Contacts | None = None  # the contacts, from POSITION on
+    sigma: Differentiated | None = None  # σ under the preload at each of the design's points, at SENSOR
+    factor: Differentiated | None = None
+    shift: tuple[Differentiated, Differentiated] | None = None  # x and y added to the contacts' position [m]
+    pickup: Pickup | None = None
+
+    @property
+    def contacts(self) -> Contacts:
+        """The contacts, with their stiffness where a mechanism reads it."""
+        assert self.loaded is not None
+        return self.loaded
+
+    @property
+    def mean_stress(self) -> Differentiated:
+        """The static stress [Pa] at each of the design's points, mean over the sensor, compression positive."""
+        assert self.sigma is not None
+        force = 1.5 / np.pi * self.design.force[self.design.point_contact]
+        return self.sigma * force / (self.contacts.thickness**2.0)
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,58 @@
-"""A force curve as mechanisms change it: the elastomer, the stage, and relaxation. SI."""
+"""A force curve as mechanisms change it: the elastomer, the stage, and relaxation. SI.
 
-from collections.abc import Sequence
+Relaxation with fading memory: E(t)/E(0) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs. u(t) is the force of the
+elastic body; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading memories
+Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for which the step is exact (Fung, Biomechanics,
+1993, section 7.6). Memories have the pairs on a last axis of their own.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
-from underskin.autodiff import Differentiated
-from underskin.mechanisms.models.relaxation import Relaxation
+from underskin.autodiff import Differentiated, contiguous
+from underskin.mechanisms.models.sphere_kernels import memory_rows
 from underskin.units import Floats
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """The Prony pairs: g and τ [s], (points, 1, 1, pairs)."""
+
+    fraction: Floats
+    time: Floats
+
+    @property
+    def unrelaxed(self) -> Floats:
+        """1 − Σ g (points, 1, 1)."""
+        return np.asarray(1.0 - self.fraction.sum(axis=-1))
+
+    def remaining(self, age: Floats) -> Floats:
+        """E(t)/E(0)."""
+        decay = np.exp(-np.maximum(age, 0.0)[..., None] / self.time)
+        return np.asarray(1.0 - (self.fraction * (1.0 - decay)).sum(axis=-1))
+
+    def convolved(self, history: Floats, memory: Floats) -> Floats:
+        """∫ e(t−s) du(s) from u(t) and its memories."""
+        return np.asarray(self.unrelaxed * history + (self.fraction * memory).sum(axis=-1))
+
+    def of_points(self, count: int) -> tuple[Floats, Floats]:
+        """g and τ broadcast to `count` points, (points, pairs)."""
+        pairs = self.fraction.shape[-1]
+        fraction, time = (
+            np.broadcast_to(values.reshape(-1, pairs), (count, pairs)) for values in (self.fraction, self.time)
+        )
+        return contiguous(fraction), contiguous(time)
+
+
+def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
+    """Y (points, curves, samples, pairs) of histories u (points, curves, samples) at times [s]; u at the first
+    sample is a step."""
+    _, times = relaxation.of_points(len(history))
+    memory = np.empty((*history.shape, times.shape[-1]))
+    memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), times, memory)
+    return memory
 
 
 @dataclass(frozen=True)
@@ -20,15 +64,37 @@ class Samples:
     travel: Floats
     time: Floats
 
+    def along(self, axis: str, force: Floats, origins: Mapping[str, float]) -> Floats:
+        """An axis of laws of curves: the depth beyond the contact point [mm], the contact force [N], or the time since
+        the origin of each recording, by its id, else its first sample [s]."""
+        if axis == "displacement_mm":
+            return np.asarray(1e3 * np.maximum(self.travel, 0.0))
+        if axis == "force_n":
+            return np.maximum(force, 0.0)
+        first = [origins.get(name, float(times[0])) for name, times in zip(self.ids, self.time, strict=True)]
+        return np.asarray(self.time - np.array(first)[:, None])
 
-class SampleLaw(Protocol):
-    """A law that changes samples one by one."""
+
+@dataclass(frozen=True)
+class SampleLaw:
+    """A law that changes samples one by one: millimetres added to the travel (`acts_on` position), newtons added to
+    the force (force), or a factor on the force."""
+
+    acts_on: str
+    change: Callable[[Samples, Floats], Floats]  # of samples where the contact force is that [N]
 
     def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
         """The travel at which the sphere presses [m] (points, curves, samples)."""
+        if self.acts_on != "position":
+            return travel
+        return travel + 1e-3 * self.change(samples, np.zeros_like(travel))
 
     def measured_force(self, samples: Samples, force: Floats) -> Floats:
         """The measured force [N] where the contact force is `force` [N] (points, curves, samples)."""
+        if self.acts_on == "position":
+            return force
+        change = self.change(samples, force)
+        return force + change if self.acts_on == "force" else force * change
 
 
 @dataclass

@@ -24,9 +24,8 @@ from underskin.mechanisms.models.composition import (
     modulus_parameter,
     required_modulus,
 )
-from underskin.mechanisms.models.curve_state import Curve, numbers
+from underskin.mechanisms.models.curve_state import Curve, memories, numbers
 from underskin.mechanisms.models.frf_design import Pickup
-from underskin.mechanisms.models.relaxation import memories
 from underskin.mechanisms.parameter import Parameter
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.campaign import (
@@ -48,6 +47,7 @@ class CurveModel(ABC):
 
     sensor: Indices | None = None
     pickup: Pickup | None = None
+    hidden_jumps = False  # whether contact may begin or end with a jump that no curve shows
 
     def __init__(
         self,
@@ -123,7 +123,7 @@ class CurveModel(ABC):
         return Prediction(value, slopes, None, None, None, inside)
 
     def _forces(self, fit: Floats, contact_mask: Mask | None = None) -> tuple[Floats, Mask, Mask]:
-        values, nuisances, _ = self._composition.values(fit, slopes=False)
+        values, nuisances = self._composition.values(fit)
         contact = 1e-3 * fit[:, self.contact_points, None]
         return self._force(self._curve(values, nuisances), contact, contact_mask)
 
@@ -194,7 +194,7 @@ class CompressionModel(CurveModel):
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
         curve = Curve(modulus=modulus, poisson_ratio=constant(INCOMPRESSIBLE, 0, modulus.value.shape[:-1]))
         for mechanism in self._mechanisms:
-            mechanism.on_curve(curve, values[mechanism.name])
+            mechanism.act(curve, values[mechanism.name])
         return curve
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:

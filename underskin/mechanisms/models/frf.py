@@ -9,23 +9,26 @@ Pick-up is a covariance.
 
 Models of the same conditions share contacts, positions and the table, which take most of the time. Points whose
 models press the same contacts are computed as one array, as far as their contacts have the same structure (sphere on
-half space or layer, with or without adhesion, a glue line). The hook of a mechanism is called once for all points
-whose models have it. The derivatives of a point are those by its own model's parameters, in their order.
+half space or layer, with or without adhesion, a glue line). A mechanism acts once for all points whose models
+have it. The derivatives of a point are those by its own model's parameters, in their order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from underskin.autodiff import Differentiated, chain, constant, sum_rows
 from underskin.errors import ErrorCode, InvalidInput, required
-from underskin.mechanisms.base import Mechanism, Values
+from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.composition import Composition, Prediction, frf_nuisances
-from underskin.mechanisms.models.contact_state import Contacts, layer_curves, press, stiffness
+from underskin.mechanisms.models.contact_state import Contacts, FrfState, layer_curves, press, stiffness
 from underskin.mechanisms.models.frf_design import (
+    LARGEST_OFFSET_MM,
+    LARGEST_STRETCH,
     FrfDesign,
     Pickup,
     Response,
@@ -89,17 +92,12 @@ class MechanismInModels:
         self._relative = [
             (name, parameter.relative_to) for name, parameter in parameters.items() if parameter.relative_to
         ]
-        self._hooks = _overridden(type(mechanism))
 
     def add(self, model: int, indices: Mapping[str, int]) -> None:
         """Record that a model has it, with its parameters at these indices."""
         self.has[model] = True
         for name, index in indices.items():
             self._indices[name][model] = index
-
-    def has_hook(self, *hooks: str) -> bool:
-        """Whether it overrides one of these hooks."""
-        return not self._hooks.isdisjoint(hooks)
 
     def values(self, points: Indices, seeds: ParameterBatch) -> Values:
         """Its parameters in their units at points whose models have it."""
@@ -109,38 +107,31 @@ class MechanismInModels:
         return values
 
 
-_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # the hooks that each class overrides
-
-
-def _overridden(mechanism_type: type[Mechanism]) -> frozenset[str]:
-    if mechanism_type not in _HOOKS:
-        _HOOKS[mechanism_type] = frozenset(
-            name for name in dir(Mechanism) if getattr(mechanism_type, name) is not getattr(Mechanism, name)
-        )
-    return _HOOKS[mechanism_type]
-
-
 _POSITION = 2  # two more variables: the contact's x and y
-_MATERIAL = "on_declared", "on_material"
+_CONTACT = Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT
 
 Part = tuple[Indices, Response]  # which points, and their response
 
 
 class FrfModels:
-    """Several models of the same conditions and skin."""
+    """Several models of the same conditions and skin.
+
+    Attributes: `at_stage`, the mechanisms of each stage that move predictions; `nuisances`, indices (models,) of d33
+    and of the factors on the declared values.
+    """
 
     def __init__(self, models: Sequence[FrfModel]) -> None:
         """Find which models have which mechanism, and which press the same contacts."""
         self._models = tuple(models)
         self._count = max(len(model.parameters) for model in models)
         self._log = np.zeros((len(models), self._count), dtype=bool)
-        self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].nuisance_indices}
+        self.nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].nuisance_indices}
         mechanisms: dict[Hashable, MechanismInModels] = {}
         self._alike: dict[Hashable, list[int]] = {}
         for number, model in enumerate(models):
             self._log[number, : len(model.parameters)] = [parameter.scale == "log" for parameter in model.parameters]
             for name, index in model.nuisance_indices.items():
-                self._nuisances[name][number] = index
+                self.nuisances[name][number] = index
             for mechanism in model.mechanisms:
                 indices = model.parameter_indices(mechanism)
                 key = mechanism.name, tuple(indices)
@@ -150,8 +141,10 @@ class FrfModels:
                     )
                 mechanisms[key].add(number, indices)
             self._alike.setdefault(model.structure, []).append(number)
-        self._mechanisms = sorted(mechanisms.values(), key=_composition_order)
-        self._with_hook: dict[str, list[MechanismInModels]] = {}
+        self.at_stage: dict[Stage, list[MechanismInModels]] = {}
+        for candidate in sorted(mechanisms.values(), key=lambda candidate: candidate.mechanism.rank):
+            if candidate.mechanism.moves_predictions:
+                self.at_stage.setdefault(candidate.mechanism.stage, []).append(candidate)
 
     def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
         """The responses at points (points, parameters) of these models, in rising order of `owner`, in parts of some
@@ -168,28 +161,23 @@ class FrfModels:
             if present:
                 rows = {number: np.arange(edges[number], edges[number + 1]) for number in present}
                 for points, contacts in self._pressed(rows, seeds):
-                    level, inside = self._level_and_inside(self._models[present[0]], points, contacts, seeds)
-                    of_lines = self._line_factor(self._models[present[0]], points, contacts, seeds) if lines else None
-                    parts.append((points, _response(level, inside, of_lines, seeds)))
+                    pressed = _Pressed(self, self._models[present[0]], points, contacts, seeds)
+                    parts.append((points, pressed.response(lines=lines)))
         return parts
 
     def _pressed(self, rows: dict[int, Indices], seeds: ParameterBatch) -> list[tuple[Indices, Contacts]]:
         """The contacts of these models' points, declared values changed by the mechanisms, grouped by structure."""
         sets: dict[tuple[MechanismInModels, ...], list[int]] = {}
         for number in rows:
-            key = tuple(
-                candidate for candidate in self._mechanisms if candidate.has[number] and candidate.has_hook(*_MATERIAL)
-            )
+            at_contact = (candidate for stage in _CONTACT for candidate in self.at_stage.get(stage, ()))
+            key = tuple(candidate for candidate in at_contact if candidate.has[number])
             sets.setdefault(key, []).append(number)
         groups: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
         for acting, numbers in sets.items():
             points = np.concatenate([rows[number] for number in numbers])
             contacts = self._contacts(self._models[numbers[0]], points, seeds)
-            acting_values = [(candidate.mechanism, candidate.values(points, seeds)) for candidate in acting]
-            for mechanism, values in acting_values:
-                mechanism.on_declared(contacts, values)
-            for mechanism, values in acting_values:
-                mechanism.on_material(contacts, values)
+            for candidate in acting:
+                candidate.mechanism.act(contacts, candidate.values(points, seeds))
             needs_layer = contacts.layered or self._models[numbers[0]].needs_stiffness
             for subset, part in _split_by_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
                 layer = layer_of(part) if needs_layer else as_in_the_table(part)
@@ -204,7 +192,7 @@ class FrfModels:
     def _contacts(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Contacts:
         """The declared contacts at all force nodes, one node after another."""
         nodes, design = len(model.force), model.design
-        factors = {name: seeds.of(points, indices) for name, indices in self._nuisances.items() if name != "d33"}
+        factors = {name: seeds.of(points, indices) for name, indices in self.nuisances.items() if name != "d33"}
         return Contacts(
             force=model.force.ravel(),
             indenter_radius=np.tile(design.indenter_radius, nodes),
@@ -214,45 +202,58 @@ class FrfModels:
             poisson_ratio=constant(model.poisson_ratio, seeds.variables, (len(points),)),
         )
 
-    def _acting(
-        self, hook: str, points: Indices, seeds: ParameterBatch
-    ) -> Iterator[tuple[Mechanism, Indices | None, Values]]:
-        """The mechanisms with this hook, each with the indices of the points whose models have it (None: all) and
-        their values."""
-        if hook not in self._with_hook:
-            self._with_hook[hook] = [candidate for candidate in self._mechanisms if candidate.has_hook(hook)]
-        owner = seeds.owner[points]
-        for candidate in self._with_hook[hook]:
-            subset = np.flatnonzero(candidate.has[owner])
-            if len(subset) == len(points):
-                yield candidate.mechanism, None, candidate.values(points, seeds)
-            elif len(subset):
-                yield candidate.mechanism, subset, candidate.values(points[subset], seeds)
 
-    def _level_and_inside(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
-    ) -> tuple[Differentiated, Mask]:
-        """The FRF before the dynamics [C/N], and which recordings are inside the table, at points of one contact
-        structure; `model` is one of their models."""
-        sigma, inside = self._sigma_at_points(model, points, contacts, seeds)
-        level = self._level(model, points, contacts, sigma, seeds).spread(len(model.design.point))
-        return level, np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, model.design.point]
+@dataclass(frozen=True)
+class _Pressed:
+    """Contacts of one structure at some of the points; `model` is one of those that press them."""
 
-    def _sigma_at_points(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
-    ) -> tuple[list[Differentiated], Mask]:
+    models: FrfModels
+    model: FrfModel
+    points: Indices
+    contacts: Contacts
+    seeds: ParameterBatch
+
+    def response(self, *, lines: bool) -> Response:
+        """The response, with the derivatives by the contact's position separate from the others; without `lines` no
+        line factors."""
+        sigma, inside = self._sigma()
+        level = self._level(sigma).spread(len(self.model.design.point))
+        factor = self._line_factor() if lines else None
+        seeds, position_slopes = self.seeds, None
+        count = seeds.variables - len(seeds.position)
+        if seeds.position:
+            position_slopes = level.slopes[count:]
+        if factor is not None:
+            factor = Differentiated(factor.value, factor.slopes[:count])
+        inside = np.broadcast_to(inside, (len(self.points), inside.shape[-1]))[:, self.model.design.point]
+        return Response(Differentiated(level.value, level.slopes[:count]), position_slopes, factor, inside)
+
+    def _acted(self, stage: Stage, sigma: Differentiated | None = None) -> Iterator[tuple[FrfState, Indices | None]]:
+        """What each mechanism of this stage made of the state, with the indices of the points whose models have it
+        (None: all)."""
+        owner = self.seeds.owner[self.points]
+        for candidate in self.models.at_stage.get(stage, ()):
+            having = np.flatnonzero(candidate.has[owner])
+            if not len(having):
+                continue
+            subset = None if len(having) == len(owner) else having
+            values = candidate.values(self.points if subset is None else self.points[subset], self.seeds)
+            state = FrfState(self.model.design, self.contacts.at_points(subset))
+            state.sigma = None if sigma is None else sigma.at_points(subset)
+            candidate.mechanism.act(state, values)
+            yield state, subset
+
+    def _sigma(self) -> tuple[list[Differentiated], Mask]:
         """σ at each position for each force node, and which positions are inside the table at all of them.
 
         Inside includes that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
         """
+        model, contacts = self.model, self.contacts
         design, table = model.design, model.sigma
-        if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
-            of_contacts = self._of_pressed(model, contacts)
-        else:
-            of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
+        of_contacts = self._of_pressed()
         nodes, positions = len(model.force), len(design.point_contact)
         contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
-        offset = self._offset(model, points, seeds) / contacts.thickness
+        offset = self._offset() / contacts.thickness
         repeated = np.tile(np.arange(positions), nodes)
         sigma = of_contacts.at(contact, offset.spread(positions)[repeated] if nodes > 1 else offset)
         near = (offset.value <= table.end) & (offset.value + of_contacts.rho.value <= PROFILE_END)
@@ -262,10 +263,10 @@ class FrfModels:
             sigma
         ], inside
 
-    def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
-        """σ of contacts other than the table's, or whose stiffness is needed."""
-        table = model.sigma
-        layer = None
+    def _of_pressed(self) -> SigmaOfContacts:
+        """σ of the contacts under their forces, which sets their stiffness where it is needed."""
+        model, contacts = self.model, self.contacts
+        table, layer = model.sigma, None
         if contacts.layered or model.needs_stiffness:
             layer = layer_curves(table.contact_grid, layer_of(contacts))
         pressed = press(contacts, layer if contacts.layered else None)
@@ -273,16 +274,14 @@ class FrfModels:
             contacts.stiffness = stiffness(contacts, pressed, layer)
         return SigmaOfContacts(table, contacts, model.sensor_radius, pressed, layer if contacts.layered else None)
 
-    def _offset(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Differentiated:
+    def _offset(self) -> Differentiated:
         """The distance of each contact from its sensor's centre [m], with derivatives by position where it varies."""
-        design = model.design
-        moved = [
-            (subset, mechanism.offset(values)) for mechanism, subset, values in self._acting("offset", points, seeds)
-        ]
+        design, seeds, count = self.model.design, self.seeds, len(self.points)
+        moved = [(subset, state.shift) for state, subset in self._acted(Stage.POSITION)]
         if not (seeds.position or moved):
-            distance = np.tile(np.hypot(design.point_x, design.point_y), (len(points), 1))
+            distance = np.tile(np.hypot(design.point_x, design.point_y), (count, 1))
             return Differentiated(distance, np.zeros((seeds.variables, *distance.shape)))
-        still = constant(0.0, seeds.variables, (len(points),))
+        still = constant(0.0, seeds.variables, (count,))
         x, y = (
             coordinate + shift
             for coordinate, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
@@ -290,75 +289,53 @@ class FrfModels:
         for subset, shift in moved:
             if shift is not None:
                 x, y = (
-                    coordinate.plus(displacement, subset, len(points))
+                    coordinate.plus(displacement, subset, count)
                     for coordinate, displacement in zip((x, y), shift, strict=True)
                 )
         distance = np.hypot(x.value, y.value)
         away = np.where(distance > 0, distance, 1.0)
         return chain(distance, (x.value / away, x), (y.value / away, y))
 
-    def _level(
-        self, model: FrfModel, points: Indices, contacts: Contacts, sigma: list[Differentiated], seeds: ParameterBatch
-    ) -> Differentiated:
+    def _level(self, sigma: list[Differentiated]) -> Differentiated:
         """The FRF of each recording before the dynamics [C/N]."""
-        design, count = model.design, len(points)
-        mobility_values = {mechanism.name: values for mechanism, _, values in self._acting("mobility", points, seeds)}
+        model, design, count = self.model, self.model.design, len(self.points)
         oscillating = sigma[0]
-        for mechanism, nodes, weights in model.increments:
-            rate = sigma[nodes[0]] * weights[0][design.point_contact]
-            for node, weight in zip(nodes[1:], weights[1:], strict=True):
-                rate = rate + sigma[node] * weight[design.point_contact]
-            oscillating = oscillating + mechanism.mobility(mobility_values[mechanism.name]) * (rate - oscillating)
-        rho = model.sensor_radius / contacts.thickness
-        charge = oscillating * (1.5e-12 * seeds.of(points, self._nuisances["d33"]) * rho * rho)
-        for mechanism, subset, values in self._acting("on_d33", points, seeds):
-            mean_stress = sigma[0] * (1.5 / np.pi * design.force[design.point_contact]) / (contacts.thickness**2.0)
-            charge = charge.times(mechanism.on_d33(mean_stress.at_points(subset), values), subset, count)
+        for state, subset in self._acted(Stage.LOAD_INCREMENT):
+            assert state.factor is not None
+            first_harmonic = sigma[1] * model.weights[0][design.point_contact]
+            for node, weight in zip(sigma[2:], model.weights[1:], strict=True):
+                first_harmonic = first_harmonic + node * weight[design.point_contact]
+            oscillating = oscillating.plus(state.factor * (first_harmonic - sigma[0]).at_points(subset), subset, count)
+        rho = model.sensor_radius / self.contacts.thickness
+        charge = oscillating * (1.5e-12 * self.seeds.of(self.points, self.models.nuisances["d33"]) * rho * rho)
+        for state, subset in self._acted(Stage.SENSOR, sigma[0]):
+            charge = charge.times(state.factor, subset, count)
         level = charge[design.point]
-        for mechanism, subset, values in self._acting("neighbour_fraction", points, seeds):
-            fraction = mechanism.neighbour_fraction(values)
-            if fraction is not None:
+        for state, subset in self._acted(Stage.NEIGHBOURS):
+            if state.factor is not None:
                 neighbours = charge.at_points(subset)[design.neighbour_point]
-                theirs = fraction * sum_rows(neighbours, design.neighbour_recording, len(design.point))
+                theirs = state.factor * sum_rows(neighbours, design.neighbour_recording, len(design.point))
                 level = level.plus(theirs, subset, count)
-        for mechanism, subset, values in self._acting("on_recordings", points, seeds):
-            level = level.times(mechanism.on_recordings(design, values), subset, count)
+        for state, subset in self._acted(Stage.RECORDING):
+            level = level.times(state.factor, subset, count)
         return level
 
-    def _line_factor(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
-    ) -> Differentiated | None:
+    def _line_factor(self) -> Differentiated | None:
         """The complex factor of each distinct line; None without any such mechanism."""
         product: Differentiated | None = None
-        count, lines = len(points), len(model.design.line_frequency)
-        for mechanism, subset, values in self._acting("on_lines", points, seeds):
-            factor = mechanism.on_lines(model.design, contacts.at_points(subset), values)
+        count, lines = len(self.points), len(self.model.design.line_frequency)
+        for state, subset in self._acted(Stage.LINES):
+            factor = state.factor
             if product is None and subset is None:
                 product = factor
             elif factor is not None:
                 base = (
-                    constant(np.ones(1, dtype=complex), seeds.variables, (count,)).spread(lines)
+                    constant(np.ones(1, dtype=complex), self.seeds.variables, (count,)).spread(lines)
                     if product is None
                     else product
                 )
                 product = base.times(factor, subset, count)
         return product
-
-
-def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: ParameterBatch) -> Response:
-    """The response, with the derivatives by the contact's position separate from the others."""
-    count, position_slopes = seeds.variables - len(seeds.position), None
-    if seeds.position:
-        position_slopes = level.slopes[count:]
-    if lines is not None:
-        lines = Differentiated(lines.value, lines.slopes[:count])
-    return Response(Differentiated(level.value, level.slopes[:count]), position_slopes, lines, inside)
-
-
-def _composition_order(candidate: MechanismInModels) -> tuple[int, int, str]:
-    """The sort key of the order of composition."""
-    mechanism = candidate.mechanism
-    return mechanism.stage.position, mechanism.order, mechanism.name
 
 
 def _split_by_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
@@ -372,6 +349,10 @@ def _split_by_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indic
 _ROOM = 1.01  # beyond the thickness' bounds
 FAINT = 1e-12  # of the largest response, below which a recording has no direction
 _QUANTITIES = 6  # of a linear layer's contact
+_NODES, _MORE_NODES = 3, 6  # of the quadrature; the three are exact for charges of the fourth degree in the force
+_LARGE = 0.4  # of the preload: a dynamic force beyond which three nodes err by more than 1e-4 of σ
+_SMALL = 1e-3  # of the preload: a dynamic force used for the limit of 0; the error is of second order
+_LEAST_FORCE = 1e-6  # of the preload, for a sphere that has left the skin
 
 
 class FrfModel:
@@ -380,25 +361,16 @@ class FrfModel:
     Rows are all lines of all recordings, one recording after another.
     """
 
-    def __init__(
-        self,
-        mechanisms: Sequence[Mechanism],
-        conditions: Conditions,
-        table: SigmaTable,
-        further_mechanisms: Sequence[Mechanism] = (),
-    ) -> None:
-        """Compute all that no parameter changes.
-
-        `further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well.
-        """
+    def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions, table: SigmaTable) -> None:
+        """Compute all that no parameter changes."""
         self._composition = Composition(mechanisms, conditions, "frf", frf_nuisances(conditions.skin))
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self.mechanisms = self._composition.mechanisms
-        fields = {field for mechanism in mechanisms for field in (*mechanism.needs_fields, *mechanism.reads_fields)}
-        fields |= {"id" for mechanism in mechanisms if mechanism.tells_recordings_apart}
-        neighbours = any(mechanism.needs_neighbours for mechanism in mechanisms)
-        self.design = design = frf_design(conditions, fields, neighbours=neighbours)
+        stages = {mechanism.stage for mechanism in mechanisms}
+        fields = {field for mechanism in mechanisms for field in mechanism.reads}
+        fields |= {"dynamic_force_n"} if Stage.LOAD_INCREMENT in stages else set()
+        self.design = design = frf_design(conditions, fields, neighbours=Stage.NEIGHBOURS in stages)
         self.recording = design.recording
         self.sensor: Indices | None = design.sensor
         skin = conditions.skin
@@ -406,18 +378,19 @@ class FrfModel:
         self.thickness = _required("thickness_mm", skin.thickness_mm)
         self.sensor_radius = _required("sensor_radius_mm", skin.sensor_radius_mm)
         self.poisson_ratio = skin.poisson_ratio
-        room = (*mechanisms, *further_mechanisms)
-        further = max((mechanism.largest_offset for mechanism in room), default=0.0)
         bounds = max(
             max(1 / parameter.low, parameter.high) for parameter in self.parameters if parameter.name == "thickness"
         )
-        stretch = _ROOM * bounds * max((mechanism.largest_stretch for mechanism in room), default=1.0)
-        offset_range = min(PROFILE_END, stretch * largest_offset(design, further) / self.thickness)
+        stretch = _ROOM * bounds * LARGEST_STRETCH
+        farthest = largest_offset(design, 1e-3 * LARGEST_OFFSET_MM * np.sqrt(2))
+        offset_range = min(PROFILE_END, stretch * farthest / self.thickness)
         self.sigma = offset_sigma(table, self.sensor_radius / self.thickness, stretch, offset_range)
-        self.needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)
-        pickups = [mechanism.pickup(conditions, design) for mechanism in self.mechanisms]
-        self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
-        self.force, self.increments = _force_nodes(self.mechanisms, design)
+        self.needs_stiffness = "stiffness" in fields
+        self.pickup: Pickup | None = together(_pickups(mechanisms, design))
+        self.force, self.weights = design.force[None], np.zeros((0, len(design.force)))
+        if Stage.LOAD_INCREMENT in stages:
+            forces, self.weights = first_harmonic(design.force, design.dynamic_force)
+            self.force = np.concatenate([self.force, forces])
         self._table, self._conditions = table, conditions
 
     @cached_property
@@ -447,7 +420,7 @@ class FrfModel:
         fit = np.asarray(fit, dtype=float)
         if fit.ndim != 1:
             raise InvalidInput("fit", fit.shape, "must be one point: (parameters,)", code=ErrorCode.UNEQUAL_LENGTHS)
-        values, _, _ = self._composition.values(fit)
+        values, _ = self._composition.values(fit)
         response = self.respond(fit, slopes=slopes, place=place)
         value, by_all = response.on_rows(self.design)
         count = len(response.level.slopes)
@@ -479,13 +452,12 @@ class FrfModel:
         """The approximate size of a response's largest arrays with derivatives by `variables`: limits the points
         computed at once."""
         contacts, lines = len(self.force.ravel()), len(self.design.line_frequency)
-        return _QUANTITIES * contacts * self.sigma.wavenumbers + 2 * (1 + variables) * lines
+        return _QUANTITIES * contacts * len(self.sigma.wave_numbers[0]) + 2 * (1 + variables) * lines
 
     @property
     def structure(self) -> Hashable:
         """A key that is equal for models that press the same contacts and need the same quantities of them."""
-        increments = tuple(mechanism.name for mechanism, _, _ in self.increments)
-        return self.design, self.sigma, self.needs_stiffness, increments
+        return self.design, self.sigma, self.needs_stiffness, len(self.weights)
 
     @property
     def nuisance_indices(self) -> Mapping[str, int]:
@@ -521,19 +493,28 @@ class FrfModel:
         return near
 
 
-def _force_nodes(
-    mechanisms: Sequence[Mechanism], design: FrfDesign
-) -> tuple[Floats, list[tuple[Mechanism, list[int], Array]]]:
-    """Forces (nodes, contacts), the preload first, and for each mechanism with `force_nodes` its nodes and their
-    weights."""
-    forces = [design.force]
-    increments = []
+def first_harmonic(force: Floats, dynamic_force: Floats) -> tuple[Floats, Floats]:
+    """Quadrature of the first harmonic of F σ(F) under an oscillating force, over its amplitude.
+
+    Gauss–Chebyshev for (2/π) ∫₋₁¹ (F + Fd s) σ(F + Fd s) s/√(1 − s²) ds / Fd: forces [N] (nodes, contacts), and their
+    weights of σ (nodes, contacts), which hold the force at the node.
+    """
+    amplitude = np.maximum(dynamic_force, _SMALL * force)
+    nodes = _NODES if (amplitude < _LARGE * force).all() else _MORE_NODES
+    s = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)[:, None]
+    s = s[np.abs(s[:, 0]) > 1e-9]  # the middle one of three has no weight
+    forces = np.maximum(force + amplitude * s, _LEAST_FORCE * force)
+    return forces, 2 / nodes * s * forces / amplitude
+
+
+def _pickups(mechanisms: Sequence[Mechanism], design: FrfDesign) -> list[Pickup]:
+    """The charge from elsewhere of each mechanism that adds it."""
+    states = []
     for mechanism in mechanisms:
-        nodes = mechanism.force_nodes(design.force, design.dynamic_force)
-        if nodes is not None:
-            increments.append((mechanism, list(range(len(forces), len(forces) + len(nodes[0]))), nodes[1]))
-            forces += list(nodes[0])
-    return np.stack(forces), increments
+        if mechanism.stage is Stage.ADDED_CHARGE:
+            states.append(FrfState(design))
+            mechanism.act(states[-1], {})
+    return [state.pickup for state in states if state.pickup is not None]
 
 
 def _by_name(values_by_mechanism: dict[str, Values]) -> dict[str, Floats]:

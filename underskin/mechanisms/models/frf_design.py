@@ -53,6 +53,8 @@ def together(pickups: Sequence[Pickup]) -> Pickup | None:
     return Pickup(rows, deviation)
 
 
+# What mechanisms and tables must have room for: each component of an offset, and a factor on the thickness
+LARGEST_OFFSET_MM, LARGEST_STRETCH = 2.0, 1.55
 NEIGHBOUR_PITCHES = 1.2
 _SPARSE = 8  # contacts times frequencies for each row, beyond which most were not measured
 

@@ -51,6 +51,7 @@ from scipy.interpolate import CubicSpline
 from underskin.autodiff import constant, contiguous
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Values
+from underskin.mechanisms.laws.adhesion import Adhesion as AdhesionLaw
 from underskin.mechanisms.models.composition import (
     STRAIN_SHARE,
     contact_point,
@@ -58,9 +59,8 @@ from underskin.mechanisms.models.composition import (
     required_modulus,
     thickness_parameter,
 )
-from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
+from underskin.mechanisms.models.curve_state import Curve, Relaxation, Samples, memories, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
-from underskin.mechanisms.models.relaxation import Relaxation, memories
 from underskin.mechanisms.models.sphere_kernels import (
     contact_rows,
     creep_edge_rows,
@@ -69,11 +69,11 @@ from underskin.mechanisms.models.sphere_kernels import (
     radius_rows,
 )
 from underskin.mechanisms.parameter import Parameter
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
-from underskin.recordings.curve_course import curve_landmarks, touch
+from underskin.recordings.curve_course import curve_landmarks, snap_in_interval, touch, visible_contact
 from underskin.recordings.modulus import estimate
 from underskin.surrogate.contact_table import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
@@ -104,7 +104,7 @@ class LayerRatios:
     def __init__(self, poisson_ratio: float) -> None:
         """Solve the layer of this Poisson ratio at the nodes (about a millisecond)."""
         alpha = np.linspace(0.0, LARGEST_A_OVER_H, _NODES)
-        ratios = _grid().curves(Layer(poisson_ratio)).ratios_at(np.maximum(alpha, 1e-9))
+        ratios = curves_of(Layer(poisson_ratio)).ratios_at(np.maximum(alpha, 1e-9))
         columns = np.concatenate([ratios, load_contact().softening_coefficients(alpha)], axis=1)
         self.cubics = np.ascontiguousarray(CubicSpline(alpha, columns).c.transpose(1, 0, 2))
         root = alpha * np.sqrt(ratios[:, 1])
@@ -128,12 +128,6 @@ def _half_space() -> Floats:
     cubics = np.zeros((1, 1, 4, 7))
     cubics[0, 0, 3, 4:] = load_contact().softening_coefficients(np.zeros(()))
     return cubics
-
-
-@cache
-def _grid() -> CurveGrid:
-    """A grid of one wave number: stresses are not needed."""
-    return CurveGrid(np.ones(1))
 
 
 @dataclass(frozen=True)
@@ -441,7 +435,8 @@ class IndentationModel(CurveModel):
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
         recordings = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
-        nuisances = _nuisances(recordings, conditions.skin)
+        sticks = any(mechanism.name == AdhesionLaw.name for mechanism in mechanisms)
+        nuisances = _nuisances(recordings, conditions.skin, sticks)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
         self._ids = [recording.id for recording in recordings]
         stiffnesses = [recording.stage_stiffness_n_per_mm for recording in recordings]
@@ -449,6 +444,14 @@ class IndentationModel(CurveModel):
             :, None
         ]  # m/N
         self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
+        contacts = [_visible_contact(recording) for recording in recordings]
+        self._seen = np.array([contact is not None for contact in contacts])[:, None]
+        none = [np.zeros(len(recording.displacement_mm)) for recording in recordings]
+        columns = [
+            column if contact is None else column + contact for column, contact in zip(none, contacts, strict=True)
+        ]
+        self._seen_contact = self._arranged(columns) > 0
+        self.hidden_jumps = sticks and not bool(self._seen.all())
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
         deepest = self.displacement.max(axis=1) - 1e-3 * middles
         self._deep = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
@@ -463,7 +466,7 @@ class IndentationModel(CurveModel):
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
         )
         for mechanism in self._mechanisms:
-            mechanism.on_curve(curve, values[mechanism.name])
+            mechanism.act(curve, values[mechanism.name])
         return curve
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
@@ -490,12 +493,17 @@ class IndentationModel(CurveModel):
             force = np.where(travel > 0, sphere.at(a)[0], 0.0)
             return force, travel > 0, sphere.inside(a) | (travel <= 0)
         if contact_mask is None:
-            contact_mask = in_contact(travel, self._last_travel(sphere, adhesion.separation))
+            contact_mask = self._as_seen(in_contact(travel, self._last_travel(sphere, adhesion.separation)))
         a = edges(
             sphere, travel, contact_mask, adhesion.work, adhesion.separation if curve.work_of_separation else None
         )
         force = np.where(contact_mask, sphere.force_at(travel, a), 0.0)
         return force, contact_mask, sphere.inside(a) | ~contact_mask
+
+    def _as_seen(self, contact_mask: Mask) -> Mask:
+        """The contact between snap-in and pull-off of the curves that show both: jumps are events, whose place no law
+        of equilibrium predicts to a sample."""
+        return np.where(self._seen, self._seen_contact, contact_mask)
 
     def _last_travel(self, sphere: Sphere, work: Floats) -> Floats:
         """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage known to be
@@ -519,7 +527,8 @@ class IndentationModel(CurveModel):
         path = _with_touch(travel, self.time)
         force, own_contact = force_on(path)
         own_contact = own_contact & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
-        contact_mask = own_contact if contact_mask is None else contact_mask
+        if contact_mask is None:
+            contact_mask = own_contact if adhesion is None else self._as_seen(own_contact)
         force = np.where(contact_mask, force, 0.0)
         if sphere.layers is None:  # a half space, which has no tables to leave
             return force, contact_mask, np.ones_like(contact_mask)
@@ -565,8 +574,18 @@ def _with_touch(travel: Floats, time: Floats) -> Path:
     return Path(travel, time, first_contact)
 
 
-def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescription) -> list[Parameter]:
-    """The nuisance parameters; raises InvalidInput where no measured curve loads, or one does not move."""
+def _visible_contact(recording: IndentationConditions) -> Mask | None:
+    """As `visible_contact`; None of conditions alone."""
+    if not isinstance(recording, IndentationRecording):
+        return None
+    return visible_contact(recording.displacement_mm, recording.force_n, recording.time_s)
+
+
+def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescription, sticks: bool) -> list[Parameter]:
+    """The nuisance parameters; raises InvalidInput where no measured curve loads, or one does not move.
+
+    Where the contact `sticks`, a visible snap-in bounds the contact point.
+    """
     estimates, contact_points, refused = [], [], None
     for recording in recordings:
         span = float(np.ptp(to_si("displacement_mm", recording.displacement_mm)))
@@ -586,7 +605,13 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
                 contact = float(to_si("displacement_mm", touch(recording.displacement_mm, features.snap_in)))
             if refused is not None and span == 0:
                 raise refused
-        contact_points.append(contact_point(recording.id, contact, _CONTACT_SD * span, _CONTACT_BOUND * span))
+        sd, bound = _CONTACT_SD * span, _CONTACT_BOUND * span
+        if sticks and isinstance(recording, IndentationRecording):
+            interval = snap_in_interval(recording.displacement_mm, recording.force_n, recording.time_s)
+            if interval is not None:
+                before, contact, after = (float(to_si("displacement_mm", place)) for place in interval)
+                sd, bound = 0.5 * (after - before), after - before
+        contact_points.append(contact_point(recording.id, contact, sd, bound))
     if refused is not None and not estimates:
         raise refused
     thickness = [] if skin.thickness_mm is None else [thickness_parameter(skin)]

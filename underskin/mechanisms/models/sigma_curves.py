@@ -19,15 +19,13 @@ a/h = 4.2); beyond the profile's end, r/h = 8, the stress is 0 (below 1e-6 of it
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import j0
 
-from underskin.autodiff import Differentiated, as_columns, chain, contiguous, unfilled
+from underskin.autodiff import Differentiated, chain, contiguous, log
 from underskin.mechanisms.models.contact_state import Contacts, PressedContacts
 from underskin.physics.contact_curves import ContactCurves, CurveGrid
 from underskin.physics.elastic_layer import Layer
@@ -35,122 +33,22 @@ from underskin.physics.hankel_transform import disc_average
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.surrogate.contact_table import load_contact
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.tensor_spline import CubicAxis, TensorSpline, joined
 from underskin.units import Floats, Indices, Mask
-
-_DEGREE = 3
-
-
-class CubicBasis:
-    """The cubic splines through values at `nodes` (not-a-knot ends).
-
-    Attributes: `to_coefficients` (functions, nodes); `knots`, the ends of the cells; `cubics` (cells, powers,
-    functions), the four functions of each cell in the distance from its lower knot, lowest power first.
-    """
-
-    def __init__(self, nodes: Floats) -> None:
-        """Write each basis function of each cell as a cubic in the distance from the cell's lower knot."""
-        self.nodes = nodes
-        interpolating = make_interp_spline(nodes, np.eye(len(nodes)), k=_DEGREE)
-        self.to_coefficients = np.asarray(interpolating.c)
-        knots = np.asarray(interpolating.t)
-        count = len(knots) - _DEGREE - 1
-        self.knots = knots[_DEGREE:-_DEGREE]
-        basis = BSpline(knots, np.eye(count), _DEGREE)
-        powers = [np.asarray(basis(self.knots[:-1], nu=order)) / math.factorial(order) for order in range(4)]
-        cells = np.arange(len(self.knots) - 1)[:, None]
-        self.cubics = np.ascontiguousarray(np.stack([power[cells, cells + np.arange(4)] for power in powers], axis=1))
-
-    def coefficients(self, values: Floats, axis: int) -> Floats:
-        """The spline's coefficients, along one axis of the values."""
-        return np.moveaxis(np.tensordot(self.to_coefficients, values, (1, axis)), 0, axis)
-
-    def weights(self, at: Floats) -> tuple[Indices, Floats, Floats]:
-        """For each point (…): the index of the first of its four functions, their values (…, 4) and their slopes (…,
-        4).
-
-        Beyond the nodes every function is continued along its tangent.
-        """
-        inside = np.minimum(np.maximum(at, self.nodes[0]), self.nodes[-1])
-        cell = np.searchsorted(self.knots[1:-1], inside, side="right")
-        u = inside - self.knots[cell]
-        square = u * u
-        powers = np.empty((*u.shape, 2, 4))
-        powers[..., 0, 0], powers[..., 0, 1], powers[..., 0, 2], powers[..., 0, 3] = 1.0, u, square, square * u
-        powers[..., 1, 0], powers[..., 1, 1], powers[..., 1, 2], powers[..., 1, 3] = 0.0, 1.0, 2 * u, 3 * square
-        weights = powers @ self.cubics[cell]
-        value, slope = weights[..., 0, :], weights[..., 1, :]
-        beyond = at - inside
-        return cell, value + slope * beyond[..., None] if beyond.any() else value, slope
-
 
 PROFILE_END = 8.0
 _SPACING = 0.0625  # of the profile and of the offsets; the profile turns over lengths of 0.3 h and more
 _MIRRORED = 4  # offsets below 0, so that the curve is even
-_RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
 _RHO_RATIO = 1.1  # of neighbouring rT/h in the table
 _WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
 PANEL = 16  # wave numbers in each of several equal panels
 
 
-@dataclass(frozen=True)
-class _Splines:
-    """A tensor product of cubic splines in a/h, L^(1/3), ln(rT/h) and e/h; 0 beyond `end` of the last.
-
-    Attributes: `coefficients` (a/h, L^(1/3), ln(rT/h), e/h); `bases` of these axes.
-    """
-
-    coefficients: Floats
-    bases: tuple[CubicBasis, CubicBasis, CubicBasis, CubicBasis]
-    end: float
-
-    @cached_property
-    def ends(self) -> Floats:
-        """The lowest and highest value along each axis (4, 2)."""
-        ends = np.array([[basis.nodes[0], basis.nodes[-1]] for basis in self.bases])
-        ends[3, 1] = self.end
-        return ends
-
-    @cached_property
-    def axes(self) -> list[Floats]:
-        """Knots and cubics of each axis in turn."""
-        return [part for basis in self.bases for part in (basis.knots, basis.cubics)]
-
-    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> Mask:
-        """Which contacts lie inside; the others are continued."""
-        return np.asarray((a_over_h <= self.ends[0, 1]) & (cbrt_load <= self.ends[1, 1]))
-
-    def at(
-        self,
-        contact: Indices,
-        a_over_h: Differentiated,
-        cbrt_load: Differentiated,
-        rt_over_h: Differentiated,
-        offset: Differentiated,
-    ) -> Differentiated:
-        """Values at rows (…, rows) of these contacts (rows,) and offsets e/h (…, rows)."""
-        from underskin.mechanisms.models.sigma_kernels import table_sigma
-
-        variables = self._within(a_over_h), cbrt_load, rt_over_h, offset
-        points = np.broadcast_shapes(*(variable.value.shape[:-1] for variable in variables))
-        result = unfilled(len(offset.slopes), (*points, len(contact)))
-        columns = [array for variable in (*variables, result) for array in as_columns(variable)]
-        table_sigma(self.coefficients, self.ends, *self.axes, contact, *columns)
-        return result
-
-    def _within(self, a_over_h: Differentiated) -> Differentiated:
-        """a/h, beyond the end e replaced by e (3 − (e/a)²)/2: the tangent there is then one over 1/a²."""
-        end = self.ends[0, 1]
-        beyond = np.maximum(a_over_h.value / end, 1.0)
-        if (beyond == 1.0).all():
-            return a_over_h
-        value = np.where(beyond > 1.0, end * (1.5 - 0.5 * beyond**-2), a_over_h.value)
-        return chain(value, (beyond**-3, a_over_h))
-
-
 class OffsetSigma:
     """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h).
 
-    Attributes: `hertz`, σ of the table; `end`, the largest offset e/h, beyond which σ is 0.
+    Attributes: `hertz`, σ of the table, a spline in a/h, L^(1/3), ln(rT/h) and e/h; `end`, the largest offset e/h,
+    beyond which σ is 0.
     """
 
     def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> None:
@@ -161,60 +59,60 @@ class OffsetSigma:
         rho = np.asarray(rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes), dtype=np.float64)
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
-        radial_basis = CubicBasis(radii)
-        self._of_rho, self._of_offset = of_rho, of_offset = CubicBasis(np.log(rho)), CubicBasis(offsets)
+        radial = CubicAxis(radii)
+        self._of_rho, self._of_offset = of_rho, of_offset = CubicAxis(np.log(rho)), CubicAxis(offsets)
+        self._offset_axis = joined([of_offset])
         self.end = min(float(offsets[-1]), PROFILE_END)
         # Splines and averages are all linear: the smaller arrays are turned into coefficients before their product
-        average = np.stack([_disc_averages(radial_basis, np.abs(offsets), ratio) for ratio in rho])
+        average = np.stack([radial.disc_averages(np.abs(offsets), ratio) for ratio in rho])
         self._radii, self._average = radii, of_offset.coefficients(of_rho.coefficients(average, 0), 1)
         self.hertz = self._splines(*table.contact_axes, table.profile_over(radii))
-        self._turns = float(offsets[-1] + rho[-1] + table.contact_axes[0][-1])
+        self._farthest = float(offsets[-1] + rho[-1] + table.contact_axes[0][-1])
 
-    def _splines(self, a_over_h: Floats, cbrt_load: Floats, profile: Floats) -> _Splines:
+    def _splines(self, a_over_h: Floats, cbrt_load: Floats, profile: Floats) -> TensorSpline:
         """The disc averages of a profile (a, L^(1/3), radii)."""
-        of_a, of_x = CubicBasis(a_over_h), CubicBasis(cbrt_load)
+        of_a, of_x = CubicAxis(a_over_h), CubicAxis(cbrt_load)
         coefficients = of_x.coefficients(of_a.coefficients(profile, 0), 1)
-        coefficients = np.ascontiguousarray(np.tensordot(coefficients, self._average, (2, 2)))
-        return _Splines(coefficients, (of_a, of_x, self._of_rho, self._of_offset), self.end)
+        coefficients = np.tensordot(coefficients, self._average, (2, 2))
+        return TensorSpline((of_a, of_x, self._of_rho, self._of_offset), coefficients)
 
     @cached_property
-    def hertz_strain(self) -> _Splines:
+    def hertz_strain(self) -> TensorSpline:
         """The effect of finite strain under Hertz' pressure: the first coefficient over L^(1/3) is the value at L =
         0, and splines sum to 1."""
         table = self.hertz.coefficients
-        return replace(self.hertz, coefficients=np.ascontiguousarray(table - table[:, :1]))
+        return TensorSpline(self.hertz.axes, table - table[:, :1])
 
     @cached_property
-    def contact_strain(self) -> _Splines:
+    def contact_strain(self) -> TensorSpline:
         """The effect of finite strain in contact with the linear layer."""
         table = load_contact()
         return self._splines(*table.contact_axes, table.profile_over(self._radii))
 
     @cached_property
-    def _wavenumbers(self) -> tuple[Floats, Floats]:
-        return _wavenumbers(self._turns)
+    def wave_numbers(self) -> tuple[Floats, Floats]:
+        """k [1/h] at which `linear_at` takes transforms, and their weights.
 
-    @property
-    def wavenumbers(self) -> int:
-        """The number of wave numbers."""
-        return PANEL * _panels(self._turns)
-
-    @property
-    def wavenumber(self) -> Floats:
-        """k [1/h] at which `linear_at` takes transforms."""
-        return self._wavenumbers[0]
+        Gauss–Legendre nodes on panels of [0, end], short enough for the fastest oscillation.
+        """
+        turns = _WAVENUMBER_END * self._farthest / (2 * np.pi)
+        panels = int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
+        x, w = np.polynomial.legendre.leggauss(PANEL)
+        half = _WAVENUMBER_END / panels / 2
+        k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
+        return k.ravel(), np.tile(half * w, panels)
 
     @cached_property
     def _bessel(self) -> Floats:
         """J0(k e) k/3 with the weights of the integral, as functions of the offset (functions, k)."""
-        k, weight = self._wavenumbers
+        k, weight = self.wave_numbers
         bessel = j0(np.multiply.outer(k, self._of_offset.nodes)) * (weight * k / 3)[:, None]
         return np.ascontiguousarray(self._of_offset.coefficients(bessel, 1).T)
 
     @cached_property
     def contact_grid(self) -> CurveGrid:
-        """The grid for contacts with a layer, whose pressure transforms are at `wavenumber`."""
-        return CurveGrid(self.wavenumber)
+        """The grid for contacts with a layer, whose pressure transforms are at `wave_numbers`."""
+        return CurveGrid(self.wave_numbers[0])
 
     def linear_at(self, transforms: Floats, contact: Indices, offset: Floats, points: tuple[int, ...]) -> Floats:
         """Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts (rows,)
@@ -224,8 +122,8 @@ class OffsetSigma:
         result = np.empty((len(transforms) + 1, *points, len(contact)))
         linear_sigma(
             self._bessel,
-            self.hertz.ends[3],
-            *self.hertz.axes[6:],
+            self.end,
+            self._offset_axis,
             contact,
             contiguous(transforms.reshape(len(transforms), -1, *transforms.shape[-2:])),
             contiguous(offset.reshape(-1, offset.shape[-1])),
@@ -244,42 +142,6 @@ def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_o
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
-def _disc_averages(radial_basis: CubicBasis, offsets: Floats, rt_over_h: float) -> Floats:
-    """The matrix (offsets, radii) that averages a profile given at its radii over the offset disc; 0 beyond them."""
-    from underskin.mechanisms.models.sigma_kernels import disc_averages
-
-    x, weight = np.polynomial.legendre.leggauss(_RADIAL)
-    radius = rt_over_h * (x + 1) / 2
-    cosine = np.cos(np.pi * (np.arange(_ANGULAR) + 0.5) / _ANGULAR)
-    total = np.zeros((len(offsets), len(radial_basis.nodes)))
-    disc_averages(
-        offsets,
-        radius,
-        weight * (x + 1) / 2 / _ANGULAR,
-        cosine,
-        radial_basis.nodes[-1],
-        radial_basis.knots,
-        radial_basis.cubics,
-        total,
-    )
-    return total @ radial_basis.to_coefficients
-
-
-def _panels(highest: float) -> int:
-    """The number of panels of [0, end] that resolve an oscillation over this distance."""
-    turns = _WAVENUMBER_END * highest / (2 * np.pi)
-    return int(np.ceil((turns * _NODES_PER_TURN + 48) / PANEL))
-
-
-def _wavenumbers(highest: float) -> tuple[Floats, Floats]:
-    """Gauss–Legendre nodes and weights on panels of [0, end], short enough for the fastest oscillation."""
-    panels = _panels(highest)
-    x, w = np.polynomial.legendre.leggauss(PANEL)
-    half = _WAVENUMBER_END / panels / 2
-    k = 2 * half * np.arange(panels)[:, None] + half * (1 + x)
-    return k.ravel(), np.tile(half * w, panels)
-
-
 class SigmaOfContacts:
     """σ of all contacts at any offset from them.
 
@@ -291,28 +153,26 @@ class SigmaOfContacts:
         sigma: OffsetSigma,
         contacts: Contacts,
         sensor_radius: float,
-        pressed: PressedContacts | None = None,
+        pressed: PressedContacts,
         layer: ContactCurves | None = None,
     ) -> None:
-        """`pressed` for contacts other than the table's; `layer` for contact with the layer itself: all contacts are
-        then on the same layer."""
+        """`layer` for contact with the layer itself: all contacts are then on the same layer."""
         self._sigma = sigma
-        self._sensor_radius, self._thickness = sensor_radius, contacts.thickness
         self.rho = sensor_radius / contacts.thickness
-        a, x = _spheres(contacts) if pressed is None else (pressed.a_over_h, pressed.cbrt_load)
-        self._variables = [a, x, self.rho]
-        self._splines = sigma.hertz
+        self._variables = [pressed.a_over_h, pressed.cbrt_load, self.rho]
+        self._spline = sigma.hertz
         self._linear: Floats | None = None
-        if pressed is not None and (layer is not None or not as_in_the_table(contacts)):
-            self._linear, further = _transforms(sigma.wavenumber, contacts, pressed, self.rho.value, layer)
+        if layer is not None or not as_in_the_table(contacts):
+            self._linear, further = _transforms(sigma.wave_numbers[0], contacts, pressed, self.rho.value, layer)
             self._variables += further
-            self._splines = sigma.hertz_strain if layer is None else sigma.contact_strain
-        self.inside = self._splines.contains(a.value, x.value)
+            self._spline = sigma.hertz_strain if layer is None else sigma.contact_strain
+        widest, strongest = (axis.nodes[-1] for axis in self._spline.axes[:2])
+        self.inside: Mask = (pressed.a_over_h.value <= widest) & (pressed.cbrt_load.value <= strongest)
 
     def at(self, contact: Indices, offset: Differentiated) -> Differentiated:
         """σ (…, points) at these offsets e/h from these contacts (points,)."""
         a, x, rho, *further = self._variables
-        sigma = self._splines.at(contact, a, x, rho, offset)
+        sigma = self._spline.at(self._within(a), x, log(rho), offset, chosen=contact, end=self._sigma.end)
         if self._linear is None:
             return sigma
         points = sigma.value.shape[:-1]
@@ -320,22 +180,14 @@ class SigmaOfContacts:
         variables = (variable[contact] for variable in (a, rho, *further))
         return sigma + chain(linear, (by_offset, offset), *zip(partial, variables, strict=bool(partial)))
 
-
-def _spheres(contacts: Contacts) -> tuple[Differentiated, Differentiated]:
-    """a/h and L^(1/3) of contacts of the kind that the table holds."""
-    from underskin.mechanisms.models.sigma_kernels import spheres
-
-    modulus, thickness = contacts.modulus, contacts.thickness
-    shape = max(len(modulus.value), len(thickness.value)), len(contacts.force)
-    a, x = (unfilled(len(modulus.slopes), shape) for _ in range(2))
-    spheres(
-        contacts.force,
-        contacts.indenter_radius,
-        *as_columns(modulus),
-        *as_columns(thickness),
-        *(a.value, a.slopes, x.value, x.slopes),
-    )
-    return a, x
+    def _within(self, a_over_h: Differentiated) -> Differentiated:
+        """a/h, beyond the end e replaced by e (3 − (e/a)²)/2: the tangent there is then one over 1/a²."""
+        end = self._spline.axes[0].nodes[-1]
+        beyond = np.maximum(a_over_h.value / end, 1.0)
+        if (beyond == 1.0).all():
+            return a_over_h
+        value = np.where(beyond > 1.0, end * (1.5 - 0.5 * beyond**-2), a_over_h.value)
+        return chain(value, (beyond**-3, a_over_h))
 
 
 def layer_of(contacts: Contacts) -> Layer:

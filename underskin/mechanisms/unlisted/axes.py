@@ -12,29 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
+from underskin.mechanisms.unlisted.vocabulary import AXES
 from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
 from underskin.recordings.readers.calendar_times import time_zone
 from underskin.units import Floats
 
 _SAME = 1e-9  # of the range, within which values are one level
-UNITS: Mapping[str, str] = {
-    "preload_n": "N",
-    "previous_preload_n": "N",
-    "indenter_radius_mm": "mm",
-    "dynamic_force_n": "N",
-    "load_cycles": "cycles",
-    "dwell_s": "s",
-    "recorded_at": "h",
-    "time_of_day": "h",
-    "order": "-",
-    "x_mm": "mm",
-    "y_mm": "mm",
-    "sensor": "-",
-    "displacement_mm": "mm",
-    "force_n": "N",
-    "time_s": "s",
-}
-BUILT_IN = tuple(UNITS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +37,7 @@ class Axis:
     @property
     def unit(self) -> str:
         """The unit of its values, one of UNITS of mechanisms."""
-        return "-" if self.relative else UNITS.get(self.name, "-")
+        return "-" if self.relative or self.name not in AXES else AXES[self.name][2]
 
     @cached_property
     def levels(self) -> Floats:

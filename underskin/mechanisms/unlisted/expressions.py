@@ -9,7 +9,7 @@ a step where the sphere turns back.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from operator import add
 from typing import ClassVar
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Kind, Stage, Values
-from underskin.mechanisms.models.curve_state import Curve, Samples
+from underskin.mechanisms.models.curve_state import Curve, SampleLaw, Samples
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.unlisted.axes import Axis
 from underskin.mechanisms.unlisted.forms import EVERYWHERE, Feature, Shape, reference, shapes
@@ -77,55 +77,28 @@ class CurveLaw(UnlistedLaw):
         }.get(acts_on, ("-", _RELATIVE, 1.0))
         amplitudes = changes("law_change", unit, share * largest, shape.count, _MOST / share)
         self.amplitudes = tuple(parameter.name for parameter in amplitudes)
-        self.parameters_bound = (*amplitudes, *shape.shape_parameters)
+        self.parameters_stated = (*amplitudes, *shape.shape_parameters)
         self.grid = shape.points
 
-    def on_curve(self, curve: Curve, values: Values) -> None:
+    def act(self, state: Curve, values: Values) -> None:
         """Add the law at these parameter values to the curve's laws."""
         sample_values = {name: of_samples(value) for name, value in values.items()}
-        curve.laws.append(_Bound(self, sample_values))
+        state.laws.append(SampleLaw(self.description.acts_on, partial(self._change, sample_values)))
 
     def features(self, samples: Samples, force: Floats, values: Values) -> Sequence[Feature]:
         """The features at samples (points, curves, samples) where the contact force is `force` [N]."""
-        return self.shape.features(self._axis_values(samples, force), values)
+        origins = self._extent.turn_times if self.shape.variant == TURN else self._extent.start_times
+        return self.shape.features(samples.along(self.axis.name, force, origins), values)
 
-    def _axis_values(self, samples: Samples, force: Floats) -> Floats:
-        """The axis at each sample."""
-        if self.axis.name == "displacement_mm":
-            return np.asarray(1e3 * np.maximum(samples.travel, 0.0))
-        if self.axis.name == "force_n":
-            return np.maximum(force, 0.0)
-        origin = self._extent.turn_times if self.shape.variant == TURN else self._extent.start_times
-        return np.asarray(samples.time - np.array([origin[name] for name in samples.ids])[:, None])
-
-
-@dataclass(frozen=True)
-class _Bound:
-    """A law at values of its parameters (points, 1, 1)."""
-
-    law: CurveLaw
-    values: Values
-
-    def pressed_travel(self, samples: Samples, travel: Floats) -> Floats:
-        """The travel [m] at which a sphere presses."""
-        if self.law.description.acts_on != "position":
-            return travel
-        return travel + 1e-3 * self._change(samples, np.zeros_like(travel))
-
-    def measured_force(self, samples: Samples, force: Floats) -> Floats:
-        """The measured force [N] where the contact force is `force`."""
-        if self.law.description.acts_on == "position":
-            return force
-        change = self._change(samples, force)
-        return force + change if self.law.description.acts_on == "force" else force * (1 + change)
-
-    def _change(self, samples: Samples, force: Floats) -> Floats:
-        features = self.law.features(samples, force, self.values)
+    def _change(self, values: Values, samples: Samples, force: Floats) -> Floats:
+        """What is added to the force or the travel, or the factor on the force."""
+        features = self.features(samples, force, values)
         parts = [
-            self.values[name].value * (feature.value if isinstance(feature, Differentiated) else feature)
-            for name, feature in zip(self.law.amplitudes, features, strict=True)
+            values[name].value * (feature.value if isinstance(feature, Differentiated) else feature)
+            for name, feature in zip(self.amplitudes, features, strict=True)
         ]
-        return np.asarray(reduce(add, parts))
+        total = np.asarray(reduce(add, parts))
+        return total if self.description.acts_on in ("force", "position") else 1 + total
 
 
 def curve_laws(extent: Extent, *, timed: bool) -> list[tuple[CurveLaw, float]]:

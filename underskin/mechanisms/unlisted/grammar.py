@@ -13,16 +13,16 @@ A law found on one campaign applies to other recordings of the skin within its r
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import add
 
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp, log
-from underskin.mechanisms.base import Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.base import Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.mechanisms.unlisted.axes import BUILT_IN, Axis, axes_of, every_axis
+from underskin.mechanisms.unlisted.axes import Axis, axes_of, every_axis
 from underskin.mechanisms.unlisted.forms import Shape, constant, shapes
 from underskin.mechanisms.unlisted.laws import (
     LAG_KINDS,
@@ -32,29 +32,18 @@ from underskin.mechanisms.unlisted.laws import (
     LevelTables,
     RecordingLaw,
     UnlistedLaw,
+    changes,
 )
-from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form
+from underskin.mechanisms.unlisted.vocabulary import AXES, ActsOn, Form
 from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Mask
 
-_REASON = "nothing is known of it; as large as what is usually left out"
 _BAND = "anywhere within the measured band"
 _BELOW = 30.0  # times below the band a corner may lie whose phase still shows in it
 _BUMPS, _BUMP_WIDTH = 8, 0.55  # of a free response; width over the distance of neighbours
 
 Factor = Callable[[Floats, Values], Differentiated]  # at frequencies [Hz]
-
-
-@dataclass(frozen=True, eq=False)
-class _Law:
-    form: Form
-    variant: str
-    amplitudes: tuple[Parameter, ...]
-    shape_parameters: tuple[Parameter, ...]
-    grid: Sequence[Sequence[float]]
-    factor: Factor
-    share: float = 1.0
 
 
 class FrequencyLaw(UnlistedLaw):
@@ -63,27 +52,35 @@ class FrequencyLaw(UnlistedLaw):
     stage = Stage.LINES
     order = 210
 
-    def __init__(self, law: _Law, middle: float) -> None:
-        """`middle` of the band [Hz], to which powers refer."""
-        self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", law.form, law.variant])
-        self.description = LawDescription("frequency_response", "frequency_hz", law.form)
-        self.variant = law.variant
-        self.share = law.share
-        self.amplitudes = tuple(parameter.name for parameter in law.amplitudes)
-        self.parameters_bound = (*law.amplitudes, *law.shape_parameters)
-        self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
-        self.factor = law.factor
-        self.middle_hz = middle
+    middle_hz: float  # of the band, to which powers refer
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-        """The factor on each distinct line."""
-        return self.factor(design.line_frequency, values)
+    def __init__(
+        self,
+        form: Form,
+        variant: str,
+        amplitudes: tuple[Parameter, ...],
+        shape_parameters: tuple[Parameter, ...],
+        grid: Sequence[Sequence[float]],
+        factor: Factor,
+        share: float = 1.0,
+    ) -> None:
+        """`factor` at frequencies, as a function of the amplitudes and the shape parameters."""
+        self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", form, variant])
+        self.description = LawDescription("frequency_response", "frequency_hz", form)
+        self.variant, self.share, self.factor = variant, share, factor
+        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
+        self.parameters_stated = (*amplitudes, *shape_parameters)
+        self.grid = np.array(grid, dtype=float).reshape(len(grid), -1)
+
+    def act(self, state: FrfState, values: Values) -> None:
+        """Set the factor on each distinct line."""
+        state.factor = self.factor(state.design.line_frequency, values)
 
     def tangents(self, frequency: Floats) -> Array:
         """∂ ln factor by each amplitude at 0, at the grid of the shape parameters (points, frequencies, amplitudes)."""
         points, count = len(self.grid), len(self.amplitudes)
         values: dict[str, Differentiated] = {}
-        for number, parameter in enumerate(self.parameters_bound):
+        for number, parameter in enumerate(self.parameters_stated):
             slopes = np.zeros((count, points, 1))
             value = np.zeros((points, 1))
             if number < count:
@@ -103,11 +100,14 @@ def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
         return []
     middle = float(np.sqrt(low * high))
     laws = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
-    return [FrequencyLaw(law, middle) for law in laws]
+    for law in laws:
+        law.middle_hz = middle
+    return laws
 
 
 def _amplitude(sd: float, name: str = "law_change") -> Parameter:
-    return Parameter(name, "-", -6 * sd, 6 * sd, Normal(0.0, sd), "linear", 0.0, _REASON)
+    (amplitude,) = changes(name, "-", sd, 1)
+    return amplitude
 
 
 def _corner(low: float, high: float, name: str = "law_corner") -> Parameter:
@@ -118,7 +118,7 @@ def _over_band(low: float, high: float, count: int) -> list[float]:
     return np.linspace(np.log(low), np.log(high), count).tolist()
 
 
-def _phases(middle: float) -> list[_Law]:
+def _phases(middle: float) -> list[FrequencyLaw]:
     """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a dispersive delay; and a pure delay."""
     exponent = Parameter(
         "law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴", closed=(0.0,)
@@ -132,10 +132,13 @@ def _phases(middle: float) -> list[_Law]:
 
     grid = [(value,) for value in (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)]
     lag = _amplitude(0.2, "law_lag")
-    return [_Law("power", "phase", (lag,), (exponent,), grid, factor), _Law("linear", "delay", (lag,), (), [()], late)]
+    return [
+        FrequencyLaw("power", "phase", (lag,), (exponent,), grid, factor),
+        FrequencyLaw("linear", "delay", (lag,), (), [()], late),
+    ]
 
 
-def _powers(low: float, high: float, middle: float) -> list[_Law]:
+def _powers(low: float, high: float, middle: float) -> list[FrequencyLaw]:
     """Minimum phase: (if)^n; a step from 1 to 1 + A; beyond a corner (1 + if/f1)^n; below one (1 + f1/(if))^(−n)."""
 
     def power(frequency: Floats, values: Values) -> Differentiated:
@@ -156,14 +159,14 @@ def _powers(low: float, high: float, middle: float) -> list[_Law]:
     from_below = [(at,) for at in _over_band(low / _BELOW, high, 8)]
     order = _amplitude(0.7, "law_exponent")
     return [
-        _Law("power", "magnitude", (_amplitude(0.15, "law_exponent"),), (), [()], power),
-        _Law("saturating", "step", (_amplitude(0.3),), (corner,), grid, step),
-        _Law("threshold", "corner", (order,), (corner,), grid, beyond, 0.5),
-        _Law("threshold", "high_pass", (order,), (lower,), from_below, beneath, 0.5),
+        FrequencyLaw("power", "magnitude", (_amplitude(0.15, "law_exponent"),), (), [()], power),
+        FrequencyLaw("saturating", "step", (_amplitude(0.3),), (corner,), grid, step),
+        FrequencyLaw("threshold", "corner", (order,), (corner,), grid, beyond, 0.5),
+        FrequencyLaw("threshold", "high_pass", (order,), (lower,), from_below, beneath, 0.5),
     ]
 
 
-def _peaks(low: float, high: float) -> list[_Law]:
+def _peaks(low: float, high: float) -> list[FrequencyLaw]:
     """A resonance at one frequency in all recordings, added to the response: 1 + A u²/(1 − u² + 2iζu), and variants."""
     corner = _corner(0.8 * low, 1.25 * high, "law_centre")
     damping = Parameter("law_damping", "-", 5e-3, 1.0, Normal(-2.8, 1.0), "log", None, "sharp to broad")
@@ -178,18 +181,18 @@ def _peaks(low: float, high: float) -> list[_Law]:
         "spring": lambda *_: 1.0,
     }
 
-    def of(name: str) -> _Law:
+    def of(name: str) -> FrequencyLaw:
         def factor(frequency: Floats, values: Values) -> Differentiated:
             u = frequency / values["law_centre"]
             numerator = numerators[name](u, values)
             return 1.0 + values["law_change"] * (numerator / (1.0 - u * u + 2j * values["law_damping"] * u))
 
-        return _Law("peak", name, (_amplitude(0.2),), (corner, damping), grid, factor, 1 / len(numerators))
+        return FrequencyLaw("peak", name, (_amplitude(0.2),), (corner, damping), grid, factor, 1 / len(numerators))
 
     return [of(name) for name in numerators]
 
 
-def _echo(low: float, high: float) -> _Law:
+def _echo(low: float, high: float) -> FrequencyLaw:
     """1 + A e^(−2πif/f1): an echo, whose ripples recur every f1."""
     spacing = _corner(2.2 * (high - low) / 60, 2 * (high - low), "law_period")
 
@@ -198,27 +201,21 @@ def _echo(low: float, high: float) -> _Law:
 
     turns = np.arange(1.0, 14.0, 0.5)
     grid = [(float(np.log((high - low) / turn)),) for turn in turns.tolist()]
-    return _Law("periodic", "echo", (_amplitude(0.15),), (spacing,), grid, factor)
+    return FrequencyLaw("periodic", "echo", (_amplitude(0.15),), (spacing,), grid, factor)
 
 
-def _free(low: float, high: float) -> _Law:
+def _free(low: float, high: float) -> FrequencyLaw:
     """ln |FRF| a sum of bumps over ln f, the phase by Kramers and Kronig."""
     centres = np.linspace(np.log(low), np.log(high), _BUMPS)
     width = _BUMP_WIDTH * (centres[1] - centres[0])
     names = tuple(f"law_change_{number + 1}" for number in range(_BUMPS))
 
     def factor(frequency: Floats, values: Values) -> Differentiated:
-        total: Differentiated | None = None
         away = (np.log(frequency) - centres[:, None]) / width
-        for name, log_magnitude, phase in zip(
-            names, np.exp(-0.5 * away**2), phase_of_bump(away, float(width)), strict=True
-        ):
-            part = values[name] * (log_magnitude + 1j * phase)
-            total = part if total is None else total + part
-        assert total is not None
-        return exp(total)
+        bumps = np.exp(-0.5 * away**2) + 1j * phase_of_bump(away, float(width))
+        return exp(reduce(add, [values[name] * bump for name, bump in zip(names, bumps, strict=True)]))
 
-    return _Law("free", "minimum_phase", tuple(_amplitude(0.1, name) for name in names), (), [()], factor)
+    return FrequencyLaw("free", "minimum_phase", tuple(_amplitude(0.1, name) for name in names), (), [()], factor)
 
 
 @lru_cache(maxsize=8)
@@ -286,26 +283,24 @@ class Grammar:
         conditions: Conditions,
         frequency: Floats,
         table: SigmaTable,
-        further_mechanisms: Sequence[Mechanism],
         listed: Collection[str],
     ) -> "Grammar":
         """The laws for FRFs at these distinct lines [Hz].
 
-        `further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well. `listed`: names of
-        mechanisms; a law that one of them describes exactly is left out.
+        `listed`: names of mechanisms; a law that one of them describes exactly is left out.
         """
         laws: list[UnlistedLaw] = []
         shares: list[float] = []
         axes = axes_of(conditions) if len(conditions.recordings) >= _LEAST_RECORDINGS else []
-        columns = [axis for axis in axes if axis.name not in BUILT_IN]
-        tables = LevelTables(conditions, table, further_mechanisms)
+        columns = [axis for axis in axes if axis.name not in AXES]
+        tables = LevelTables(conditions, table)
         lines = np.unique(frequency)
         for axis in axes:
-            share = 1.0 if axis.name in BUILT_IN else _COLUMNS / len(columns)
+            share = 1.0 if axis.name in AXES else _COLUMNS / len(columns)
             for law in [*_over_recordings(axis, lines, tables, listed), *_constants(axis, axes, tables, listed)]:
                 laws.append(law)
                 shares.append(share * _share(law))
-        total = sum(1.0 for axis in axes if axis.name in BUILT_IN) + (_COLUMNS if columns else 0.0)
+        total = sum(1.0 for axis in axes if axis.name in AXES) + (_COLUMNS if columns else 0.0)
         log_shares = np.log(np.array(shares) / max(total, 1.0)) if shares else np.zeros(0)
         over_frequency = frequency_laws(lines) if len(lines) >= _LEAST_LINES else []
         frequency_shares = [_FREQUENCY * _share(law) for law in over_frequency]
@@ -352,7 +347,7 @@ def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, listed: Collection[s
     if axis.name == "sensor":
         return acts_on in ("thickness", "modulus") or (acts_on == "gain" and _SENSORS_GAIN not in listed)
     if acts_on == "position":
-        return axis.name in _POSITION_AXES or axis.name not in BUILT_IN
+        return axis.name in _POSITION_AXES or axis.name not in AXES
     if acts_on == "force":  # a force that is scaled is a modulus that is
         return not shape.logarithmic and axis.name not in ("preload_n", "indenter_radius_mm", "x_mm", "y_mm")
     return True
@@ -362,9 +357,7 @@ _ROUNDING = 1e-9  # of the range, by which a value may lie beyond it
 CAMPAIGN_SPECIFIC_AXES = ("order",)  # axes without meaning for other recordings
 
 
-def bound_to(
-    law: UnlistedLaw, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]
-) -> tuple[UnlistedLaw, Mask]:
+def bound_to(law: UnlistedLaw, conditions: Conditions, table: SigmaTable) -> tuple[UnlistedLaw, Mask]:
     """The law on these recordings, and which of them (recordings,) lie in its range.
 
     A recording beyond the range, or without a value on its axis, is predicted at the end of the range.
@@ -375,7 +368,7 @@ def bound_to(
     axis, inside = _on(law.axis, conditions, ids)
     if isinstance(law, LagLaw):
         return law.on(axis), inside
-    return law.on(axis, LevelTables(conditions, table, further_mechanisms)), inside
+    return law.on(axis, LevelTables(conditions, table)), inside
 
 
 def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, Mask]:

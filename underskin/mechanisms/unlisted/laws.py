@@ -12,7 +12,8 @@ Laws are bound to the recordings of a campaign; they are mechanisms like any oth
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
+from operator import add
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
@@ -20,9 +21,8 @@ from scipy.interpolate import CubicSpline
 
 from underskin.autodiff import Differentiated, chain, exp
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.unlisted.axes import Axis
 from underskin.mechanisms.unlisted.forms import Feature, Shape
@@ -74,11 +74,11 @@ class Curve:
 class LevelTables:
     """Tables for the recordings of one campaign, by their ids; each is computed on first use."""
 
-    def __init__(self, conditions: Conditions, table: SigmaTable, further_mechanisms: Sequence[Mechanism]) -> None:
-        """`further_mechanisms`: those for whose offsets and thicknesses σ is tabulated as well."""
+    def __init__(self, conditions: Conditions, table: SigmaTable) -> None:
+        """Tabulate nothing yet."""
         recordings = [recording.without_measurements(frequency_hz=_ANY_LINE) for recording in frf_of(conditions)]
         self._conditions = Conditions(conditions.name, conditions.skin, tuple(recordings))
-        self._table, self._further_mechanisms = table, tuple(further_mechanisms)
+        self._table = table
         self._row_numbers = {recording.id: number for number, recording in enumerate(recordings)}
         self.force = {recording.id: recording.preload_n for recording in recordings}
         self._curves: dict[str, Curve] = {}
@@ -112,7 +112,7 @@ class LevelTables:
 
     @cached_property
     def _model(self) -> FrfModel:
-        return FrfModel((), self._conditions, self._table, self._further_mechanisms)
+        return FrfModel((), self._conditions, self._table)
 
     @cached_property
     def _start(self) -> Floats:
@@ -134,9 +134,7 @@ class LevelTables:
             replace(recording, indenter_radius_mm=recording.indenter_radius_mm * float(np.exp(s)))
             for recording in frf_of(self._conditions)
         ]
-        model = FrfModel(
-            (), Conditions("radius", self._conditions.skin, tuple(recordings)), self._table, self._further_mechanisms
-        )
+        model = FrfModel((), Conditions("radius", self._conditions.skin, tuple(recordings)), self._table)
         fit = self._start.copy()
         fit[model.nuisance_indices["youngs_modulus"]] -= 2 * s
         return model.respond(fit, slopes=False).level.value
@@ -166,9 +164,7 @@ class LevelTables:
             for number, key in enumerate(distinct)
             for index, radius in enumerate(radii.tolist())
         ]
-        model = FrfModel(
-            (), Conditions("places", self._conditions.skin, tuple(placed)), self._table, self._further_mechanisms
-        )
+        model = FrfModel((), Conditions("places", self._conditions.skin, tuple(placed)), self._table)
         levels = model.respond(self._start, slopes=False).level.value.reshape(len(distinct), -1)
         return Curve.of(radii, _over(levels[[distinct.index(key) for key in keys]].T, self._base))
 
@@ -222,7 +218,6 @@ class UnlistedLaw(Mechanism):
     law = "See its expression."
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]] = ()
-    begins_at_guesses = True
     description: LawDescription
     share: float
     grid: Floats
@@ -230,16 +225,10 @@ class UnlistedLaw(Mechanism):
     log_share: float = 0.0  # in the prior of an unlisted law
     screened_fits: tuple[Floats, ...] = ()  # fit coordinates from screenings
 
-    def parameters(self, conditions: object, kind: Kind = "frf") -> tuple[Parameter, ...]:
-        """The bound parameters, whatever the campaign."""
-        return self.parameters_bound
-
-    parameters_bound: tuple[Parameter, ...]
-
     def guesses(self, conditions: object, kind: Kind) -> Sequence[Sequence[float]]:
         """The fits of screenings that found it."""
         return [
-            [parameter.from_fit(at) for parameter, at in zip(self.parameters_bound, fit.tolist(), strict=True)]
+            [parameter.from_fit(at) for parameter, at in zip(self.parameters_stated, fit.tolist(), strict=True)]
             for fit in self.screened_fits
         ]
 
@@ -271,7 +260,7 @@ class RecordingLaw(UnlistedLaw):
             usual = usual / 2
         amplitudes = changes("law_change", self._unit, usual, count)
         self.amplitudes = tuple(parameter.name for parameter in amplitudes)
-        self.parameters_bound = (*amplitudes, *shape.shape_parameters)
+        self.parameters_stated = (*amplitudes, *shape.shape_parameters)
         self.grid = shape.points
 
     def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
@@ -284,22 +273,26 @@ class RecordingLaw(UnlistedLaw):
         """Of recordings (…, recordings)."""
         return self.shape.features(self.axis.of(ids), values)
 
-    def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
-        """The factor on each recording."""
-        features = self.features(design.ids, values)
-        rows = self._rows(design.ids)
+    def act(self, state: FrfState, values: Values) -> None:
+        """Set the factor on each recording."""
+        state.factor = self.factor(state.design.ids, values)
+
+    def factor(self, ids: tuple[str, ...], values: Values) -> Differentiated:
+        """The factor on each of these recordings."""
+        features = self.features(ids, values)
+        rows = self._rows(ids)
         if self._acts_on == "position":
             half = len(self.amplitudes) // 2
             x, y = (
-                _summed([values[name] * feature for name, feature in zip(names, features, strict=True)])
+                reduce(add, [values[name] * feature for name, feature in zip(names, features, strict=True)])
                 for names in (self.amplitudes[:half], self.amplitudes[half:])
             )
             return self.tables.moved(rows, x, y)
-        change = _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
+        change = reduce(add, [values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
         if self.shape.logarithmic:
             log = change
         elif self._acts_on == "force":
-            force = np.array([self.tables.force[name] for name in design.ids])
+            force = np.array([self.tables.force[name] for name in ids])
             log = log_positive(change / force)
         else:
             log = log_positive(change)
@@ -344,13 +337,6 @@ def log_of(quantity: Differentiated) -> Differentiated:
     return chain(value, (1 / np.where(inside, factor, _LEAST), quantity))
 
 
-def _summed(parts: Sequence[Differentiated]) -> Differentiated:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total
-
-
 @lru_cache(maxsize=64)
 def changes(name: str, unit: str, usual: float, count: int, most: float = _MOST) -> tuple[Parameter, ...]:
     """This many changes, each with the typical size as prior sd; bounded by `most` times that."""
@@ -377,7 +363,7 @@ class LagLaw(UnlistedLaw):
 
     stage = Stage.LINES
     order = 200
-    tells_recordings_apart = True
+    reads = ("id",)
 
     def __init__(self, kind: LagKind, axis: Axis, shape: Shape, lines: Floats) -> None:
         """Over the band of these lines [Hz]."""
@@ -391,7 +377,7 @@ class LagLaw(UnlistedLaw):
         power = shape.logarithmic
         lags = changes("law_lag", "-", usual, shape.count)
         self.amplitudes = tuple(parameter.name for parameter in lags)
-        self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.shape_parameters)
+        self.parameters_stated = (*lags, *([_EXPONENT] if power else []), *shape.shape_parameters)
         self.grid = _EXPONENTS if power else shape.points
 
     def on(self, axis: Axis) -> "LagLaw":
@@ -405,14 +391,15 @@ class LagLaw(UnlistedLaw):
         features = self.shape.features(self.axis.of(ids), values)
         if self.shape.logarithmic:
             features = [exp(values["law_exponent"] * features[0])]
-        return _summed([values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
+        return reduce(add, [values[name] * feature for name, feature in zip(self.amplitudes, features, strict=True)])
 
-    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
-        """The factor on each distinct line."""
+    def act(self, state: FrfState, values: Values) -> None:
+        """Set the factor on each distinct line."""
+        design = state.design
         ids = [design.ids[number] for number in design.contact_recording]
         lag = self.lag(ids, values).spread(len(ids))[design.line_contact]
         pattern = self.pattern(design.line_frequency)
-        return 1.0 / (1.0 - lag * pattern) if self.kind == "corner" else exp(lag * pattern)
+        state.factor = 1.0 / (1.0 - lag * pattern) if self.kind == "corner" else exp(lag * pattern)
 
     def pattern(self, frequency: Floats) -> Array:
         """∂ ln factor by the lag, where that is 0."""

@@ -1,22 +1,20 @@
 """Arithmetic on channels with units: `Piezo - Deflection`, `0.05 [N/m] * 'Deflection (nm)'` (`derived` of `rig/1`).
 
-A formula holds names of channels, in quotes where one is not a single word; numbers; a unit in brackets after either;
-`+ - * /`, a leading minus, and parentheses. It is parsed by Python's `ast`; everything else is rejected and nothing is
-executed. Both sides of a sum need one dimension; units are converted.
+A formula (expressions.py) holds names of channels, in quotes where one is not a single word; numbers; a unit in
+brackets after either. Both sides of a sum need one dimension; units are converted.
 """
 
 import ast
-import dataclasses
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers import text
+from underskin.recordings.readers.expressions import Expression, Grammar, name_of, read, source
 from underskin.recordings.readers.unit_labels import (
     Exponents,
     contradicts,
@@ -29,8 +27,11 @@ from underskin.recordings.readers.unit_labels import (
 )
 from underskin.recordings.validation import LONGEST_NAME, shown
 
-_FORM = "must be arithmetic on channels, such as Piezo - Deflection, 0.05 [N/m] * Deflection or -'Load cell'"
-_UNIT = "its unit in brackets, such as 0.05 [N/m]"
+_GRAMMAR = Grammar(
+    form="must be arithmetic on channels, such as Piezo - Deflection, 0.05 [N/m] * Deflection or -'Load cell'; a name "
+    "of several words in quotes, a number with its unit in brackets, such as 0.05 [N/m]",
+    longest=LONGEST_NAME,
+)
 
 
 @dataclass(frozen=True)
@@ -42,40 +43,15 @@ class Quantity:
     label: str = ""
 
 
-@dataclass(frozen=True)
-class Formula:
-    """A parsed formula: its text, the distinct names in it, and whether it adds or subtracts terms that both hold
-    names."""
-
-    text: str
-    names: tuple[str, ...]
-    is_sum: bool
-    tree: ast.expr = dataclasses.field(compare=False)  # of the text
-
-
 QuantityOf = Callable[[str, str | None], Quantity]  # quantity of a name and the unit stated after it
 
 
-def parse(field: str, text: str) -> Formula:
+def parse(field: str, text: str) -> Expression:
     """Parse a formula; raises InvalidInput that names the invalid term."""
-    if len(text) > LONGEST_NAME:
-        raise InvalidInput(field, shown(text), f"must have up to {LONGEST_NAME} characters")
-    text = text.strip()
-    try:
-        tree = ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        column = getattr(error, "offset", None)
-        place = f"; look at character {column}" if column else ""
-        allowed = f"{_FORM}; a name of several words in quotes, a number with {_UNIT}{place}"
-        raise InvalidInput(field, text, allowed) from None
-    if b"#" in text.encode()[tree.end_col_offset or 0 :]:  # to `ast` the rest is a comment
-        raise InvalidInput(field, text, f"{_FORM}; a name with # in quotes")
-    parser = _Parser(field, text)
-    parser.check(tree)
-    return Formula(text, tuple(dict.fromkeys(parser.names(tree))), parser.adds_names(tree), tree)
+    return read(text, field, _GRAMMAR)
 
 
-def evaluate(formula: Formula, quantity_of: QuantityOf, file: str, place: str) -> Quantity:
+def evaluate(formula: Expression, quantity_of: QuantityOf, file: str, place: str) -> Quantity:
     """Its value, (samples,) or a scalar; `quantity_of` gives the quantity of a name.
 
     Raises FileError that names the term whose unit or length does not fit.
@@ -84,79 +60,10 @@ def evaluate(formula: Formula, quantity_of: QuantityOf, file: str, place: str) -
         return _Evaluation(formula.text, quantity_of, file, place).of(formula.tree)
 
 
-def labels(formula: Formula) -> Iterator[str]:
+def labels(formula: Expression) -> Iterator[str]:
     """The units stated in it."""
     stated = (node for node in ast.walk(formula.tree) if isinstance(node, ast.Subscript))
-    return (_source(formula.text, node.slice) for node in stated)
-
-
-def _source(text: str, node: ast.expr) -> str:
-    return (ast.get_source_segment(text, node) or "").strip()
-
-
-def _name(text: str, node: ast.expr) -> str | None:
-    """The channel that a node names, as written (`ast` would normalise its letters); None for other nodes."""
-    if isinstance(node, ast.Name):
-        return _source(text, node)
-    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
-
-
-def _number(node: ast.expr) -> float | None:
-    """The number that a node is, infinite where a float cannot hold it; None for others."""
-    is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
-    return float(ast.literal_eval(node)) if is_number else None
-
-
-class _Parser:
-    """Rejects everything but arithmetic."""
-
-    def __init__(self, field: str, text: str) -> None:
-        self.field = field
-        self.text = text
-
-    def check(self, node: ast.expr) -> None:
-        """Raises InvalidInput at the first node that is not allowed."""
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div):
-            self.check(node.left)
-            self.check(node.right)
-        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            self.check(node.operand)
-        elif isinstance(node, ast.Subscript) and isinstance(node.value, ast.Constant | ast.Name):
-            self.check(node.value)
-            label = _source(self.text, node.slice)
-            if exponents(label) is None:
-                raise self._error(node, f"{label!r} is no unit that is known here, such as N, mm, V, pC or N/m")
-        elif _name(self.text, node) is None:
-            self._require_number(node)
-
-    def names(self, node: ast.expr) -> Iterator[str]:
-        """The names in it, from left to right, without units in brackets."""
-        name = _name(self.text, node)
-        if name is not None:
-            yield name
-        children = [node.value] if isinstance(node, ast.Subscript) else ast.iter_child_nodes(node)
-        for child in children:
-            if isinstance(child, ast.expr):
-                yield from self.names(child)
-
-    def adds_names(self, node: ast.expr) -> bool:
-        """Whether two terms that hold names are added or subtracted anywhere in it."""
-        sums = (
-            operation
-            for operation in ast.walk(node)
-            if isinstance(operation, ast.BinOp) and isinstance(operation.op, ast.Add | ast.Sub)
-        )
-        return any(all(any(self.names(side)) for side in (operation.left, operation.right)) for operation in sums)
-
-    def _require_number(self, node: ast.expr) -> None:
-        number = _number(node)
-        if number is None:
-            raise self._error(node, f"is not allowed; a formula {_FORM}")
-        if not math.isfinite(number):
-            raise self._error(node, "is too large a number")
-
-    def _error(self, node: ast.expr, reason: str) -> InvalidInput:
-        return InvalidInput(self.field, self.text, f"{shown(_source(self.text, node))}: {reason}")
+    return (source(formula.text, node.slice) for node in stated)
 
 
 class _Evaluation:
@@ -171,8 +78,8 @@ class _Evaluation:
     def of(self, node: ast.expr, label: str | None = None) -> Quantity:
         """The quantity of a node; `label`: the unit stated after it."""
         if isinstance(node, ast.Subscript):
-            return self.of(node.value, _source(self.text, node.slice))
-        name = _name(self.text, node)
+            return self.of(node.value, source(self.text, node.slice))
+        name = name_of(self.text, node)
         if name is not None:
             return self.quantity_of(name, label)
         if isinstance(node, ast.UnaryOp):
@@ -180,9 +87,7 @@ class _Evaluation:
             return Quantity(-operand.values, operand.dimension)
         if isinstance(node, ast.BinOp):
             return self._combined(node)
-        number = _number(node)
-        assert number is not None
-        return in_unit(number, label or "1")
+        return in_unit(float(ast.literal_eval(node)), label or "1")
 
     def _combined(self, node: ast.BinOp) -> Quantity:
         left, right = self.of(node.left), self.of(node.right)
@@ -207,7 +112,7 @@ class _Evaluation:
         return f"{self._source_of(node)} has {unit_words}"
 
     def _source_of(self, node: ast.expr) -> str:
-        return str(shown(_source(self.text, node)))
+        return str(shown(source(self.text, node)))
 
     def _error(self, reason: str) -> FileError:
         return FileError(self.file, self.place, reason)
@@ -227,7 +132,7 @@ FIELD = "derived"
 
 
 def with_derived(
-    contents: Contents, formulas: Mapping[str, Formula], stated: Callable[[Block], Stated], file: str
+    contents: Contents, formulas: Mapping[str, Expression], stated: Callable[[Block], Stated], file: str
 ) -> Contents:
     """The contents with the derived channels in every block that has the names of their formulas.
 
@@ -265,12 +170,12 @@ class _Derivation:
         self._place = ""
         self._labels: list[str] = []
 
-    def missing(self, formula: Formula) -> list[str]:
+    def missing(self, formula: Expression) -> list[str]:
         """Names of a formula that are neither channel, constant nor property."""
         scalars = {*self.stated, *self._constants}
         return [name for name in formula.names if name not in scalars and self._channel(name) is None]
 
-    def add(self, name: str, formula: Formula, place: str) -> None:
+    def add(self, name: str, formula: Expression, place: str) -> None:
         """Add the channel of a formula; a constant is used by later formulas only."""
         self._place, self._labels = place, []
         quantity = evaluate(formula, self._quantity, self.file, place)

@@ -1,42 +1,51 @@
-"""The spline at single points: the same numbers as SciPy's, and a table's `at` the same as its columns."""
+"""The tensor spline: the same numbers and slopes as SciPy's, and a table's `at` the same as its columns."""
 
 import itertools
 import math
 
 import numpy as np
 import pytest
-from scipy.interpolate import NdBSpline
+from scipy.interpolate import NdBSpline, make_interp_spline
 
 from underskin import load_table
-from underskin.surrogate.point_spline import PointSpline
-from underskin.surrogate.sigma_table import interpolation_coefficients
+from underskin.surrogate.tensor_spline import TensorSpline
+from underskin.units import Floats
 
 TABLE = load_table()
 GENERATOR = np.random.default_rng(3)
 AXES = [np.cumsum(GENERATOR.uniform(0.1, 1.0, count)) - 1 for count in (7, 9, 6)]
-SPLINE = NdBSpline(*interpolation_coefficients(AXES, GENERATOR.normal(size=(7, 9, 6))), 3)
-POINT_SPLINE = PointSpline(SPLINE)
+VALUES = GENERATOR.normal(size=(7, 9, 6))
+SPLINE = TensorSpline.through(AXES, VALUES)
 
 INSIDE = GENERATOR.uniform([axis[0] for axis in AXES], [axis[-1] for axis in AXES], (300, 3))
 NODES = np.array(list(itertools.product(*AXES)))
 
 
+def _scipys() -> NdBSpline:
+    coefficients, knots = VALUES, []
+    for number, nodes in enumerate(AXES):
+        spline = make_interp_spline(nodes, coefficients, k=3, axis=number)
+        knots.append(spline.t)
+        coefficients = np.moveaxis(spline.c, 0, number)
+    return NdBSpline(tuple(knots), np.ascontiguousarray(coefficients), 3)
+
+
 @pytest.mark.parametrize("points", [INSIDE, NODES], ids=["inside", "nodes and limits"])
-def test_values_are_scipys(points: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
-    expected = SPLINE(points)
-    for point, value in zip(points.tolist(), expected.tolist(), strict=True):
-        cell = POINT_SPLINE.cell(*point)
-        assert cell is not None
-        assert POINT_SPLINE.value(cell, *point) == pytest.approx(value, abs=1e-12)
+def test_values_and_slopes_are_scipys(points: Floats) -> None:
+    expected = _scipys()
+    np.testing.assert_allclose(SPLINE.values(*points.T), expected(points), atol=1e-12)
+    slopes = [expected(points, nu=order) for order in np.eye(3, dtype=int)]
+    np.testing.assert_allclose(SPLINE.gradient(*points.T), slopes, atol=1e-10)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_there_is_no_cell_outside(axis: int) -> None:
+def test_there_is_no_value_outside(axis: int) -> None:
     middle = [float(nodes[2]) for nodes in AXES]
     low, high = float(AXES[axis][0]), float(AXES[axis][-1])
     for value in (math.nextafter(low, -math.inf), math.nextafter(high, math.inf), -math.inf, math.inf, math.nan):
         point = [*middle[:axis], value, *middle[axis + 1 :]]
-        assert POINT_SPLINE.cell(*point) is None
+        assert np.isnan(SPLINE.values(*point))
+        assert np.isnan(SPLINE.gradient(*point)).all()
 
 
 def test_table_answers_point_answers_column() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import spherical_jn
 
-from underskin.physics.bessel_kernel import even_orders
+from underskin.physics.contact_kernel import even_orders
 
 
 @pytest.mark.parametrize("orders", [1, 2, 18])

@@ -1,0 +1,540 @@
+"""The documents (`report/1`) on several campaigns of one skin, and on skins of one make, and their words.
+
+On campaigns: the sensors that one leaves out as dead or weak (those that failed between two campaigns first), the
+changes of d33 from campaign to campaign, the mechanisms with their dates. On skins: the populations of E, thickness,
+d33 and the strengths of mechanisms, and the skins that depart from them. No d33 of several campaigns, or of skins of
+one make, is to be quoted; the clauses here say why, and what may be quoted in its place.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
+from underskin.diagnosis.reporting.d33 import StatedD33
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
+from underskin.diagnosis.reporting.report import SCHEMA, Reported
+from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
+from underskin.diagnosis.several.population import D33, REGULAR, STATED, Populations
+from underskin.diagnosis.several.sensors import (
+    ArrayOverDates,
+    CampaignDates,
+    Change,
+    Failure,
+    Sensor,
+    changed_once,
+)
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.formatting import in_percent, listed, of_clauses
+from underskin.inversion.array_course import FEWEST_DATES
+from underskin.inversion.array_history import TWO_DATES, array_change_in_words
+from underskin.units import Floats
+
+_ALTERNATIVES = 6
+_LEAST_PRESENCE = 0.005  # probability of a listed mechanism
+_LEAST_LISTED = 0.1  # probability of a listed quantity in which a skin may depart
+_MOST_NAMED = 3  # changes, causes, skins and departures in a statement
+
+
+@dataclass(frozen=True, eq=False)
+class SkinOverDates:
+    """What the campaigns of a skin say together: lists are by campaign with a result, `reports` those of all campaigns
+    alone. `changes` and `array` are those of d33, with what could have caused them."""
+
+    dates: CampaignDates
+    reports: Mapping[str, Reported]
+    provenance: Mapping[str, Any]
+    p_unlisted: Sequence[float]
+    p_described: float  # by known physics, all campaigns
+    histories: Sequence[SetHistory]
+    periods: Sequence[Period]
+    sensors: Sequence[Mapping[str, Sensor]]
+    failures: Mapping[Failure, Sequence[str]]
+    changes: Sequence[Change]
+    array: ArrayOverDates | None
+
+
+@dataclass(frozen=True, eq=False)
+class PooledQuantity:
+    """One quantity of `skins`: its row in their `populations`, which are relative to declared values with these
+    logarithms (skins,), and the name of the departure in it."""
+
+    parameter: str
+    unit: str
+    skins: Sequence[str]
+    populations: Populations
+    row: int
+    departure: str
+    declared: Floats
+
+    @property
+    def expected(self) -> Floats:
+        """The batch's mean at each skin's declared values (skins,)."""
+        return np.exp(self.populations.mean[self.row] + self.declared)
+
+
+@dataclass(frozen=True, eq=False)
+class Fleet:
+    """What skins of one make say together: `reports` those of the usable skins alone, `lacking` the others; the set of
+    mechanisms of each with its probability; and the pooled quantities, d33 first.
+
+    `p_declared`: the probability of each error of the values declared for all skins; `orders`: clauses on skins with
+    several campaigns whose order is not known in time.
+    """
+
+    reports: Mapping[str, Reported]
+    provenance: Mapping[str, Any]
+    lacking: Sequence[str]
+    orders: Mapping[str, str]
+    p_unlisted: Mapping[str, float]
+    p_described: float  # by known physics, all skins
+    sets: Mapping[str, tuple[Names, float]]
+    p_sets: float
+    p_declared: Mapping[str, float]
+    errors: Mapping[str, tuple[str, float]]  # of skins that depart in a declared value
+    quantities: Sequence[PooledQuantity]
+
+
+def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
+    """The report on campaigns of one skin, which are called `name` together."""
+    leader, names = skin.histories[0], skin.dates.names
+    unexplained = [name for name, share in zip(names, skin.p_unlisted, strict=True) if share > STATED]
+    probability = leader.probability * skin.p_described
+    verdict = _verdict(unexplained, probability, bool(leader.mechanisms or skin.changes))
+    probability = 1 - skin.p_described if unexplained else probability
+    last = skin.reports[names[-1]].d33
+    mechanisms = [*(_acting(period, skin.dates) for period in skin.periods), *_changed_levels(skin)]
+    acting = [mechanism for mechanism in mechanisms if mechanism["name"] in leader.mechanisms]
+    exchanges = [
+        Finding(
+            Reason.LEVELS_EXCHANGED,
+            "",
+            "sensor",
+            {"since": skin.dates.called(change.since), "first": change.sensor, "second": change.exchanged_with},
+        )
+        for change in changed_once(skin.changes)
+        if change.exchanged_with is not None
+    ]
+    decisive = [*_failure_clauses(skin), *_contradiction_clauses(skin.reports)]
+    stated = _sets_in_words(verdict, unexplained, acting, names, in_percent(probability))
+    first = [*decisive, f"apart from that, {stated}"] if decisive else [stated]
+    closing = [skin.dates.order_clause(), _d33_of_last(names[-1], last)]
+    return {
+        **_begun(name, list(skin.reports), verdict, probability),
+        "statement": of_clauses(first, _change_clauses(skin), closing, names=names),
+        "location": _nowhere("campaign"),
+        "mechanisms": mechanisms,
+        "presence": [
+            *_presence(skin),
+            *(_share(sorted(change.causes), change.probability) for change in skin.changes if change.causes),
+        ],
+        "unnamed": None,
+        "alternatives": [
+            _share(history.mechanisms or [NOTHING_MISSING], skin.p_described * history.probability)
+            | {"why_not": _history_in_words(history, names)}
+            for history in skin.histories[1 : _ALTERNATIVES + 1]
+        ],
+        "not_identifiable": _not_identifiable({names[-1]: last}),
+        "findings": [*(finding.in_report() for finding in exchanges), *_prefixed(skin.reports, "findings")],
+        **_of_kinds(skin.reports),
+        "fit": None,
+        "power": [],
+        "d33": {**(last.document or {}), "quotable": False, "per_sensor": _per_sensor(skin), **_per_campaign(skin)},
+        "next_experiment": None,
+        "provenance": {**skin.provenance, "each": _each("campaign", skin.reports)},
+    }
+
+
+def fleet_document(name: str, campaigns: Sequence[str], fleet: Fleet) -> dict[str, Any]:
+    """The report on a fleet with this name, of `campaigns` with these names."""
+    quantities = [_population(quantity) for quantity in fleet.quantities]
+    mechanisms = _mechanisms_of_fleet(fleet)
+    departs = any(quantity["departures"] for quantity in quantities)
+    unexplained = [skin for skin, share in fleet.p_unlisted.items() if share > STATED]
+    wrongly = max(fleet.p_declared.values(), default=0.0)
+    p_declared = wrongly if wrongly > STATED else 1 - sum(fleet.p_declared.values())
+    p_sets = fleet.p_sets * p_declared * fleet.p_described
+    p_departures, least_certain = _probability_of_departures(fleet)
+    # By the least certain skin: by all together, fleets of many skins would all be ambiguous
+    verdict = _verdict(unexplained, min(p_sets, least_certain), bool(mechanisms) or departs)
+    probability = 1 - fleet.p_described if unexplained else p_sets * p_departures
+    d33 = quantities[0]
+    asides = [*_contradiction_clauses(fleet.reports), *_asides(fleet), _d33_of_skins(d33, mechanisms, fleet.reports)]
+    first = _fleet_in_words(mechanisms, unexplained, probability)
+    names = [*fleet.reports, *fleet.lacking, *campaigns]
+    return {
+        **_begun(name, campaigns, verdict, probability),
+        "statement": of_clauses([first], _departure_clauses(fleet.quantities, quantities), asides, names=names),
+        "location": _nowhere("skin"),
+        "mechanisms": mechanisms,
+        "presence": [_share([mechanism["name"]], mechanism["probability"]) for mechanism in mechanisms],
+        "unnamed": None,
+        "alternatives": [],
+        "not_identifiable": _not_identifiable({skin: report.d33 for skin, report in fleet.reports.items()}),
+        "findings": _prefixed(fleet.reports, "findings"),
+        **_of_kinds(fleet.reports),
+        "fit": None,
+        "power": [],
+        "population": quantities,
+        "d33": {"name": D33, "unit": d33["unit"], "value": d33["mean"], "quotable": False, "per_skin": d33["skins"]},
+        "next_experiment": None,
+        "provenance": {**fleet.provenance, "each": _each("skin", fleet.reports)},
+    }
+
+
+def _begun(name: str, campaigns: Sequence[str], verdict: str, probability: float) -> dict[str, Any]:
+    document = {"schema": SCHEMA, "campaign": name, "campaigns": list(campaigns)}
+    return {**document, "verdict": verdict, "probability": round(probability, 3)}
+
+
+def _nowhere(part: str) -> dict[str, Any]:
+    return {"axes": [], "region": {}, "effect_percent": None, "statement": f"See each {part}'s own diagnosis."}
+
+
+def _each(part: str, reports: Mapping[str, Reported]) -> list[dict[str, Any]]:
+    verdicts = [{key: report.document[key] for key in ("verdict", "probability")} for report in reports.values()]
+    return [{part: name, **verdict} for name, verdict in zip(reports, verdicts, strict=True)]
+
+
+def _prefixed(reports: Mapping[str, Reported], key: str) -> list[dict[str, Any]]:
+    """The rows of all reports, each statement with the name of its campaign or skin."""
+    return [
+        {**row, "statement": f"{name}: {row['statement']}"}
+        for name, report in reports.items()
+        for row in report.document.get(key, ())
+    ]
+
+
+def _of_kinds(reports: Mapping[str, Reported]) -> dict[str, Any]:
+    """`by_kind` and `contradictions`; empty where no report has several kinds of recordings."""
+    by_kind = [row for report in reports.values() for row in report.document.get("by_kind", ())]
+    return {"by_kind": by_kind, "contradictions": _prefixed(reports, "contradictions")} if by_kind else {}
+
+
+def _contradiction_clauses(reports: Mapping[str, Reported]) -> list[str]:
+    return [f"in {contradiction['statement']}" for contradiction in _prefixed(reports, "contradictions")]
+
+
+def _verdict(unexplained: Sequence[str], probability: float, anything: bool) -> str:
+    if unexplained:
+        return "unexplained"
+    if probability < EXPLAINED:
+        return "ambiguous"
+    return "explained" if anything else "no_mismatch"
+
+
+def _share(mechanisms: Sequence[str], probability: float) -> dict[str, Any]:
+    return {"mechanisms": list(mechanisms), "probability": round(probability, 3)}
+
+
+def _mechanism(
+    name: str, probability: float, parameters: Sequence[Mapping[str, Any]], scope: Mapping[str, Any]
+) -> dict[str, Any]:
+    row = {"name": name, "probability": round(probability, 3), "parameters": list(parameters)}
+    return {**row, "explains_percent": None, "scope": dict(scope)}
+
+
+def _rounded(digits: int = 4, /, **values: float) -> dict[str, float | None]:
+    return {name: rounded(float(value), digits) for name, value in values.items()}
+
+
+def _not_identifiable(by_name: Mapping[str, StatedD33]) -> list[dict[str, str]]:
+    """Mechanisms that would not show in a campaign, or a skin's, and prevent quoting its d33."""
+    return [
+        {**row, "reason": f"{name} alone: {row['reason']}"}
+        for name, stated in by_name.items()
+        for row in stated.not_identifiable([])
+        if row["mechanism"] in {shift.mechanism for shift in stated.deciding}
+    ]
+
+
+def _scope(dates: CampaignDates, campaigns: Sequence[int], begins: bool) -> dict[str, Any]:
+    since = dates.since(campaigns[0]) if begins else None
+    return {"campaigns": [dates.names[index] for index in campaigns], **({"since": since} if since else {})}
+
+
+def _acting(period: Period, dates: CampaignDates) -> dict[str, Any]:
+    parameters = []
+    for parameter, mean, sd in zip(period.parameters, period.mean, period.deviation, strict=True):
+        low, high = parameter.bounds
+        ends = {"value": mean, "low": max(mean - SDS_OF_95 * sd, low), "high": min(mean + SDS_OF_95 * sd, high)}
+        value = _rounded(**{name: parameter.from_fit(float(end)) for name, end in ends.items()})
+        parameters.append({"name": parameter.name, "unit": parameter.unit, **value})
+    return _mechanism(period.mechanism, period.probability, parameters, _scope(dates, period.campaigns, period.begins))
+
+
+def _changed_levels(skin: SkinOverDates) -> list[dict[str, Any]]:
+    """Changes of d33 between campaigns as mechanisms: the most probable cause, or ageing where one sensor's d33 fell.
+
+    Each has a statement, since a change of level alone does not show its cause.
+    """
+    rows = []
+    for change in skin.changes:
+        could = change.causes if change.sensor is None else (AGEING,) if change.value < 0 else ()
+        if could and change.exchanged_with is None:
+            parameter = {"name": "change_of_d33", "unit": "%", **_rounded(3, **change.percent)}
+            scope = _scope(skin.dates, range(change.since, len(skin.dates.names)), begins=True)
+            scope |= {} if change.sensor is None else {"sensors": [change.sensor]}
+            statement = of_clauses([_change_in_words(change, skin.dates)])
+            rows.append({**_mechanism(could[0], change.probability, [parameter], scope), "statement": statement})
+    return rows
+
+
+def _presence(skin: SkinOverDates) -> list[dict[str, Any]]:
+    """The posterior that each mechanism acts in at least one campaign."""
+    once: dict[str, float] = {}
+    for history in skin.histories:
+        for name in history.mechanisms:
+            once[name] = once.get(name, 0.0) + history.probability
+    ranked = sorted(once.items(), key=lambda item: -item[1])
+    return [_share([name], skin.p_described * share) for name, share in ranked if share > _LEAST_PRESENCE]
+
+
+def _per_sensor(skin: SkinOverDates) -> list[dict[str, Any]]:
+    return [
+        {"campaign": name, "sensor": sensor, "unit": "pC/N", **_rounded(value=d33, low=low, high=high)}
+        for name, sensors in zip(skin.dates.names, skin.sensors, strict=True)
+        for sensor, (d33, _, low, high) in sensors.items()
+    ]
+
+
+def _per_campaign(skin: SkinOverDates) -> dict[str, Any]:
+    """d33 of the array over the sensors common to the campaigns."""
+    if skin.array is None:
+        return {}
+    rows = zip(skin.array.numbers, skin.array.d33, SDS_OF_95 * skin.array.uncertainty, strict=True)
+    return {
+        "per_campaign": [
+            {"campaign": skin.dates.names[number], "unit": "pC/N"}
+            | _rounded(value=d33, low=d33 - half, high=d33 + half)
+            for number, d33, half in rows
+        ]
+    }
+
+
+def _sets_in_words(
+    verdict: str,
+    unexplained: Sequence[str],
+    mechanisms: Sequence[Mapping[str, Any]],
+    names: Sequence[str],
+    percent: str,
+) -> str:
+    if verdict == "unexplained":
+        return f"something is missing in {', '.join(unexplained)} that no known mechanism describes ({percent})"
+    if verdict == "no_mismatch":
+        return f"all {len(names)} campaigns and the paper's model agree within the noise ({percent})"
+    if not mechanisms:
+        return f"within each campaign nothing is missing ({percent})"
+    lead = "best explained so" if verdict == "ambiguous" else "the paper's model lacks"
+    return f"{lead}: {', '.join(_acting_in_words(mechanism, names) for mechanism in mechanisms)} ({percent})"
+
+
+def _acting_in_words(mechanism: Mapping[str, Any], names: Sequence[str]) -> str:
+    scope, words = mechanism["scope"], in_words([mechanism["name"]])
+    if "since" in scope:
+        return f"{words} since {scope['since']}"
+    if len(scope["campaigns"]) == len(names):
+        return f"{words} in {'both' if len(names) == 2 else f'all {len(names)}'} campaigns of FRFs"
+    return f"{words} in {' and '.join(scope['campaigns'])} alone"
+
+
+def _history_in_words(history: SetHistory, names: Sequence[str]) -> str:
+    sets = zip(names, history.sets, strict=True)
+    return "; ".join(f"{name}: {in_words(mechanisms or (NOTHING_MISSING,))}" for name, mechanisms in sets)
+
+
+def _failure_clauses(skin: SkinOverDates) -> list[str]:
+    """Such as "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12"."""
+    clauses = []
+    for failure, sensors in skin.failures.items():
+        single = len(sensors) == 1
+        who = f"sensor {sensors[0]}" if single else f"sensors {listed(sensors)}"
+        state, _, why = failure.fault.partition(": ")
+        start = skin.dates.called(failure.first)
+        if failure.after is not None:
+            again = f"answer{'s' if single else ''} again on {skin.dates.called(failure.after)}"
+            was = f"{who} {'was' if single else 'were'} {state} on {start} ({why})"
+            clauses.append(f"{was} and {again}; left out of what is compared there")
+            continue
+        when, earlier = "in all campaigns", ""
+        if failure.before is not None:
+            before = skin.sensors[failure.before]
+            had = [f"{before[sensor][0]:.3g}" for sensor in sensors if sensor in before]
+            level = f"{listed(had)} pC/N" if had else "a response"
+            when, earlier = f"since {start}", f", after {level} on {skin.dates.called(failure.before)}"
+        clauses.append(
+            f"{who} {'is' if single else 'are'} {state} {when}: {why}{earlier}; left out of all that follows"
+        )
+    return clauses
+
+
+def _change_clauses(skin: SkinOverDates) -> list[str]:
+    """On changes of d33: of the array, first if it changed, and of sensors, of which more than a few are counted."""
+    over, dates = skin.array, skin.dates
+    several = over is not None and len(over.numbers) > 2
+    steps = [change for change in skin.changes if change.sensor is None and change.is_step and several]
+    of_array = [_change_in_words(change, dates) for change in steps]
+    if over is not None and not steps:
+        of_array = _array_clauses(over, skin.changes, dates)
+    sensors = [change for change in changed_once(skin.changes) if change.sensor is not None]
+    clauses = [_change_in_words(change, dates) for change in sensors[:_MOST_NAMED]]
+    more = len(sensors) - _MOST_NAMED
+    clauses += [f"d33 of each sensor has {more} further changes"] if more > 0 else []
+    changed = steps or (over is not None and over.is_significant)
+    return [*of_array, *clauses] if changed else [*clauses, *of_array]
+
+
+def _change_in_words(change: Change, dates: CampaignDates) -> str:
+    """A clause on the change of d33 of one sensor or of the array; of the array with its possible causes, which a
+    change of level cannot separate."""
+    if change.exchanged_with is not None:
+        both = f"sensors {change.sensor} and {change.exchanged_with}"
+        return f"{both} look exchanged since {dates.called(change.since)}: each has the d33 that the other had"
+    whose = "of the array" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
+    percent = change.percent
+    low, high = sorted((abs(percent["low"]), abs(percent["high"])))
+    size = f"{'fell' if change.value < 0 else 'rose'} by {abs(percent['value']):.3g} % ({low:.3g} to {high:.3g})"
+    causes = f", {_causes_in_words(change)}" if change.sensor is None else ""
+    return f"d33 {whose} {size} between {dates.called(change.before)} and {dates.called(change.until)}{causes}"
+
+
+def _array_clauses(over: ArrayOverDates, changes: Sequence[Change], dates: CampaignDates) -> list[str]:
+    """On the array's d33 from the first to the last campaign."""
+    first, last = over.numbers[0], over.numbers[-1]
+    between, days = f"between {dates.called(first)} and {dates.called(last)}", dates.days(first, last)
+    clause = array_change_in_words(over.change.value, over.low, over.high, over.d33.tolist(), between, days)
+    if not over.is_significant:
+        return [clause]
+    stated = next((change for change in changes if change.sensor is None), over.change)
+    return [f"{clause}, {_causes_in_words(stated)}", *([TWO_DATES] if len(over.numbers) < FEWEST_DATES else [])]
+
+
+def _causes_in_words(change: Change) -> str:
+    few = [in_words([name]) for name in change.causes[:_MOST_NAMED]]
+    more = ["another mechanism"] if len(change.causes) > _MOST_NAMED else []
+    causes = " or ".join([*few, *more, "an amplifier's gain", "the temperature"])
+    return f"a change of level that {causes} would make: these recordings do not tell which"
+
+
+def _d33_of_last(last: str, stated: StatedD33) -> str:
+    """A clause on the d33 of a joint report, which is that of the `last` campaign by its recordings alone."""
+    if stated.document is None:
+        return f"no d33 is to be quoted: in {last}, the last campaign, no answer explains the recordings"
+    clause = f"d33 here is by the recordings of {last} alone, and not to be quoted for all campaigns"
+    if stated.document["quotable"]:
+        return f"{clause}: {stated.quoted()}"
+    return f"{clause}, nor for {last} itself: {stated.interval()}"
+
+
+def _d33_of_skins(
+    d33: Mapping[str, Any], mechanisms: Sequence[Mapping[str, Any]], reports: Mapping[str, Reported]
+) -> str:
+    """A clause on the d33 of a fleet, the mean of its skins, and of which skins their own may be quoted: of those whose
+    own diagnosis lacks no mechanism that the fleet shows in them."""
+    by_reason: dict[str, list[str]] = {"": []}
+    for skin, report in reports.items():
+        stated = {mechanism["name"] for mechanism in report.document["mechanisms"]}
+        here = [mechanism["name"] for mechanism in mechanisms if skin in mechanism["scope"]["skins"]]
+        lacking = [name for name in here if name not in stated]
+        of_fleet = [f"its own diagnosis lacks {in_words(lacking)}"] if lacking else []
+        by_reason.setdefault(" and ".join(report.d33.reasons or of_fleet), []).append(skin)
+    may = by_reason.pop("")
+    others = [f"not of {_few(skins)} ({reason})" for reason, skins in by_reason.items()]
+    quotable = ", ".join([f"of {_few(may) if may else 'none'}", *others])
+    return (
+        f"d33 is not to be quoted, because {d33['mean']:.3g} {d33['unit']} is the mean of the skins and no skin's own; "
+        f"by its own recordings alone it may be quoted {quotable}"
+    )
+
+
+def _few(skins: Sequence[str]) -> str:
+    further = len(skins) - _MOST_NAMED
+    return listed([*skins[:_MOST_NAMED], *([f"{further} more"] if further > 0 else [])])
+
+
+def _population(quantity: PooledQuantity) -> dict[str, Any]:
+    populations, row, declared = quantity.populations, quantity.row, quantity.declared
+    mean, spread = float(np.exp(populations.mean[row] + declared.mean())), float(populations.spread[row])
+    values = np.exp(populations.of_skins[:, :, row] + declared)
+    skins = [
+        {"skin": skin, **_rounded(value=value, low=low, high=high)}
+        for skin, value, low, high in zip(quantity.skins, *values, strict=True)
+    ]
+    return {
+        "parameter": quantity.parameter,
+        "unit": quantity.unit,
+        "mean": rounded(mean),
+        "sd": rounded(mean * float(np.hypot(spread, declared.std())), 3),
+        "departures": [
+            {"skin": skin["skin"], "value": skin["value"], "probability": round(share, 3)}
+            for skin, departures in zip(skins, populations.departures, strict=True)
+            if departures[REGULAR] < 1 - STATED and (share := departures.get(quantity.departure, 0.0)) > _LEAST_LISTED
+        ],
+        "skins": skins,
+    }
+
+
+def _probability_of_departures(fleet: Fleet) -> tuple[float, float]:
+    """The probability of the stated departures of all skins together, and the least of that of one skin."""
+    joint, least_certain = 1.0, 1.0
+    for pooled in {id(quantity.populations): quantity.populations for quantity in fleet.quantities}.values():
+        if pooled is fleet.quantities[0].populations or any(pooled.stated):
+            joint *= pooled.joint.get(pooled.stated, 0.0)
+            of_skins = zip(pooled.departures, pooled.stated, strict=True)
+            least_certain = min(least_certain, *(probabilities[departure] for probabilities, departure in of_skins))
+    return joint, least_certain
+
+
+def _mechanisms_of_fleet(fleet: Fleet) -> list[dict[str, Any]]:
+    """With the skins that have each; also a declared E or thickness that is wrong for all, or for a skin that departs
+    in it."""
+    present: dict[str, dict[str, float]] = {
+        error: dict.fromkeys(fleet.reports, share) for error, share in fleet.p_declared.items() if share > STATED
+    }
+    for skin, (names, share) in fleet.sets.items():
+        for mechanism in names:
+            present.setdefault(mechanism, {})[skin] = share
+    for skin, (error, share) in fleet.errors.items():
+        present.setdefault(error, {})[skin] = share
+    return [
+        _mechanism(mechanism, float(np.mean(list(shares.values()))), [], {"skins": list(shares)})
+        for mechanism, shares in present.items()
+    ]
+
+
+def _fleet_in_words(mechanisms: Sequence[Mapping[str, Any]], unexplained: Sequence[str], probability: float) -> str:
+    listed_mechanisms = [
+        f"{in_words([mechanism['name']])} in {', '.join(mechanism['scope']['skins'])}" for mechanism in mechanisms
+    ]
+    missing = "; ".join(listed_mechanisms) or in_words((NOTHING_MISSING,))
+    if unexplained:
+        return f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}"
+    return f"By skin: {missing} ({in_percent(probability)} probability)"
+
+
+def _departure_clauses(quantities: Sequence[PooledQuantity], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    ways: dict[str, list[str]] = {}
+    for quantity, row in zip(quantities, rows, strict=True):
+        unit = "" if row["unit"] == "-" else f" {row['unit']}"
+        for departure in row["departures"]:
+            others = f"{row['mean']:g} ± {row['sd']:g}"
+            if np.ptp(quantity.declared) > 0:
+                others = f"{quantity.expected[quantity.skins.index(departure['skin'])]:.4g} for the same declared"
+            ways.setdefault(departure["skin"], []).append(
+                f"in {quantity_in_words(row['parameter'])}: {departure['value']:g}{unit}, "
+                f"where the others have {others} ({in_percent(departure['probability'])})"
+            )
+    clauses = [f"one departs, {skin}, {', or '.join(of_skin)}" for skin, of_skin in ways.items()]
+    more = len(clauses) - _MOST_NAMED
+    clauses = [*clauses[:_MOST_NAMED], *([f"{more} more depart, see the populations"] if more > 0 else [])]
+    return clauses or ["none is seen to depart from the others"]
+
+
+def _asides(fleet: Fleet) -> list[str]:
+    orders = [
+        f"of {skin}, the last that can be used speaks: {clause}" for skin, clause in fleet.orders.items() if clause
+    ]
+    return [*([f"nothing could be told of {', '.join(fleet.lacking)}"] if fleet.lacking else []), *orders]
