@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Requirement
-from underskin.findings import sentences
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.sentences import UnitGuess
@@ -192,7 +191,7 @@ def _likely_range(field: LabField, size: float) -> Requirement:
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude"
-    return Requirement(text, UNITS_CHECKED, f"; {sentences.unit_guess(unit_guess(field.name, size))}")
+    return Requirement(text, UNITS_CHECKED, f"; {unit_guess(field.name, size)}")
 
 
 def unit_guess(name: str, size: float, usual: tuple[float, float] | None = None) -> UnitGuess:

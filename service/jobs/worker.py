@@ -157,12 +157,12 @@ def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", send_message: S
     from underskin.diagnosis.pipeline import diagnose, with_refused
     from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.diagnosis.reporting.figures import figures
-    from underskin.diagnosis.reporting.report import report
+    from underskin.diagnosis.reporting.report import next_experiment, report
 
     limits = RigLimits(**job.limits or {})
     diagnosis = diagnose(reading.campaign, table, lambda share: send_message({"progress": share}), limits, job.without)
     if job.limits is not None:
-        send_message({"plan": diagnosis.next_experiment})
+        send_message({"plan": next_experiment(diagnosis)})
         return
     diagnosis = with_refused(diagnosis, reading.problems)
     document = report(diagnosis)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from underskin.diagnosis.reporting.law_statement import answer_statement
+from underskin.diagnosis.reporting.statement import answer_clauses
 from underskin.diagnosis.selection.answers import Answer, leading_first
 
 pytestmark = pytest.mark.slow
@@ -38,6 +38,7 @@ def test_the_most_probable_kind_leads(shares: tuple[float, ...], leader: str) ->
 
 def test_leads_together_said_sum() -> None:
     """What leads together is said with its sum."""
-    statement = answer_statement(leading_first(answers(0.34, 0.05, 0.21, 0.2, 0.2)), "ambiguous")
-    assert statement.startswith("Known mechanisms explain this (61 % together), best ageing (21 %), but these rivals")
+    ranked = leading_first(answers(0.34, 0.05, 0.21, 0.2, 0.2))
+    statement, *_ = answer_clauses(ranked, "ambiguous", "the paper's model")
+    assert statement.startswith("known mechanisms explain this (61 % together), best ageing (21 %), but these rivals")
     assert "something without a name (34 %)" in statement

@@ -15,7 +15,7 @@ from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, descr
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
-from underskin.diagnosis.reporting.report import DiagnosisResult
+from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.reporting.page_styles import WHOLE_NUMBERS, decade_ticks, is_logarithmic
+from underskin.diagnosis.reporting.page_styles import LEAST_PHASE, WHOLE_NUMBERS, decade_ticks, is_logarithmic
 from underskin.figures.style import ZONE, label, line_style, marked, styled
 from underskin.recordings.frf.flat_zone import FrfLines, FrfSpread
 from underskin.units import Floats
@@ -21,7 +21,6 @@ _UNITS = (" pC/N", "°", "")
 _HEIGHT = 640
 _MOST_IN_LEGEND = 12
 _BRIGHTEST = 0.85  # of Viridis; lighter colours are invisible on white
-_LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
@@ -104,7 +103,7 @@ def _finished(traces: Sequence[PlotlyTrace], zone_hz: tuple[float, float] | None
         figure.update_yaxes(title=words, row=row, col=1)
     figure.update_yaxes(**_magnitude_axis(traces), row=1, col=1)
     phases = _values(traces, "y2")
-    low, high = np.nanmin(phases, initial=-_LEAST_PHASE), np.nanmax(phases, initial=_LEAST_PHASE)
+    low, high = np.nanmin(phases, initial=-LEAST_PHASE), np.nanmax(phases, initial=LEAST_PHASE)
     margin = 0.05 * (high - low)
     figure.update_yaxes(range=[low - margin, high + margin], row=2, col=1)
     figure.update_yaxes(range=[0, 1.02], row=3, col=1)

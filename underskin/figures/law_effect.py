@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.mechanisms import CATALOGUE, Mechanism, Model, Parameter, compose
+from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Model, Parameter, compose
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
@@ -74,19 +74,38 @@ def law_effect(name: str, table: SigmaTable) -> LawEffect:
     Unsupported
         Where the rig lacks what the mechanism reads, such as a temperature.
     """
-    mechanism = CATALOGUE[name]
-    return _of_frf(mechanism, table) if "frf" in mechanism.kinds else _of_curve(mechanism, table)
+    kind = CATALOGUE[name].kinds[0]
+    campaign = drawn_campaign(kind)
+    base, with_it = compose([], campaign, table, kind), compose([name], campaign, table, kind)
+    drawn = base.recording == len(campaign.recordings) - 1
+    nuisances = [parameter.start for parameter in base.parameters]
+    parameters = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
+    rows = strengths(parameters)
+    without = np.asarray(base.predict(np.array(nuisances)).value[drawn])
+    results = [_excursion(with_it, parameters, np.array([*row, *nuisances]), drawn) for row in rows]
+    words = tuple(_in_words(parameters, row) for row in rows)
+    recording = campaign.recordings[-1]
+    if isinstance(recording, FrfRecording):
+        magnitude, phase = (
+            EffectPanel(title, of(without), tuple(map(of, results)))
+            for title, of in (("magnitude, pC/N", _magnitude), ("phase, degrees", _phase))
+        )
+        return LawEffect("frequency, Hz", _FREQUENCY, True, words, (magnitude, phase))
+    force = EffectPanel("force, N", without, tuple(results))
+    changes = tuple(result - without for result in results)
+    change = EffectPanel("change of force, N", np.zeros_like(without), changes)
+    return LawEffect("displacement, mm", recording.displacement_mm, False, words, (force, change))
 
 
 def lacking(mechanism: Mechanism) -> str | None:
     """What the reference rig lacks for the mechanism, in words; None where it can be drawn."""
     kind = mechanism.kinds[0]
-    return mechanism.unsupported(reference_recordings() if kind == "frf" else reference_campaign(kind), kind)
+    return mechanism.unsupported(drawn_campaign(kind), kind)
 
 
 def strengths(parameters: Sequence[Parameter]) -> list[list[float]]:
     """Fit coordinates of the parameters at each of three strengths; once without a strength parameter."""
-    if not any(_is_strength(parameter) for parameter in parameters):
+    if all(parameter.limit is None for parameter in parameters):
         return [[usual(parameter) for parameter in parameters]]
     for factors in (STRENGTHS, _WEAKER):
         rows = [[_scaled(parameter, factor) for parameter in parameters] for factor in factors]
@@ -98,11 +117,12 @@ def strengths(parameters: Sequence[Parameter]) -> list[list[float]]:
     ]
 
 
-def reference_recordings() -> Campaign:
-    """The reference campaign of FRFs; the last recording is the one that is drawn."""
-    campaign = reference_campaign("frf")
-    first = campaign.recordings[0]
-    assert isinstance(first, FrfRecording)
+def drawn_campaign(kind: Kind) -> Campaign:
+    """The reference campaign of a kind; the last recording is the one that is drawn, of curves the only one."""
+    campaign = reference_campaign(kind)
+    first, *others = campaign.recordings
+    if not isinstance(first, FrfRecording):
+        return replace(campaign, recordings=tuple(others))
     sensor = campaign.skin.sensors[0]
     drawn = replace(
         first,
@@ -121,26 +141,8 @@ def reference_recordings() -> Campaign:
     return replace(campaign, recordings=(*campaign.recordings, drawn))
 
 
-def _of_frf(mechanism: Mechanism, table: SigmaTable) -> LawEffect:
-    campaign = reference_recordings()
-    base, with_it = compose([], campaign, table), compose([mechanism.name], campaign, table)
-    last = base.recording == len(campaign.recordings) - 1
-    nuisances = [parameter.start for parameter in base.parameters]
-    parameters = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
-    rows = strengths(parameters)
-    without = base.predict(np.array(nuisances)).value[last]
-    results = [_excursion(with_it, parameters, np.array([*row, *nuisances]), last) for row in rows]
-    magnitude, phase = (
-        EffectPanel(title, of(without), tuple(of(result) for result in results))
-        for title, of in (("magnitude, pC/N", _magnitude), ("phase, degrees", _phase))
-    )
-    return LawEffect(
-        "frequency, Hz", _FREQUENCY, True, tuple(_in_words(parameters, row) for row in rows), (magnitude, phase)
-    )
-
-
 def _excursion(model: Model, parameters: Sequence[Parameter], fit: Floats, rows: Array) -> Array:
-    """The FRF [C/N]; for a mechanism that acts on the scatter only, one standard deviation away."""
+    """The FRF [C/N] or the force [N]; for a mechanism that acts on the scatter only, one standard deviation away."""
     prediction = model.predict(fit)
     value = prediction.value[rows]
     if any(parameter.acts_on == "line_variance" for parameter in parameters):
@@ -161,30 +163,6 @@ def _phase(frf: Array) -> Floats:
     return np.asarray(np.degrees(np.angle(frf)))
 
 
-def _of_curve(mechanism: Mechanism, table: SigmaTable) -> LawEffect:
-    kind = mechanism.kinds[0]
-    campaign = reference_campaign(kind)
-    campaign = replace(campaign, recordings=campaign.recordings[1:])
-    base, with_it = compose([], campaign, table, kind), compose([mechanism.name], campaign, table, kind)
-    nuisances = [parameter.start for parameter in base.parameters]
-    parameters = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
-    rows = strengths(parameters)
-    without = np.asarray(base.predict(np.array(nuisances)).value)
-    results = [np.asarray(with_it.predict(np.array([*row, *nuisances])).value) for row in rows]
-    recording = campaign.recordings[0]
-    assert not isinstance(recording, FrfRecording)
-    travel = recording.displacement_mm
-    panels = (
-        EffectPanel("force, N", without, tuple(results)),
-        EffectPanel("change of force, N", np.zeros_like(without), tuple(result - without for result in results)),
-    )
-    return LawEffect("displacement, mm", travel, False, tuple(_in_words(parameters, row) for row in rows), panels)
-
-
-def _is_strength(parameter: Parameter) -> bool:
-    return parameter.limit is not None
-
-
 def usual(parameter: Parameter) -> float:
     """The fit coordinate used in figures."""
     return parameter.typical if parameter.shown is None else parameter.to_fit(parameter.shown)
@@ -193,7 +171,7 @@ def usual(parameter: Parameter) -> float:
 def _scaled(parameter: Parameter, factor: float) -> float:
     """`factor` times the distance from the limit; shape parameters are unchanged."""
     middle = usual(parameter)
-    if not _is_strength(parameter):
+    if parameter.limit is None:
         return middle
     limit = None if parameter.moves_covariance else parameter.fit_limit
     if limit is not None:
@@ -208,6 +186,6 @@ def _in_words(parameters: Sequence[Parameter], row: Sequence[float]) -> str:
             " -"
         )
         for parameter, at in zip(parameters, row, strict=True)
-        if _is_strength(parameter)
+        if parameter.limit is not None
     ]
     return ", ".join(words) or "with it"

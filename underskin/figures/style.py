@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.diagnosis.reporting.page_styles import LINE_COLOURS
+from underskin.diagnosis.reporting.page_styles import LINE_COLOURS, PLAIN
 from underskin.errors import unequal_lengths
 from underskin.units import Floats
 
@@ -19,7 +19,6 @@ INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
 SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations, of every error bar
 _LONGEST_LABEL = 60
 _MARKS = 8  # at most, along a line whose colour is not unique
-PLAIN = {"exponentformat": "none"}  # else ticks had prefixes beside the unit of their axis: 10μ of N
 _AXIS = {
     "gridcolor": GRID,
     "zerolinecolor": "#c3cad1",

@@ -1,29 +1,70 @@
 """The sentences of findings in English: for each reason a template, or a function where words depend on the arguments.
 
-Only this table and `sentences` hold the words; another language is another such pair.
+Only this table and `sentences` hold the words; another language is another such pair. Templates are those of
+`str.format` with further specifications (`_Template`).
 """
 
+import string
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from underskin.findings import sentences
-from underskin.findings import sentences as sensor_sentences
 from underskin.findings.codes import Reason
+from underskin.findings.formatting import in_digits, significant
 from underskin.findings.lacking import Lack, Lacking
 
 Words = str | Callable[..., str]
+OPTIONAL: Mapping[str, Any] = {"left_out": False, "example": "", "frequency_hz": None}  # arguments of some findings
+
+
+class _Template(string.Formatter):
+    """Python's format specifications, and some for words.
+
+    `{value:yes|no}` is the first text, which may hold fields, if the value is true, else the second. `{value:digits 2}`
+    never is a power of ten, `{value:significant 2}` no positive one. `{texts:or}` joins a list, `{ids:count}` is its
+    length, `{ids:listed recordings}` and `{ids:sensors}` name its first ids, and `{more:more recording}` is a number of
+    further cases in brackets. None is empty.
+    """
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """One field in words."""
+        yes, bar, no = format_spec.rpartition("|")
+        if bar:
+            return yes if value else no
+        if value is None:
+            return ""
+        name, _, argument = format_spec.partition(" ")
+        if name in _WORDS:
+            return _WORDS[name](value, argument)
+        return str(super().format_field(value, format_spec))
+
+
+_WORDS: Mapping[str, Callable[[Any, str], str]] = {
+    "digits": lambda value, digits: in_digits(value, int(digits)),
+    "significant": lambda value, digits: significant(value, int(digits)),
+    "or": lambda texts, _: ", or ".join(texts),
+    "count": lambda ids, _: str(len(ids)),
+    "listed": sentences.listed,
+    "sensors": lambda ids, _: sentences.listed_sensors(ids),
+    "more": sentences.more_alike,
+}
+
+
+def in_english(words: Words, arguments: Mapping[str, Any]) -> str:
+    """A template or a function with its arguments."""
+    if isinstance(words, str):
+        return _Template().vformat(words, (), {**OPTIONAL, **arguments})
+    return words(**arguments)
 
 
 def statement(reason: Reason, arguments: Mapping[str, Any]) -> str:
     """The sentence of a reason with its arguments."""
-    words = ENGLISH[reason]
-    return words.format(**arguments) if isinstance(words, str) else words(**arguments)
+    return in_english(ENGLISH[reason], arguments)
 
 
 def lacking(what: Lacking) -> str:
     """A lack in words, as the end of a sentence."""
-    words = LACKING[what.lack]
-    text = words.format(**what.arguments) if isinstance(words, str) else words(**what.arguments)
+    text = in_english(LACKING[what.lack], what.arguments)
     if not what.refused_recordings:
         return text
     fields = " and ".join(what.refused_fields)
@@ -37,6 +78,16 @@ def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
 
 _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
 _OF_ARRAY = "{percent:.0f} % of the array's d33"
+_MORE_ROWS = "{more: ({more} more rows like it)|}"
+_UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
+_RESPONSE = "1000 × too {too_large:large: pC taken for nC, or N for mN?|small: nC taken for pC?}"
+_NEEDED = (
+    "force and displacement would need a modulus of about {modulus_mpa:.2g} MPa: "
+    "{slips:{slips:or}?|are force, displacement and size in the units that were said?}"
+)
+_THOUSANDFOLD = "{too_small:a thousandfold|divided by 1000}"
+_ALL_AS_IN, _LEFT_OUT = "{example:in all recordings, as in {example}: |}", "{left_out: Left out|}"  # of time series
+DEFECT = "{channel}: {samples} samples from sample {first_sample} {kind}"
 
 LACKING: Mapping[Lack, Words] = {
     Lack.CURVES_CONTRADICT: "force, displacement and modulus cannot all be right as declared (see findings); if they "
@@ -83,7 +134,9 @@ ENGLISH: Mapping[Reason, Words] = {
     "that is declared too small is not ruled out",
     Reason.OUT_OF_TABLES_FITTED: "with the values found for {answer} its contact lies beyond the tables: its "
     "prediction is continued from the table's edge",
-    Reason.CONTACTS_KEPT: sentences.contacts_kept,
+    Reason.CONTACTS_KEPT: "by the declared {declared_mpa:g} MPa {contacts} of {recordings} contacts lie beyond the "
+    "tables, "
+    "{found_mpa:at the {found_mpa:.3g} MPa found|with the values found for {answer}} they lie within: kept",
     Reason.BEYOND_TABLE: "{limit}",
     Reason.PLACE_BEYOND_TABLE: "its position is farther from the sensor than the table reaches, or its lines scatter "
     "beyond measure",
@@ -97,114 +150,130 @@ ENGLISH: Mapping[Reason, Words] = {
     "slip of units? Left out",
     Reason.TWO_MODULI: "the two curves' apparent moduli of {first_mpa:.2g} and {second_mpa:.2g} MPa contradict each "
     "other: is force or displacement of one of them off by 1000?",
-    Reason.MODULUS_BESIDE_DECLARED: sentences.needed_modulus("{declared_mpa:g} MPa is declared"),
-    Reason.MODULUS_BESIDE_RUBBER: sentences.needed_modulus("Rubber has {low_mpa:g} to {high_mpa:g} MPa"),
+    Reason.MODULUS_BESIDE_DECLARED: f"{_NEEDED} {{declared_mpa:g}} MPa is declared",
+    Reason.MODULUS_BESIDE_RUBBER: f"{_NEEDED} Rubber has {{low_mpa:g}} to {{high_mpa:g}} MPa",
     Reason.MODULUS_OF_NO_ELASTOMER: sentences.elastomer,
-    Reason.DECLARED_UNUSUAL: sentences.unusual,
+    Reason.DECLARED_UNUSUAL: _UNUSUAL,
     Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
     Reason.PRELOADS_SMALL: "no preload is above {highest_n:g} N: they look 1000 × too small; were they given in kN?",
     Reason.PRELOADS_LARGE: "no preload is below {lowest_n:g} N: they look 1000 × too large; were they given in mN?",
-    Reason.FREQUENCIES: sentences.frequencies,
+    Reason.FREQUENCIES: "frequencies are {lowest_hz:g} to {highest_hz:g} Hz: they look 1000 × too "
+    "{too_large:large|small}; were "
+    "they given in {given_in}?",
     Reason.PERIODS_TOO_LONG: "no period of {lowest_hz:g} Hz fits into the {pause_s:.3g} s after which, by recorded_at, "
     "the next recording follows: are they 1000 × too small, given in kHz?",
-    Reason.RESPONSE_BESIDE_OTHERS: lambda too_large: (
-        f"the response looks {sentences.response_slip(too_large)} Left out"
-    ),
+    Reason.RESPONSE_BESIDE_OTHERS: f"the response looks {_RESPONSE} Left out",
     Reason.TWO_RESPONSES: "the two recordings' responses are {ratio:.3g} times as far apart as expected: a slip of "
     "units?",
-    Reason.D33_NEEDED: sentences.d33_needed,
-    Reason.PLACES: lambda too_small, given_in, sensors_in: (
-        f"places lie at their own sensors only {sentences.thousandfold(too_small)}: were they given in {given_in}, "
-        f"or the sensors in {sensors_in}?"
-    ),
-    Reason.PLACE: lambda too_small, given_in: (
-        f"its place lies at its own sensor only {sentences.thousandfold(too_small)}: was it given in {given_in}? "
-        "Left out"
-    ),
+    Reason.D33_NEEDED: "charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N"
+    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}; it looks {_RESPONSE}",
+    Reason.PLACES: f"places lie at their own sensors only {_THOUSANDFOLD}: were they given in {{given_in}}, or the "
+    f"sensors in "
+    "{sensors_in}?",
+    Reason.PLACE: f"its place lies at its own sensor only {_THOUSANDFOLD}: was it given in {{given_in}}? Left out",
     Reason.PLACES_AT_SENSORS: "no place lies farther from its sensor than {farthest_mm:.2g} mm: were they given in m?",
-    Reason.WITHIN_TABLES: sentences.within_tables,
-    Reason.SERIES_FORCE: sentences.of_series(sentences.series_force),
-    Reason.SERIES_DYNAMIC_FORCE: sentences.of_series(sentences.series_dynamic_force),
-    Reason.SERIES_PRELOAD: sentences.of_series(sentences.series_preload),
-    Reason.BESIDE_OTHERS: sentences.beside_others,
+    Reason.WITHIN_TABLES: "were it 1000 × {larger:larger|smaller}, contacts would lie within the tables: was it given "
+    "in "
+    "{given_in}?",
+    Reason.SERIES_FORCE: f"{_ALL_AS_IN}it is shaken by {{oscillation_n:.3g}} N, where dynamic_force_n is "
+    f"{{dynamic_force_n:g}}: it "
+    f"looks 1000 × too {{too_large:large|small}}; was it given in {{given_in}}?{_LEFT_OUT}",
+    Reason.SERIES_DYNAMIC_FORCE: f"{_ALL_AS_IN}{{dynamic_force_n:g}} N looks 1000 × too {{too_large:large|small}} "
+    f"beside the "
+    f"recorded force: was it given in {{given_in}}?{_LEFT_OUT}",
+    Reason.SERIES_PRELOAD: f"{_ALL_AS_IN}{{preload_n:g}} N looks 1000 × too {{too_large:large|small}} beside the "
+    f"recorded force's "
+    f"mean of {{mean_n:.3g}} N: was it given in {{given_in}}?{_LEFT_OUT}",
+    Reason.BESIDE_OTHERS: "{value:g} looks 1000 × too {too_large:large|small} beside the others: was it given in "
+    "{given_in}? "
+    "Left out",
     Reason.DYNAMIC_FORCE_LARGE: "the dynamic force reaches the preload in all recordings, so the sphere would leave "
     "the skin: was it given in mN, or the preload in kN, or are the two exchanged?",
     Reason.DYNAMIC_FORCE_SMALL: "it is at most {ratio:.1g} of the preload: it looks 1000 × too small; was it given in "
     "kN, or the preload in mN?",
     Reason.NARROW_MAP: "the map spans {span_mm:g} mm, on sensors {diameter_mm:g} mm across: is it in mm?",
-    Reason.UNUSUAL_MAGNITUDE: sentences.unusual,
-    Reason.UNUSUAL_MEDIAN_FRF: lambda **arguments: f"FRF, median of the recordings: {sentences.unusual(**arguments)}",
+    Reason.UNUSUAL_MAGNITUDE: _UNUSUAL,
+    Reason.UNUSUAL_MEDIAN_FRF: f"FRF, median of the recordings: {_UNUSUAL}",
     Reason.CURVE_COUNTED_NEGATIVE: sentences.counted_negative,
-    Reason.ROWS_REVERSED: sentences.rows_reversed,
+    Reason.ROWS_REVERSED: "its rows begin where it is deepest and end in the air: it was read from the last row to "
+    "the first"
+    "{is_timed:, without its times, since a way out alone does not tell what relaxes|}",
     Reason.FORCE_SATURATES: sentences.force_saturates,
-    Reason.PERIODIC_ERROR: sentences.periodic_error,
+    Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
+    "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "
+    "screw or an encoder{frequency_hz:; or hum, or a vibration of {frequency_hz:.3g} Hz|}); it was subtracted",
     Reason.TIP_SHAPE: "{refusal}",
     Reason.TWO_SIGNS: "the two recordings answer with opposite signs: one of them is reversed",
     Reason.ALL_REVERSED: "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier "
     "inverts)",
     Reason.SENSOR_REVERSED: "sensor {sensor!r} answers with the opposite sign of the others: reversed",
     Reason.RECORDING_REVERSED: "its sign is the opposite of the others': reversed",
-    Reason.RECORDINGS_REVERSED: lambda reversed_recordings, recordings: (
-        f"the sign of {len(reversed_recordings)} of {recordings} recordings is the opposite of the others', with no "
-        f"order in it: reversed ({sentences.listed(reversed_recordings, 'recordings')})"
-    ),
+    Reason.RECORDINGS_REVERSED: "the sign of {reversed_recordings:count} of {recordings} recordings is the opposite "
+    "of the "
+    "others', with no order in it: reversed ({reversed_recordings:listed recordings})",
     Reason.ALL_CONJUGATED: sentences.all_conjugated,
-    Reason.RECORDINGS_CONJUGATED: lambda conjugated, recordings: (
-        f"the phase over frequency of {len(conjugated)} of {recordings} recordings is that of the others with its sign "
-        f"turned: they look conjugated, and were conjugated back ({sentences.listed(conjugated, 'recordings')})"
-    ),
+    Reason.RECORDINGS_CONJUGATED: "the phase over frequency of {conjugated:count} of {recordings} recordings is that "
+    "of the "
+    "others with its sign turned: they look conjugated, and were conjugated back ({conjugated:listed recordings})",
     Reason.LEVELS_EXCHANGED: "since {since} sensors {first!r} and {second!r} each have the d33 that the other one had "
     "before: their labels or cables look exchanged, and each d33 since then belongs to the other sensor",
     Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, "
     "or their places, look exchanged; put right",
-    Reason.CABLES_EXCHANGED: sensor_sentences.cables_exchanged,
-    Reason.LABELS_PERMUTED: sensor_sentences.labels_permuted,
-    Reason.LABELS_CONTRADICT_PLACES: sensor_sentences.labels_contradict_places,
-    Reason.SILENT_TOGETHER: sensor_sentences.silent_together,
-    Reason.AMPLITUDE_FACTOR: sentences.amplitude_factor,
+    Reason.CABLES_EXCHANGED: "from recording {since!r} on, in the order of time, sensors {first!r} and {second!r} "
+    "answer as each "
+    "other: their cables look exchanged; put right ({recordings} recordings)",
+    Reason.LABELS_PERMUTED: sentences.labels_permuted,
+    Reason.LABELS_CONTRADICT_PLACES: sentences.labels_contradict_places,
+    Reason.SILENT_TOGETHER: "sensors {first!r} and {second!r} both show no response since recording {since!r}, in the "
+    "order of "
+    "time: cables exchanged, or a connector or amplifier that they share; left out ({recordings} recordings)",
+    Reason.AMPLITUDE_FACTOR: "the response of {of:count} of {recordings} recordings is {factor:.3g} times the "
+    "others': is their "
+    "dynamic force or charge given as {meant} instead of peak? Put right by this factor ({of:listed recordings})"
+    "{left_out:; {left_out} that do not tell were left out|}",
     Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
-    Reason.CHANNELS_SWAPPED: sentences.of_series(sentences.swapped),
-    Reason.PRELOAD_AND_RADIUS_EXCHANGED: sentences.preload_and_radius_exchanged,
+    Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "
+    f"{{charge_mean_pc:.3g}}, where "
+    f"preload_n is {{preload_n:g}}: force and charge look exchanged.{_LEFT_OUT}",
+    Reason.PRELOAD_AND_RADIUS_EXCHANGED: "the spheres are pressed harder than the tables hold, or preload_n and "
+    "indenter_radius_mm "
+    "are exchanged: L = F/(R²E) of {beyond} of {recordings} contacts is beyond the tables, and within if they are "
+    "exchanged",
     Reason.FORCE_CONTRADICTS_PRELOAD: "the force is {mean_n:.3g} N in the mean, but the preload is {preload_n:g} N: "
     "is one in another unit?",
-    Reason.SENSORS_AT_ONE_PLACE: sentences.one_place,
-    Reason.SENSORS_TOO_NEAR: sentences.too_near,
+    Reason.SENSORS_AT_ONE_PLACE: "{sensors:sensors} lie at one place, x {x_mm:g} mm, y {y_mm:g} mm: is it a "
+    "slip?{more:more place}",
+    Reason.SENSORS_TOO_NEAR: "{sensors:sensors} of {radius_mm:g} mm radius cannot lie {pitch_mm:g} mm apart: "
+    "{in_metres:were their places given in m|is it the diameter}, or a slip?",
     Reason.SENSORS_OVERLAP: "{first} and {second} lie over one another, their centres {distance_mm:g} mm apart: are x "
     "and y in mm?",
     Reason.NO_CONTACT_WITHIN_TABLES: "no contact lies within the tables: contact radii would be {smallest:.3g} to "
     "{largest:.3g} of the thickness, or the places lie far from their sensors; are preload, sphere, thickness, modulus "
     "and places right?",
-    Reason.TIME_TO_COME: lambda written, more: (
-        f"recorded_at is {written}, which is still to come: is the year a slip?"
-        f"{sentences.more_alike(more, 'recording')}"
-    ),
-    Reason.TIME_TOO_OLD: lambda written, year, more: (
-        f"recorded_at is {written}, before {year}: was the clock not set?{sentences.more_alike(more, 'recording')}"
-    ),
-    Reason.D33_FITTED: lambda d33_pc_per_n, kind: (
-        f"d33 comes out as {d33_pc_per_n:.4g} pC/N, {sentences.IMPLAUSIBLE_D33[kind]}"
-    ),
-    Reason.D33_OF_ARRAY: lambda d33_pc_per_n, kind: (
-        f"d33 of the array is {d33_pc_per_n:.3g} pC/N, {sentences.IMPLAUSIBLE_D33[kind]}"
-    ),
-    Reason.D33_OF_ROW: lambda d33_pc_per_n, kind, more: (
-        f"d33 is {d33_pc_per_n:.3g} pC/N, {sentences.IMPLAUSIBLE_D33[kind]}{sentences.more_rows(more)}"
-    ),
-    Reason.DEFECT: sentences.defect,
-    Reason.DEFECTS_LEFT_OUT: sentences.defects_left_out,
+    Reason.TIME_TO_COME: "recorded_at is {written}, which is still to come: is the year a slip?{more:more recording}",
+    Reason.TIME_TOO_OLD: "recorded_at is {written}, before {year}: was the clock not set?{more:more recording}",
+    Reason.D33_FITTED: "d33 comes out as {d33_pc_per_n:.4g} pC/N, {kind}",
+    Reason.D33_OF_ARRAY: "d33 of the array is {d33_pc_per_n:.3g} pC/N, {kind}",
+    Reason.D33_OF_ROW: f"d33 is {{d33_pc_per_n:.3g}} pC/N, {{kind}}{_MORE_ROWS}",
+    Reason.DEFECT: DEFECT,
+    Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",
     Reason.LINES_LEFT_OUT: sentences.lines_left_out,
     Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
     "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "
     "percent; a drive that repeats itself at least four times gives them all",
-    Reason.MAINS_IN_CHARGE: sentences.mains_in_charge,
+    Reason.MAINS_IN_CHARGE: "in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a "
+    "multiple of it by about {charge_pc:significant 2} pC, and the force does not: mains pickup? The lines there "
+    "are left out",
     Reason.NOISE_IN_FRF: sentences.noise_in_frf,
     Reason.BEHIND_FILTER: sentences.behind_filter,
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: sentences.parameter_at_bound,
     Reason.THICKNESS_UNKNOWN: sentences.thickness_unknown,
-    Reason.LINE_NOISE_LEVEL: sentences.line_noise,
+    Reason.LINE_NOISE_LEVEL: "the lines scatter {level:digits 2} times more about the stated answer than about their "
+    "own "
+    "neighbours: part of the misfit along frequency may have been taken for noise",
     Reason.REMAINDER: "a smooth part of about {percent:.2g} % of the largest force, {times:.0f} times a sample's "
     "noise, is left that no mechanism here describes",
     Reason.HELD_OUT_NO_BETTER: sentences.held_out,
@@ -213,17 +282,22 @@ ENGLISH: Mapping[Reason, Words] = {
     "rig: something that no recording states changes from one to the next",
     Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for {mechanisms}: a platen that is "
     "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it",
-    Reason.LOAD_NOT_LINEAR: sentences.load_not_linear,
+    Reason.LOAD_NOT_LINEAR: "L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left "
+    "out; it "
+    "adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere"
+    "{more: ({more} more contacts like it)|}",
     Reason.PRESSURE_NOT_LINEAR: "{pressure_mpa:g} MPa is more than the layer's modulus, {modulus_mpa:g} MPa: it is far "
     "from linear there",
-    Reason.CONTACT_SLIPS: sentences.contact_slips,
+    Reason.CONTACT_SLIPS: "the tangential force is {ratio:.3g} times the normal one: it slips unless friction is "
+    "stronger"
+    "{more: ({more} more contacts like it)|}",
     Reason.DEAD: f"dead: no charge beyond noise ({_OF_ARRAY})",
     Reason.INVERTED: f"inverted polarity: {_OF_ARRAY}",
     Reason.WEAK: f"weak: {_OF_ARRAY}",
     Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
     "cable or its range, beyond any spread; left out ({recordings} recordings)",
-    Reason.SENSOR_WEAKER: sensor_sentences.sensor_alone,
-    Reason.SENSOR_STRONGER: sensor_sentences.sensor_alone,
+    Reason.SENSOR_WEAKER: sentences.sensor_alone,
+    Reason.SENSOR_STRONGER: sentences.sensor_alone,
     Reason.STRONG: f"strong: {_OF_ARRAY}",
     Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
     Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",

@@ -1,5 +1,7 @@
-"""Numbers and probabilities for readers."""
+"""Numbers, probabilities, lists and clauses for readers."""
 
+import re
+from collections.abc import Sequence
 from decimal import Decimal
 
 
@@ -23,3 +25,54 @@ def in_digits(value: float, digits: int = 4) -> str:
     """To significant digits, never as a power of ten."""
     text = format(Decimal(f"{value:.{digits}g}"), "f")
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names joined with commas and a final "and"."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+_END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # end of a sentence within a clause
+_END_OR_STOP = re.compile(r"([.?!]) +")
+_STOP = re.compile(r"\. +")
+_NAME = re.compile(r"\w+('s|s')")  # Hertz's, Mullins': keeps its capital
+_SYMBOLS = ("d33",)  # keep their small letter at the beginning of a sentence
+
+
+def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
+    """One sentence from the clauses of each of `sentences`; empty clauses, and sentences without any, are left out.
+
+    Within a sentence no full stop is followed by a space, so that the sentences can be split again. `names` of
+    campaigns and skins are not split: "Palm 2. Upper" is no end of a sentence.
+
+    >>> of_clauses(["one slip: given in µm? Left out", "apart from that, all agrees"], [], ["d33 to quote: 14 pC/N"])
+    'One slip: given in µm? – left out; apart from that, all agrees. d33 to quote: 14 pC/N.'
+    """
+    protected_names = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
+
+    def as_clause(text: str) -> str:
+        for name, protected in protected_names.items():
+            text = text.replace(name, protected)
+        return clause(text)
+
+    filled = ([as_clause(text) for text in clauses if text] for clauses in sentences)
+    return " ".join(f"{capital('; '.join(map(small, clauses)))}." for clauses in filled if clauses)
+
+
+def clause(text: str) -> str:
+    """A text of one or several sentences as part of a sentence, without a full stop at its end."""
+    first, *parts = _END.split(text.strip().rstrip("."))
+    for mark, following in zip(parts[::2], parts[1::2], strict=True):
+        first += f"{'; ' if mark == '.' else f'{mark} – '}{small(following)}"
+    return _STOP.sub(".\N{NO-BREAK SPACE}", first)
+
+
+def capital(text: str) -> str:
+    """The text with a capital at its beginning, unless it begins with a symbol."""
+    return text if text.startswith(_SYMBOLS) else text[:1].upper() + text[1:]
+
+
+def small(text: str) -> str:
+    """The text with a small letter at its beginning, unless it begins with a symbol or a name."""
+    plain = text[1:2].islower() or text.startswith("A ")
+    return text[:1].lower() + text[1:] if plain and not _NAME.match(text) else text

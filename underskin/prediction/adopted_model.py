@@ -13,7 +13,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
-from underskin.findings import sentences
 from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Stage
 from underskin.mechanisms.laws import misalignment
 from underskin.mechanisms.models.composed import forward_model
@@ -228,7 +227,7 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
         return None
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
     implausible = plausibility.implausibility(d33)
-    return None if implausible is None else f"{d33:.4g} pC/N, {sentences.IMPLAUSIBLE_D33[implausible]}"
+    return None if implausible is None else f"{d33:.4g} pC/N, {implausible}"
 
 
 def _on_fit(parameter: Parameter, value: float) -> float:

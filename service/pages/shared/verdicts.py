@@ -140,14 +140,14 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 def _quoted(report: Mapping[str, Any]) -> str:
     """The d33 of a report in words; if it may not be quoted, with the report's reason."""
     from underskin.diagnosis.reporting.wording import (
-        as_stated,
         not_quoted,
+        number,
     )  # with plotting code, which is slow to import
 
     d33 = report["d33"]
-    low, high = as_stated(d33["low"]), as_stated(d33["high"])
+    low, high = number(d33["low"], 3), number(d33["high"], 3)
     if d33.get("quotable", True):
-        return f"{as_stated(d33['value'])} {d33['unit']} (95 %: {low} to {high})"
+        return f"{number(d33['value'], 3)} {d33['unit']} (95 %: {low} to {high})"
     return not_quoted(report) or f"it lies from {low} to {high} {d33['unit']}"
 
 

@@ -10,7 +10,7 @@
   its explanation depends on the line. Values are means weighted with 1/variance.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,13 +21,14 @@ from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
 from underskin.diagnosis.inference.residuals import row_prediction
 from underskin.diagnosis.localisation import axis_values
+from underskin.diagnosis.reporting.facts import DiagnosisResult
+from underskin.diagnosis.reporting.kinds import KINDS
 from underskin.diagnosis.reporting.numbers import parameter_index
-from underskin.diagnosis.reporting.report import DiagnosisResult
-from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, frf_recordings
+from underskin.recordings.campaign import Campaign, CurveRecording, frf_recordings
 from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
-MOST_SAMPLES = 600  # drawn of a curve
+_MOST_POINTS = 600  # samples drawn of a curve, or points of a map
 _MORE = 1.1  # times the residual of plain least squares
 _SAMPLES_NEAR_CORNER = 12  # on either side of a jump or of the deepest sample, all drawn
 
@@ -41,21 +42,12 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class CurvePrediction:
-    """One explanation's prediction of one curve: force (rows,), its standard deviation (rows,) from noise and from
-    errors that neighbouring samples share, and the contact point."""
-
-    force_n: Floats
-    deviation_n: Floats
-    contact: Mark
-
-
-@dataclass(frozen=True)
 class ShownCurve:
     """One recording: the drawn samples (shown,) of its `count`, and the means that were fitted (rows,).
 
-    `snap_in` is the first sample in contact after the jump, `pull_off` the last one before its jump; None where there
-    is no jump.
+    `predicted_n` and `contacts`: force and contact point by the explanations `before` and `after`; `deviation_n`: of
+    the force about the latter, from noise and from errors that neighbouring samples share. `snap_in` is the first
+    sample in contact after the jump, `pull_off` the last one before its jump; None where there is no jump.
     """
 
     name: str
@@ -64,8 +56,9 @@ class ShownCurve:
     sample_n: Floats  # (shown,)
     displacement_mm: Floats  # (rows,)
     force_n: Floats  # (rows,)
-    before: CurvePrediction
-    after: CurvePrediction
+    predicted_n: Mapping[str, Floats]  # each (rows,)
+    contacts: Mapping[str, Mark]
+    deviation_n: Floats  # (rows,)
     snap_in: Mark | None
     pull_off: Mark | None
 
@@ -73,25 +66,50 @@ class ShownCurve:
     def misfit_percent(self) -> float:
         """100 √(Σ|y − m|²/Σ|y|²) under the explanation after."""
         size = float(np.linalg.norm(self.force_n))
-        return 100 * float(np.linalg.norm(self.force_n - self.after.force_n)) / size if size else 0.0
+        return 100 * float(np.linalg.norm(self.force_n - self.predicted_n["after"])) / size if size else 0.0
 
 
 def shown_curves(
     problem: FittingProblem, recorded: Campaign, before: Explanation, after: Explanation
 ) -> list[ShownCurve]:
     """All fitted curves, the worst explained first; `recorded` holds them with every sample."""
-    raw = {
-        recording.id: recording
-        for recording in recorded.recordings
-        if isinstance(recording, CurveRecording) and recording.kind == problem.kind
-    }
     lines = problem.lines
-    predicted = zip(_predictions(problem, before), _predictions(problem, after), strict=True)
+    raw = {recording.id: recording for recording in _curves(recorded)}
+    _, before_curves = _predictions(problem, before)
+    cell, after_curves = _predictions(problem, after)
+    deviation = _deviation(problem, after, cell)
     curves = []
-    for recording, span, predictions in zip(lines.campaign.recordings, lines.spans, predicted, strict=True):
-        assert isinstance(recording, CurveRecording)
-        curves.append(_shown(raw[recording.id], recording.displacement_mm, lines.value.real[span], *predictions))
+    for index, (recording, span) in enumerate(zip(_curves(lines.campaign), lines.spans, strict=True)):
+        sample_mm, measured, *times = finite_samples(raw[recording.id])
+        landmarks = curve_landmarks(sample_mm, measured, *times)
+        jumps: list[int | None] = [None, None]
+        if recording.kind == "indentation":
+            measured = measured - landmarks.zero
+            jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
+        snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
+        along = path_fractions(sample_mm, measured, landmarks, problem.kind)
+        shown = _thinned(along, [landmarks.turn, *(at for at in jumps if at is not None)])
+        predicted = {"before": before_curves[index], "after": after_curves[index]}
+        curves.append(
+            ShownCurve(
+                name=recording.id,
+                count=len(measured),
+                sample_mm=sample_mm[shown],
+                sample_n=measured[shown],
+                displacement_mm=recording.displacement_mm,
+                force_n=lines.value.real[span],
+                predicted_n={role: force for role, (force, _) in predicted.items()},
+                contacts={role: contact for role, (_, contact) in predicted.items()},
+                deviation_n=deviation[span],
+                snap_in=snap_in,
+                pull_off=pull_off,
+            )
+        )
     return sorted(curves, key=lambda curve: -curve.misfit_percent)
+
+
+def _curves(campaign: Campaign) -> list[CurveRecording]:
+    return [recording for recording in campaign.recordings if isinstance(recording, CurveRecording)]
 
 
 def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Floats) -> tuple[Floats, Floats] | None:
@@ -108,25 +126,21 @@ def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Fl
     return (fit, plain) if misfit > _MORE * least_misfit else None
 
 
-def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
-    """The prediction of each curve."""
+def _predictions(problem: FittingProblem, explanation: Explanation) -> tuple[CellResponse, list[tuple[Floats, Mark]]]:
+    """The cells' response under an explanation; of each curve the force (rows,) [N] and the contact point."""
     lines, fit = problem.lines, explanation.point.fit
     force = explanation.model.predict(fit).value.real
     cell = cell_response(lines, explanation.best.levels, force)
     reading = cell.reading(lines, force)
-    plain = plain_reading(problem, explanation, reading)
-    if plain is not None:
-        fit, reading = plain
-    deviation = _deviation(problem, explanation, cell)
+    fit, reading = plain_reading(problem, explanation, reading) or (fit, reading)
     predicted = []
-    for recording, span in zip(lines.campaign.recordings, lines.spans, strict=True):
-        assert isinstance(recording, CurveRecording)
+    for recording, span in zip(_curves(lines.campaign), lines.spans, strict=True):
         contact = float(fit[parameter_index(explanation, f"contact_point {recording.id}")])
         # The cell's reading in the air just before contact, including any drift
         in_air = np.flatnonzero(recording.displacement_mm[: int(recording.displacement_mm.argmax()) + 1] <= contact)
         shown = reading[span][in_air[-1]] if len(in_air) else cell.offset[span][0]
-        predicted.append(CurvePrediction(reading[span], deviation[span], Mark(contact, float(shown))))
-    return predicted
+        predicted.append((reading[span], Mark(contact, float(shown))))
+    return cell, predicted
 
 
 def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResponse) -> Floats:
@@ -141,44 +155,15 @@ def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResp
     return np.sqrt(np.maximum(variance, 0.0))
 
 
-def _shown(
-    raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
-) -> ShownCurve:
-    sample_mm, measured, *times = finite_samples(raw)
-    landmarks = curve_landmarks(sample_mm, measured, *times)
-    jumps: list[int | None] = [None, None]
-    if raw.kind == "indentation":
-        measured = measured - landmarks.zero
-        jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
-    snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
-    shown = _thinned(
-        path_fractions(sample_mm, measured, landmarks, "indentation" if raw.kind == "indentation" else "compression"),
-        [landmarks.turn, *(at for at in jumps if at is not None)],
-    )
-    return ShownCurve(
-        name=raw.id,
-        count=len(measured),
-        sample_mm=sample_mm[shown],
-        sample_n=measured[shown],
-        displacement_mm=displacement,
-        force_n=force,
-        before=before,
-        after=after,
-        snap_in=snap_in,
-        pull_off=pull_off,
-    )
-
-
 def _thinned(way: Floats, corners: list[int]) -> Indices:
     """Indices of the samples drawn: even in the arc length `way` (0 to 1), and all near the corners."""
     count = len(way)
-    if count <= MOST_SAMPLES:
+    if count <= _MOST_POINTS:
         return np.arange(count)
-    even = np.minimum(np.searchsorted(way, np.linspace(0.0, 1.0, MOST_SAMPLES)), count - 1)
     near_corners = [
         np.arange(max(at - _SAMPLES_NEAR_CORNER, 0), min(at + _SAMPLES_NEAR_CORNER + 1, count)) for at in corners
     ]
-    return np.unique(np.concatenate([even, *near_corners]))
+    return np.unique(np.concatenate([_even(way, _MOST_POINTS), *near_corners]))
 
 
 MOST_RECORDINGS = 120
@@ -212,23 +197,16 @@ class ShownFrf:
 def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation) -> list[ShownFrf]:
     """The fitted recordings, the one with the largest misfit after first; at most `MOST_RECORDINGS`, those with the
     largest misfit, equally many of each sensor."""
-    lines = problem.lines
-    measured, predicted_before, predicted_after = (
-        _PC_PER_C * rows
-        for rows in (lines.value, *(_predicted(problem, explanation) for explanation in (before, after)))
-    )
-    deviation = _PC_PER_C * _frf_deviation(problem, after)
-    misfits = [
-        [_misfit_percent(measured[span], rows[span]) for span in lines.spans]
-        for rows in (predicted_before, predicted_after)
-    ]
-    chosen = _worst([recording.sensor for recording in frf_recordings(lines.campaign)], misfits[1])
+    lines, recordings = problem.lines, frf_recordings(problem.lines.campaign)
+    predicted = [_predicted(problem, explanation) for explanation in (before, after)]
+    misfits = [[_misfit_percent(lines.value[span], rows[span]) for span in lines.spans] for rows in predicted]
+    deviation = _frf_deviation(problem, after, predicted[1])
+    chosen = _worst([recording.sensor for recording in recordings], misfits[1])
     most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, _MOST_LINES))
     shown = []
     for index in chosen:
-        recording, span = lines.campaign.recordings[index], lines.spans[index]
-        assert isinstance(recording, FrfRecording)
-        shown_rows = span.start + _thinned_lines(lines.frequency[span], most)
+        recording, span = recordings[index], lines.spans[index]
+        rows = span.start + _thinned_lines(lines.frequency[span], most)
         shown.append(
             ShownFrf(
                 name=recording.id,
@@ -236,11 +214,11 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
                 indenter_radius_mm=recording.indenter_radius_mm,
                 preload_n=recording.preload_n,
                 count=span.stop - span.start,
-                frequency_hz=lines.frequency[shown_rows],
-                measured=measured[shown_rows],
-                before=predicted_before[shown_rows],
-                after=predicted_after[shown_rows],
-                deviation=deviation[:, shown_rows],
+                frequency_hz=lines.frequency[rows],
+                measured=_PC_PER_C * lines.value[rows],
+                before=_PC_PER_C * predicted[0][rows],
+                after=_PC_PER_C * predicted[1][rows],
+                deviation=_PC_PER_C * deviation[:, rows],
                 misfit_before=misfits[0][index],
                 misfit_after=misfits[1][index],
             )
@@ -256,19 +234,20 @@ def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
     return predicted
 
 
-def _frf_deviation(problem: FittingProblem, explanation: Explanation) -> Floats:
+def _frf_deviation(problem: FittingProblem, explanation: Explanation, predicted: Complexes) -> Floats:
     """Standard deviation of real and imaginary part about the prediction (2, rows) [C/N]: noise of the lines, mains
     pick-up, gain and position of the recording."""
     lines, best = problem.lines, explanation.best
-    levels, predicted = best.levels, _predicted(problem, explanation)
-    pickup = best.pickup_variance
-    of_line = (levels.level * lines.deviation) ** 2 + (
-        pickup if len(pickup) == len(lines.value) else pickup[lines.recording]
-    )
+    levels = best.levels
+    of_line = (levels.level * lines.deviation) ** 2 + _of_rows(lines, best.pickup_variance)
     position_variance = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
     relative = levels.gain**2 + position_variance + 0.5 * levels.position**4 * problem.curvature.square
-    parts = np.array([predicted.real, predicted.imag])
-    return np.sqrt(of_line + relative[lines.recording] * parts**2)
+    return np.sqrt(of_line + relative[lines.recording] * np.array([predicted.real, predicted.imag]) ** 2)
+
+
+def _of_rows(lines: Lines, column: Floats) -> Floats:
+    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
+    return column if len(column) == len(lines.value) else column[lines.recording]
 
 
 def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
@@ -295,21 +274,25 @@ def _thinned_lines(frequency: Floats, most: int) -> Indices:
     if count <= most:
         return np.arange(count)
     log_frequency = np.log(np.maximum(frequency, np.min(frequency[frequency > 0], initial=np.inf)))
-    targets = np.linspace(log_frequency[0], log_frequency[-1], most)
-    return np.unique(np.minimum(np.searchsorted(log_frequency, targets), count - 1))
+    return _even(log_frequency, most)
+
+
+def _even(along: Floats, most: int) -> Indices:
+    """Indices that are about even in a rising coordinate."""
+    targets = np.linspace(along[0], along[-1], most)
+    return np.unique(np.minimum(np.searchsorted(along, targets), len(along) - 1))
 
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
 _TRAVEL = "displacement_mm"
 
-_MOST_POINTS = 600
 _LEAST_BINS = 8  # of the lines, so that a shape over them is visible in campaigns of any size
 _MOST_LEVELS = 24  # of an axis
 _MOST_OF_TRAVEL = 12  # of the displacement, whose labels are long
 _DIGITS, _DECIMALS = range(3, 10), range(7)  # tried for labels, until all differ
 _ALMOST_ALL = 0.9  # share of the gaps between neighbouring lines that are no wider than a step
 _SLACK = 1e-9  # of a step, for lines on its edge
-_SMALLEST = 0.05  # of the largest response: the least scale of a residual
+SMALLEST = 0.05  # of the largest response: the least scale of a residual
 
 
 @dataclass(frozen=True)
@@ -325,8 +308,7 @@ class Points:
     @property
     def residual_percent(self) -> Complexes:
         """Measured minus predicted over |predicted|, or over 5 % of the largest where that is more."""
-        size = np.abs(self.predicted)
-        residual: Complexes = 100 * (self.measured - self.predicted) / np.maximum(size, _SMALLEST * size.max())
+        residual: Complexes = 100 * (self.measured - self.predicted) / self._scale
         return residual
 
     def times(self, factor: float) -> "Points":
@@ -341,9 +323,13 @@ class Points:
     @property
     def noise_percent(self) -> Floats:
         """Standard deviation of the noise over the same scale."""
-        size = np.abs(self.predicted)
-        noise: Floats = 100 * np.hypot(self.deviation, self.gain * size) / np.maximum(size, _SMALLEST * size.max())
+        noise: Floats = 100 * np.hypot(self.deviation, self.gain * np.abs(self.predicted)) / self._scale
         return noise
+
+    @property
+    def _scale(self) -> Floats:
+        size = np.abs(self.predicted)
+        return np.maximum(size, SMALLEST * size.max())
 
 
 @dataclass(frozen=True)
@@ -368,7 +354,7 @@ class Thinned:
         along = any(axis in diagnosis.region for axis in lines.row_axes)
         by_line = lines.curves or along or any(lines.mechanisms[name].needs_lines for name in shown.names)
         most = max(_MOST_POINTS // lines.recordings, _LEAST_BINS) if by_line else 1
-        step = _steps_of_samples(lines.frequency, most) if lines.curves else _steps_of_lines(lines, most)
+        step = _in_steps(np.round(lines.frequency, 6), most)[2] if lines.curves else _steps_of_lines(lines, most)
         bins = int(step.max()) + 1
         self.by_line = by_line
         self._used, self._point = np.unique(lines.recording * bins + step, return_inverse=True)
@@ -387,7 +373,7 @@ class Thinned:
         if plain is not None:
             predicted = plain[1].astype(complex)
         variance = (levels.level**2 / self._total) + self._mean(self._row_variance(explanation))
-        unit = 1.0 if lines.curves else 1e12
+        unit = KINDS[lines.kind].per_si
         return Points(
             recording=self.recording,
             measured=unit * self._complex_mean(lines.value),
@@ -411,11 +397,10 @@ class Thinned:
 
     def _of_lines(self, frequency: Floats) -> Levels | None:
         """The steps common to all recordings, neighbours merged where there are too many."""
-        distinct, step = np.unique(self._bin, return_inverse=True)
-        steps = min(len(distinct), _MOST_LEVELS)
+        _, of_distinct, step = _in_steps(self._bin, _MOST_LEVELS)
+        steps = int(of_distinct[-1]) + 1
         if steps < 2:
             return None
-        step = step.reshape(-1) * steps // len(distinct)
         of_row = step[self._point]
         low, high = np.full(steps, np.inf), np.zeros(steps)
         np.minimum.at(low, of_row, frequency)
@@ -436,8 +421,7 @@ class Thinned:
             explanation.best.hypothesis.lines.recording
         ]
         variance += levels.position**2 * squared_slopes * np.abs(prediction.value) ** 2
-        variance += explanation.best.pickup_variance
-        return variance if len(variance) == len(self.lines.value) else variance[self.lines.recording]
+        return _of_rows(self.lines, variance + explanation.best.pickup_variance)
 
     def _mean(self, column: Floats) -> Floats:
         return np.bincount(self._point, self._weight * column) / self._total
@@ -446,11 +430,12 @@ class Thinned:
         return self._mean(column.real) + 1j * self._mean(column.imag)
 
 
-def _steps_of_samples(coordinate: Floats, most: int) -> Indices:
-    """The step of each sample (rows,), with about equal numbers of distinct values of `coordinate`."""
-    distinct, index = np.unique(np.round(coordinate, 6), return_inverse=True)
-    steps: Indices = index.reshape(-1) * min(len(distinct), most) // len(distinct)
-    return steps
+def _in_steps(values: Array, most: int) -> tuple[Array, Indices, Indices]:
+    """The distinct values, and the step of each of them and of each value: steps of about equal numbers of distinct
+    values."""
+    distinct, index = np.unique(values, return_inverse=True)
+    of_distinct = np.arange(len(distinct)) * min(len(distinct), most) // len(distinct)
+    return distinct, of_distinct, of_distinct[index.reshape(-1)]
 
 
 def _steps_of_lines(lines: Lines, most: int) -> Indices:
@@ -468,12 +453,11 @@ def _steps_of_lines(lines: Lines, most: int) -> Indices:
 
 def _stepped(column: Floats, axis: str) -> Levels:
     """The distinct values of a column as steps, or steps of about equal counts; displacements in a readable unit."""
-    distinct, index = np.unique(np.round(column, 6), return_inverse=True)
-    steps = min(len(distinct), _MOST_OF_TRAVEL if axis == _TRAVEL else _MOST_LEVELS)
-    of_value = np.arange(len(distinct)) * steps // len(distinct)
-    starts = np.searchsorted(of_value, np.arange(steps))
+    most = _MOST_OF_TRAVEL if axis == _TRAVEL else _MOST_LEVELS
+    distinct, of_distinct, step = _in_steps(np.round(column, 6), most)
+    starts = np.flatnonzero(np.diff(of_distinct, prepend=-1))
     low, high = distinct[starts], distinct[np.append(starts[1:], len(distinct)) - 1]
-    step, middle = of_value[index.reshape(-1)], (low + high) / 2
+    middle = (low + high) / 2
     if axis != _TRAVEL:
         return Levels(step, _distinct(middle, _DIGITS, fractional=False), low, high, AXES[axis])
     unit, scale = readable_unit(axis, float(np.abs(distinct).max()))

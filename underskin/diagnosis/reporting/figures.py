@@ -8,35 +8,33 @@ against the band of its population. Colour scales run from purple to orange, whi
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from textwrap import wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.data.names import SIMPLEST, quantity_in_words
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.localisation import SIGNIFICANT
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.reporting.facts import DiagnosisResult, Facts
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned, shown_curves, shown_frfs
-from underskin.diagnosis.reporting.law_statement import capital
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.page_styles import BOUND, LINE_COLOURS
 from underskin.diagnosis.reporting.recording_figures import (
     AFTER,
     BAND,
     BEFORE,
+    BELOW,
     MEASURED,
     curve_figure,
     frf_figure,
     parameter_intervals,
     styled,
 )
-from underskin.diagnosis.reporting.report import DiagnosisResult
-from underskin.findings.formatting import in_percent
+from underskin.findings.formatting import capital, in_percent
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 from underskin.mechanisms.unlisted.laws import in_plain_words
-from underskin.recordings.campaign import Campaign
-from underskin.units import Floats, readable_unit
+from underskin.units import Complexes, Floats, readable_unit
 
 _GREY = "#BBBBBB"
 _MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, up to which numbers are shown
@@ -50,36 +48,48 @@ _EDGE = 0.04  # of the range shown: margin at the ends of an axis
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
     """The figures by name: where, frf or curve, before_after, explanations, parameters. `document`: the report."""
-    if diagnosis.search is None or diagnosis.problem is None:
+    if diagnosis.search is None:
         return {}
-    base = next(explanation for explanation in diagnosis.search.explanations if not explanation.names)
-    shown = diagnosis.search.fit_behind(diagnosis.search.answers[0])
-    thinned = Thinned(diagnosis, diagnosis.problem, shown)
-    before, after = thinned.points(base), thinned.points(shown)
+    facts = Facts(diagnosis)
+    problem, shown = facts.problem, facts.shown
+    thinned = Thinned(diagnosis, problem, shown)
+    before, after = thinned.points(facts.base), thinned.points(shown)
+    part = _part(facts)
     drawn = {
-        "where": residual_map(diagnosis, thinned, before, after),
-        "before_after": before_and_after(diagnosis, thinned, before, after, shown),
+        "where": residual_map(diagnosis, thinned, before, after, part),
+        "before_after": before_and_after(facts, before, after, part),
         "explanations": explanations(document),
     }
+    simplest = SIMPLEST[problem.kind]
+    names = (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
     if diagnosis.curves is not None:
-        drawn["curve"] = _curve(diagnosis.problem, diagnosis.curves, base, shown)
-    elif not diagnosis.problem.lines.curves:
-        recordings = shown_frfs(diagnosis.problem, base, shown)
-        drawn["frf"] = frf_figure(recordings, *_models(diagnosis.problem, shown))
+        curves = shown_curves(problem, diagnosis.curves, facts.base, shown)
+        drawn["curve"] = curve_figure(curves, facts.traits, *names)
+    else:
+        drawn["frf"] = frf_figure(shown_frfs(problem, facts.base, shown), *names)
     if any(mechanism["parameters"] for mechanism in document["mechanisms"]):
-        drawn["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
+        drawn["parameters"] = parameter_intervals(shown, document["mechanisms"])
     return drawn
 
 
-def _curve(problem: FittingProblem, recorded: Campaign, base: Explanation, shown: Explanation) -> go.Figure:
-    """Each curve with the model before and after; with one model where nothing is added."""
-    return curve_figure(shown_curves(problem, recorded, base, shown), problem.kind, *_models(problem, shown))
+class _Part(NamedTuple):
+    """The real or imaginary part of responses, its name, and this after a comma; of curves nothing."""
+
+    is_imaginary: bool
+    name: str
+    words: str
+
+    def of(self, column: Complexes) -> Floats:
+        return column.imag if self.is_imaginary else column.real
 
 
-def _models(problem: FittingProblem, shown: Explanation) -> tuple[str, str]:
-    """Names of the models before and after; before is empty where nothing is added."""
-    simplest = SIMPLEST[problem.kind]
-    return (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
+def _part(facts: Facts) -> _Part:
+    """The real part, or the imaginary part where the misfit lies in the phase."""
+    telling = [result for result in facts.diagnosis.axes if result.significant]
+    largest = max(telling, key=lambda result: result.share, default=None)
+    if largest is not None and largest.axis == "phase":
+        return _Part(True, "out of phase", ", out of phase")
+    return _Part(False, *facts.traits.part)
 
 
 def explanations(document: Mapping[str, Any]) -> go.Figure:
@@ -122,15 +132,13 @@ def _in_lines(names: Sequence[str]) -> str:
     return " +<br>".join(lines)
 
 
-def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points) -> go.Figure:
+def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points, part: _Part) -> go.Figure:
     """Residual of the base model over the located axes, with the region outlined.
 
     A cell is the mean over its points; out of phase where the misfit lies in the phase, as the title says. Cells within
     the noise are pale. The noise is that of the stated explanation, since the base model counts its misfit as noise;
     `meta` of the layout has half its 95 % interval [%].
     """
-    part, name = _part(diagnosis, before.residual_percent)
-    which = "" if thinned.lines.curves else f", {name}"
     x_axis, y_axis = _map_axes(diagnosis, thinned)
     x, y = (None if axis is None else thinned.levels(axis) for axis in (x_axis, y_axis))
     single_level = Levels(np.zeros(len(before.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
@@ -138,7 +146,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
     cell = y.step * len(x.names) + x.step
     size = len(x.names) * len(y.names)
     count = np.bincount(cell, minlength=size)
-    mean = np.where(count > 0, np.bincount(cell, part, size) / np.maximum(count, 1), np.nan)
+    mean = np.where(count > 0, np.bincount(cell, part.of(before.residual_percent), size) / np.maximum(count, 1), np.nan)
     shape = (len(y.names), len(x.names))
     noise = SDS_OF_95 * float(np.median(after.noise_percent))
     limit = max(float(np.nanmax(np.abs(mean))), _ABOVE_NOISE * noise) or 1.0
@@ -156,7 +164,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
         textfont={"size": _CELL} if len(y.names) <= _MOST_ABREAST else None,
         xgap=1,
         ygap=1,
-        colorbar={"title": {"text": f"{name} [%]", "side": "right"}},
+        colorbar={"title": {"text": f"{part.name} [%]", "side": "right"}},
         hovertemplate="%{z:+.3g} % (mean of %{customdata})<extra></extra>",
     )
     for levels, update in ((x, figure.update_xaxes), (y, figure.update_yaxes)):
@@ -166,7 +174,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
         (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
         figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": MEASURED, "width": 3})
     figure.update_layout(
-        title=f"Where: measured less {SIMPLEST[thinned.lines.kind]}{which}, in percent of it",
+        title=f"Where: measured less {SIMPLEST[thinned.lines.kind]}{part.words}, in percent of it",
         height=170 + 40 * max(4, min(len(y.names), 12)),
         meta={"noise_percent": noise},
     )
@@ -180,29 +188,26 @@ def _percent_label(percent: float) -> str:
     return f"{percent:+.0f}".replace("-", "−") if round(percent) else "0"
 
 
-def before_and_after(
-    diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points, shown: Explanation
-) -> go.Figure:
+def before_and_after(facts: Facts, before: Points, after: Points, part: _Part) -> go.Figure:
     """Measured against predicted, by the base model and by the stated explanation, each with the band of the noise."""
-    headings = f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"
+    headings = f"before: {SIMPLEST[facts.problem.kind]}", f"after: {_named(facts.shown)}"
     titles = ["<br>".join(wrap(title, _TITLE)) for title in headings]
     figure = make_subplots(1, 2, subplot_titles=titles, horizontal_spacing=0.12)
     further = _TITLE_LINE * max(title.count("<br>") for title in titles)
-    _, name = _part(diagnosis, before.measured)
-    what, unit = f"FRF, {name} ", "pC/N"
-    if thinned.lines.curves:
+    unit = "pC/N"
+    if facts.problem.lines.curves:
         largest = max(float(np.abs(points.measured).max()) for points in (before, after))
-        readable, per_n = readable_unit("force_n", largest)
-        what, unit, before, after = "force ", readable, before.times(per_n), after.times(per_n)
+        unit, per_n = readable_unit("force_n", largest)
+        before, after = before.times(per_n), after.times(per_n)
     both = np.concatenate([column for points in (before, after) for column in (points.predicted, points.measured)])
-    shown_part = _part(diagnosis, both)[0]
+    shown_part = part.of(both)
     room = _EDGE * float(np.ptp(shown_part))
     axis_range = [float(shown_part.min()) - room, float(shown_part.max()) + room]
-    ids = [escape(recording.id) for recording in thinned.lines.campaign.recordings]
+    ids = [escape(recording.id) for recording in facts.problem.lines.campaign.recordings]
     for panel, (points, colour, marker) in enumerate(
         ((before, BEFORE, "square-open"), (after, AFTER, "circle")), start=1
     ):
-        predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
+        predicted, measured = map(part.of, (points.predicted, points.measured))
         along = np.linspace(predicted.min(), predicted.max(), _BAND)
         # If all predictions were equal the band would have no width along the abscissa.
         along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
@@ -236,7 +241,9 @@ def before_and_after(
             col=panel,
         )
     figure.update_xaxes(title=f"predicted [{unit}]", title_font_size=_TITLE_SIZE, range=axis_range)
-    figure.update_yaxes(title=f"measured {what}[{unit}]", title_font_size=_TITLE_SIZE, col=1)
+    figure.update_yaxes(
+        title=f"measured {facts.traits.response}{part.words} [{unit}]", title_font_size=_TITLE_SIZE, col=1
+    )
     for panel in (1, 2):
         figure.update_yaxes(range=axis_range, scaleanchor=f"x{panel}", constrain="domain", row=1, col=panel)
         figure.update_xaxes(constrain="domain", row=1, col=panel)
@@ -244,7 +251,7 @@ def before_and_after(
         title="Measured against predicted",
         height=470 + further,
         margin={"t": 90 + further, "b": 100},
-        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
+        legend=BELOW,
     )
     figure.update_annotations(font_size=_TITLE_SIZE)
     return styled(figure)
@@ -254,17 +261,6 @@ def _named(shown: Explanation) -> str:
     mechanisms = shown.best.hypothesis.lines.mechanisms
     label = " + ".join(in_plain_words(mechanisms[name]) for name in shown.names)
     return label.replace("_", " ") or "nothing added"
-
-
-def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
-    """The real part, or the imaginary part where the misfit lies in the phase, and its name."""
-    if diagnosis.problem is not None and diagnosis.problem.lines.curves:
-        return column.real, "force"
-    telling = [result for result in diagnosis.axes if result.p_value is not None and result.p_value < SIGNIFICANT]
-    largest = max(telling, key=lambda result: result.share, default=None)
-    if largest is not None and largest.axis == "phase":
-        return column.imag, "out of phase"
-    return column.real, "in phase"
 
 
 def _map_axes(diagnosis: DiagnosisResult, thinned: Thinned) -> tuple[str | None, str | None]:

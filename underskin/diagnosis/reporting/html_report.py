@@ -17,8 +17,8 @@ from plotly.offline import get_plotlyjs
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.figures import explanations, several_figures
-from underskin.diagnosis.reporting.law_statement import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.page_styles import SCHEME
+from underskin.diagnosis.reporting.statement import first_and_rest, lacking_part
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
@@ -50,7 +50,7 @@ plot.parentElement.style.height = "auto"; // its box has the height of the figur
 """  # replaces a figure's own menu, which the keyboard cannot open
 
 _FILTERS = (
-    *(wording.as_stated, wording.axis, wording.columns, wording.error, wording.finding, wording.group),
+    *(wording.axis, wording.columns, wording.error, wording.finding, wording.group),
     *(wording.in_its_unit, wording.interval, wording.law_range, wording.not_quoted, wording.number, wording.plain),
     *(wording.quantity, wording.readable, wording.unit, wording.words),
     *(acted_on, followed, first_and_rest, in_percent, lacking_part),

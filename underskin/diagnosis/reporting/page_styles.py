@@ -17,8 +17,10 @@ import numpy as np
 from underskin.units import Floats, readable_unit
 
 SHOWN, PAPER, BOUND = "solid", "dash", "dot"
+PLAIN = {"exponentformat": "none"}  # without it ticks would have prefixes as well as the axis its unit: 10μ of N
 # Full labels of a logarithmic axis; plotly would label both 50 and 0.5 as 5.
 WHOLE_NUMBERS = {"tickformat": "~g"}
+LEAST_PHASE = 10.0  # ° to each side of an axis, so that noise is not magnified
 _FEW_DECADES = 2.5  # up to which there is room for labels at 2 and 5
 _MOST_POWERS = 9  # of ten, labelled on an axis
 _WIDE, _DECADE = 3.0, 10.0  # largest magnitude over the typical and over the smallest, of a logarithmic axis

@@ -10,7 +10,6 @@ measured; orange, dashed and square the model before; blue, solid and circle the
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import Any, NamedTuple
 
@@ -19,37 +18,70 @@ import plotly.graph_objects as go
 import plotly.io as pio
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import parameter_slices
-from underskin.diagnosis.reporting.figure_data import CurvePrediction, Mark, ShownCurve, ShownFrf
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, multiple_of
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.reporting.figure_data import SMALLEST, Mark, ShownCurve, ShownFrf
+from underskin.diagnosis.reporting.kinds import KindTraits
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, multiple_of, spans
 from underskin.diagnosis.reporting.page_styles import (
+    LEAST_PHASE,
     PAPER,
+    PLAIN,
     SHOWN,
     WHOLE_NUMBERS,
     decade_ticks,
     is_logarithmic,
     with_minus,
 )
-from underskin.mechanisms.base import Kind
 from underskin.mechanisms.parameter import Parameter
 from underskin.units import Floats, readable_unit
 
-PLAIN = {"exponentformat": "none"}  # without it ticks would have prefixes as well as the axis its unit: 10μ of N
-TEMPLATE = go.layout.Template(pio.templates["plotly_white"]).update(
+_TEMPLATE = go.layout.Template(pio.templates["plotly_white"]).update(
     layout={"xaxis": PLAIN, "yaxis": PLAIN}, data={"heatmap": [{"colorbar": PLAIN}]}
 )
+_STYLE = {"template": _TEMPLATE, "font": {"size": 14, "color": "#222222"}}
 MEASURED, BEFORE, AFTER, BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.15)"
+BELOW = {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"}  # a legend below the figure
+PlotlyTrace = dict[str, Any]
 
 
 def styled(figure: go.Figure) -> go.Figure:
     """The figure in the common layout."""
-    figure.update_layout(template=TEMPLATE, font={"size": 14, "color": "#222222"})
-    return figure
+    return figure.update_layout(**_STYLE)
+
+
+class Model(NamedTuple):
+    """Style of a model; `role` is before or after, `words` its name in a legend, `mark` the size of its contact points
+    [pixels]."""
+
+    role: str
+    words: str
+    colour: str
+    dash: str
+    symbol: str
+    mark: int
+
+
+def models_of(before: str, after: str) -> list[Model]:
+    """The models by their names; `before` is empty where there is one."""
+    if not before:
+        return [Model("after", after, AFTER, SHOWN, "circle", 8)]
+    return [
+        Model("before", f"before: {before}", BEFORE, PAPER, "square-open", 13),
+        Model("after", f"after: {after}", AFTER, SHOWN, "circle", 8),
+    ]
+
+
+def _with_menu(figure: go.Figure, labels: Sequence[str], args: Sequence[Any]) -> go.Figure:
+    """The figure with a menu that shows one of several recordings; a button's `name` is its label without markup."""
+    buttons = [
+        {"label": escape(label), "name": label, "method": "update", "args": changed}
+        for label, changed in zip(labels, args, strict=True)
+    ]
+    menu = {"buttons": buttons, "x": 1, "xanchor": "right", "y": 1.02, "yanchor": "bottom"}
+    return figure.update_layout(updatemenus=[menu]) if len(buttons) > 1 else figure
 
 
 _MOST_CURVES = 12
-_TITLES = {"indentation": "Force against depth", "compression": "Force against displacement"}
 _LOADED = 0.02  # of the largest force, from which a curve is in the initial view
 _CURVE_ROOM = 0.4, 0.05  # of the initial view: additional range in the air, if recorded, and margin
 _ALONG = 40  # points along an edge of the band
@@ -57,32 +89,11 @@ _CURVE_HEIGHT, _PANEL = 460, 150  # pixels
 _PANEL_TITLE = 12  # smaller than others, so that those of two panels do not touch
 
 
-class _CurveModel(NamedTuple):
-    """Name and style of a model; `role` is before or after."""
-
-    role: str
-    name: str
-    colour: str
-    dash: str
-    marker: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class _Drawing:
-    """One recording: its traces, and its part of the layout by path."""
-
-    label: str
-    traces: list[dict[str, Any]]
-    layout: dict[str, Any]
-
-
-def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: str) -> go.Figure:
+def curve_figure(curves: Sequence[ShownCurve], traits: KindTraits, before: str, after: str) -> go.Figure:
     """The figure of the first curves; `before` and `after` are names of the models, `before` empty where there is
     one."""
-    models = [_CurveModel("after", after, AFTER, SHOWN, {"symbol": "circle", "size": 8})]
-    if before:
-        models.insert(0, _CurveModel("before", before, BEFORE, PAPER, {"symbol": "square-open", "size": 13}))
-    drawings = [_Curve(curve, kind, models).drawing() for curve in curves[:_MOST_CURVES]]
+    models = models_of(before, after)
+    drawings = [_Curve(curve, traits, models) for curve in curves[:_MOST_CURVES]]
     panels = len(models)
     height = _CURVE_HEIGHT + _PANEL * panels
     share = 0.8 * _PANEL / height
@@ -93,67 +104,64 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
         figure.add_traces([{**trace, "visible": index == 0} for trace in drawing.traces])
     for path, value in drawings[0].layout.items():
         figure.layout[path] = value
+    visible = [[other is drawing for other in drawings for _ in other.traces] for drawing in drawings]
     figure.update_layout(
-        title=_TITLES[kind],
-        template=TEMPLATE,
-        font={"size": 14, "color": "#222222"},
+        title=traits.title,
+        **_STYLE,
         height=height,
         margin={"r": 20, "t": 80, "b": 130},
-        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "tracegroupgap": 0},
+        legend={**BELOW, "tracegroupgap": 0},
     )
-    if len(drawings) > 1:
-        figure.update_layout(updatemenus=[_curve_menu(drawings)])
-    return figure
+    labels = [drawing.label for drawing in drawings]
+    args = [[{"visible": shown}, drawing.layout] for shown, drawing in zip(visible, drawings, strict=True)]
+    return _with_menu(figure, labels, args)
 
 
 class _Curve:
-    """One recording in readable units; depth is measured from the contact point of the model after."""
+    """One recording in readable units: its label, its traces and its part of the layout by path.
 
-    def __init__(self, curve: ShownCurve, kind: Kind, models: Sequence[_CurveModel]) -> None:
+    Samples and models above, residuals below, marks on top; depth is measured from the contact point of the model
+    after.
+    """
+
+    def __init__(self, curve: ShownCurve, traits: KindTraits, models: Sequence[Model]) -> None:
         self._curve, self._models = curve, models
-        self._zero = curve.after.contact.displacement_mm
+        self._zero = curve.contacts["after"].displacement_mm
         deepest = float(np.abs(curve.displacement_mm - self._zero).max())
         self._length, self._per_mm = readable_unit("displacement_mm", deepest)
-        self._along = "depth" if kind == "indentation" else "displacement"
-
-    def drawing(self) -> _Drawing:
-        """Samples and models above, residuals below, marks on top."""
-        curve = self._curve
+        self.label = f"{curve.name}: {curve.misfit_percent:.2g} % left"
         every = len(curve.sample_n) == curve.count
         samples = f"{curve.count} samples" if every else f"{len(curve.sample_n)} of {curve.count} samples"
         largest = float(np.abs(curve.sample_n).max())
         dots = {"color": MEASURED, "symbol": "circle-open", "size": 4, "opacity": 0.45}
         measured = {"mode": "markers", "marker": dots, "name": f"measured ({samples})"}
-        traces = [self._trace("measured", curve.sample_mm, curve.sample_n, largest, measured)]
-        layout: dict[str, Any] = {"yaxis.title.text": f"force [{readable_unit('force_n', largest)[0]}]"}
-        residuals = [curve.force_n - self._predicted(model).force_n for model in self._models]
+        self.traces = [self._trace("measured", curve.sample_mm, curve.sample_n, largest, measured)]
+        self.layout: dict[str, Any] = {"yaxis.title.text": f"force [{readable_unit('force_n', largest)[0]}]"}
+        residuals = [curve.force_n - curve.predicted_n[model.role] for model in models]
         most = min(float(np.abs(residual).max()) for residual in residuals)  # the unit of all is the best one's
-        for row, (model, residual) in enumerate(zip(self._models, residuals, strict=True), start=2):
-            is_single = len(self._models) == 1
-            name = model.name if is_single else f"{model.role}: {model.name}"
+        for row, (model, residual) in enumerate(zip(models, residuals, strict=True), start=2):
             line = {"color": model.colour, "width": 2, "dash": model.dash}
-            look: dict[str, Any] = {"mode": "lines", "line": line, "legendgroup": model.role, "name": escape(name)}
-            predicted = self._predicted(model).force_n
-            traces.append(self._trace(model.role, curve.displacement_mm, predicted, largest, look))
+            look: PlotlyTrace = {"mode": "lines", "line": line, "legendgroup": model.role, "name": escape(model.words)}
+            predicted = curve.predicted_n[model.role]
+            self.traces.append(self._trace(model.role, curve.displacement_mm, predicted, largest, look))
             look |= {"showlegend": False, "xaxis": f"x{row}", "yaxis": f"y{row}"}
-            traces += self._band(model, most, row)
-            traces.append(self._trace(f"residual {model.role}", curve.displacement_mm, residual, most, look))
-            which = "residual" if is_single else f"residual<br>{model.role}"
-            layout[f"yaxis{row}.title.text"] = f"{which} [{readable_unit('force_n', most)[0]}]"
-            layout[f"yaxis{row}.title.font.size"] = _PANEL_TITLE
-        traces += [self._mark(name, mark, largest, marker) for name, mark, marker in self._marks()]
-        last = len(self._models) + 1
-        layout[f"xaxis{last}.title.text"] = f"{self._along} from the contact point [{self._length}]"
+            self.traces += self._band(model, most, row)
+            self.traces.append(self._trace(f"residual {model.role}", curve.displacement_mm, residual, most, look))
+            which = "residual" if len(models) == 1 else f"residual<br>{model.role}"
+            self.layout[f"yaxis{row}.title.text"] = f"{which} [{readable_unit('force_n', most)[0]}]"
+            self.layout[f"yaxis{row}.title.font.size"] = _PANEL_TITLE
+        self.traces += [self._mark(name, mark, largest, marker) for name, mark, marker in self._marks()]
+        last = len(models) + 1
+        self.layout[f"xaxis{last}.title.text"] = f"{traits.along} from the contact point [{self._length}]"
         view = self._view()
-        layout |= {f"xaxis{row}.range": view for row in ("", *range(2, last + 1))}
-        return _Drawing(f"{curve.name}: {curve.misfit_percent:.2g} % left", traces, layout)
+        self.layout |= {f"xaxis{row}.range": view for row in ("", *range(2, last + 1))}
 
-    def _band(self, model: _CurveModel, most: float, row: int) -> list[dict[str, Any]]:
+    def _band(self, model: Model, most: float, row: int) -> list[PlotlyTrace]:
         """The band that holds 95 % of the residuals of an exact law, on loading and unloading."""
         curve = self._curve
-        half = SDS_OF_95 * curve.after.deviation_n
+        half = SDS_OF_95 * curve.deviation_n
         turn = int(curve.displacement_mm.argmax())
-        edge: dict[str, Any] = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
+        edge: PlotlyTrace = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
         edge |= {"xaxis": f"x{row}", "yaxis": f"y{row}", "showlegend": False}
         edge |= {"name": "95 % of the noise", "legendgroup": "band"}
         traces = []
@@ -167,14 +175,12 @@ class _Curve:
             traces.append(self._trace(f"noise {name} {model.role} high", displacement, high, most, filled))
         return traces
 
-    def _predicted(self, model: _CurveModel) -> CurvePrediction:
-        return self._curve.before if model.role == "before" else self._curve.after
-
     def _marks(self) -> list[tuple[str, Mark, dict[str, Any]]]:
         marks = []
         for model in self._models:
             name = "contact point" if len(self._models) == 1 else f"contact point {model.role}"
-            marks.append((name, self._predicted(model).contact, {"color": model.colour, **model.marker}))
+            marker = {"color": model.colour, "symbol": model.symbol, "size": model.mark}
+            marks.append((name, self._curve.contacts[model.role], marker))
         jumps = (("snap-in", self._curve.snap_in, "down"), ("pull-off", self._curve.pull_off, "up"))
         for name, mark, way in jumps:
             if mark is not None:
@@ -216,36 +222,15 @@ class _Curve:
         return [max(low - air, float(self._depth(curve.sample_mm).min()) - edge), high + edge]
 
 
-def _curve_menu(drawings: Sequence[_Drawing]) -> dict[str, Any]:
-    """The menu that shows one recording; a button's `name` is its label without markup."""
-    buttons = []
-    for drawing in drawings:
-        visible = [other is drawing for other in drawings for _ in other.traces]
-        args = [{"visible": visible}, drawing.layout]
-        buttons.append({"label": escape(drawing.label), "name": drawing.label, "method": "update", "args": args})
-    return {"buttons": buttons, "x": 1, "xanchor": "right", "y": 1.02, "yanchor": "bottom"}
-
-
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
-_LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _LONG_TITLE = 11  # pixels: fits the height of a panel in a narrow window
 _ROOM = 0.08  # margin at either end of an axis
 _IN_VIEW = 10.0  # times the noise's band: initial range of residuals
 _FEW = 3  # lines up to which a model has markers
-_SMALLEST, _NONE = 0.05, 1e-9  # of a recording's largest response, and pC/N: least scale of a residual
+_NONE = 1e-9  # pC/N: least scale of a residual
 _RESPONSES = ("measured", "before", "after")
 _DIGITS, _RESIDUAL_DIGITS = 5, 3  # of responses and frequencies, and of phases and residuals
-
-
-class _Model(NamedTuple):
-    """Name and style of a model; `role` is before or after."""
-
-    role: str
-    name: str
-    colour: str
-    dash: str
-    marker: str
 
 
 class _Trace(NamedTuple):
@@ -254,16 +239,14 @@ class _Trace(NamedTuple):
     role: str
     panel: int
     unit: str
-    look: dict[str, Any]
+    look: PlotlyTrace
 
 
 def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Figure:
     """The figure of FRFs, the first recording in view; `before` and `after` are names of the models, `before` empty
     where there is one. `layout.meta` has the recordings' names, sensors, spheres, preloads and misfits, and the role of
     each trace."""
-    models = [_Model("after", after, AFTER, SHOWN, "circle")]
-    if before:
-        models.insert(0, _Model("before", before, BEFORE, PAPER, "square-open"))
+    models = models_of(before, after)
     few = min(len(recording.frequency_hz) for recording in recordings) <= _FEW
     traces = _traces(models, few)
     figure = make_subplots(4, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=_ROWS)
@@ -294,11 +277,10 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         figure.layout[path] = value
     figure.update_layout(
         title="Measured and predicted, recording by recording",
-        template=TEMPLATE,
-        font={"size": 14, "color": "#222222"},
+        **_STYLE,
         height=_HEIGHT,
         margin={"l": 90, "r": 20, "t": 80, "b": 100},
-        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
+        legend=BELOW,
         meta={
             "recordings": [recording.name for recording in recordings],
             "sensors": [recording.sensor for recording in recordings],
@@ -311,12 +293,14 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
             "shows": [trace.role for trace in traces],
         },
     )
-    if len(recordings) > 1:
-        figure.update_layout(updatemenus=[_menu(recordings, numbers, views, bool(before))])
-    return figure
+    first = recordings[0].frequency_hz
+    alike = all(np.array_equal(recording.frequency_hz, first) for recording in recordings)
+    changed = [{"y": columns["y"]} if alike else columns for columns in numbers]
+    labels = [_label(recording, bool(before)) for recording in recordings]
+    return _with_menu(figure, labels, [[*pair] for pair in zip(changed, views, strict=True)])
 
 
-def _traces(models: Sequence[_Model], few: bool) -> list[_Trace]:
+def _traces(models: Sequence[Model], few: bool) -> list[_Trace]:
     """The traces in the order of drawing."""
     dots = {"mode": "markers", "marker": {"color": MEASURED, "symbol": "circle-open", "size": 5}}
     traces = [_Trace("measured", 1, "pC/N", {**dots, "name": "measured", "legendgroup": "measured"})]
@@ -327,15 +311,14 @@ def _traces(models: Sequence[_Model], few: bool) -> list[_Trace]:
         traces.append(_Trace(f"noise {part} low", panel, "%", {**edge, "showlegend": False}))
         traces.append(_Trace(f"noise {part} high", panel, "%", {**edge, **named}))
     for model in models:
-        name = model.name if len(models) == 1 else f"{model.role}: {model.name}"
-        marker = {"color": model.colour, "symbol": model.marker, "size": 5}
+        marker = {"color": model.colour, "symbol": model.symbol, "size": 5}
         line = {
             "mode": "lines+markers" if few else "lines",
             "line": {"color": model.colour, "width": 2, "dash": model.dash},
             "marker": marker,
             "legendgroup": model.role,
         }
-        traces.append(_Trace(model.role, 1, "pC/N", {**line, "name": escape(name)}))
+        traces.append(_Trace(model.role, 1, "pC/N", {**line, "name": escape(model.words)}))
         traces.append(_Trace(f"{model.role} phase", 2, "°", {**line, "showlegend": False}))
         residual = {"mode": "markers", "marker": marker, "legendgroup": model.role, "showlegend": False}
         traces.append(_Trace(f"residual {model.role} real", 3, "%", residual))
@@ -354,7 +337,7 @@ def _columns(recording: ShownFrf) -> dict[str, Floats]:
         "before phase": before + 360 * np.round((phase[0] - before[0]) / 360),
     }
     size = np.abs(recording.after)
-    percent = 100 / np.maximum(size, max(_SMALLEST * float(size.max()), _NONE))
+    percent = 100 / np.maximum(size, max(SMALLEST * float(size.max()), _NONE))
     for part, deviation in zip(("real", "imaginary"), recording.deviation, strict=True):
         half = SDS_OF_95 * deviation * percent
         columns |= {f"noise {part} low": -half, f"noise {part} high": half}
@@ -392,7 +375,7 @@ def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
         "yaxis.range": [float(low - room) if wide else 0.0, float(high + room)],
     }
     phases = [columns["measured phase" if name == "measured" else f"{name} phase"] for name in names]
-    low, high = min(-_LEAST_PHASE, *map(np.min, phases)), max(_LEAST_PHASE, *map(np.max, phases))
+    low, high = min(-LEAST_PHASE, *map(np.min, phases)), max(LEAST_PHASE, *map(np.max, phases))
     view["yaxis2.range"] = [float(low - _ROOM * (high - low)), float(high + _ROOM * (high - low))]
     for axis, part in ((3, "real"), (4, "imaginary")):
         band = float(columns[f"noise {part} high"].max())
@@ -400,20 +383,6 @@ def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
         reach = max(band, largest[-1], min(max(largest), _IN_VIEW * band)) * (1 + _ROOM)
         view[f"yaxis{axis}.range"] = [-reach, reach]
     return view
-
-
-def _menu(
-    recordings: Sequence[ShownFrf], numbers: Sequence[dict[str, list[Any]]], views: Sequence[dict[str, Any]], both: bool
-) -> dict[str, Any]:
-    """The menu that shows one recording; a button's `name` is its label without markup."""
-    first = recordings[0].frequency_hz
-    alike = all(np.array_equal(recording.frequency_hz, first) for recording in recordings)
-    buttons = []
-    for recording, columns, view in zip(recordings, numbers, views, strict=True):
-        label = _label(recording, both)
-        changed = {"y": columns["y"]} if alike else columns
-        buttons.append({"label": escape(label), "name": label, "method": "update", "args": [changed, view]})
-    return {"buttons": buttons, "x": 1, "xanchor": "right", "y": 1.02, "yanchor": "bottom"}
 
 
 def _label(recording: ShownFrf, both: bool) -> str:
@@ -435,14 +404,15 @@ _ROW, _SPACING = 140, 0.73  # height of a parameter's row [pixels], and the shar
 _TITLE = 13  # pixels
 
 
-def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
+def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, Any]]) -> go.Figure:
     """Each parameter's 95 % interval in its unit; that of its prior is in words, since drawn it would dwarf it."""
-    spans = parameter_slices(shown.names, problem.lines)
+    priors = spans(shown)
     rows = [
         (mechanism["name"], parameter, prior, multiple_of(shown, prior))
-        for mechanism in document["mechanisms"]
+        for mechanism in mechanisms
+        if mechanism["name"] in priors
         for parameter, prior in zip(
-            mechanism["parameters"], shown.model.parameters[spans[mechanism["name"]]], strict=True
+            mechanism["parameters"], shown.model.parameters[priors[mechanism["name"]]], strict=True
         )
     ]
     titles = [
@@ -468,7 +438,7 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
     figure.update_layout(
         title="What the recordings say of the parameters",
         height=200 + _ROW * len(rows),
-        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
+        legend=BELOW,
         margin={"t": 110, "b": 90},
     )
     return styled(figure)

@@ -17,9 +17,16 @@ from scipy.special import ndtr
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.planning.rig_limits import RigLimits
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter_with_interval, rounded
+from underskin.diagnosis.reporting.numbers import (
+    SDS_OF_95,
+    covariance_of,
+    law_shares,
+    parameters_of,
+    rounded,
+    spans,
+    with_ends,
+)
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.unlisted_search import law_of
 from underskin.diagnosis.validation import cross_validation
@@ -74,6 +81,16 @@ class LeadingLaw:
         return self.law.description.form
 
     @property
+    def combination(self) -> tuple[str, str, str]:
+        """Quantity, axis and form."""
+        return self.law.description.acts_on, self.law.description.axis, self.form
+
+    @property
+    def other_names(self) -> tuple[str, ...]:
+        """The mechanisms beside it."""
+        return tuple(name for name in self.explanation.names if name != self.law.name)
+
+    @property
     def axis(self) -> Axis | None:
         """The axis of recordings or samples; None for frequency."""
         return self.law.axis if isinstance(self.law, RecordingLaw | LagLaw | CurveLaw) else None
@@ -119,26 +136,26 @@ class LeadingLaw:
         return bool(np.ptp(ends) < _LEVEL * np.abs(ends).max())
 
     @property
+    def is_outside_band(self) -> bool:
+        """Whether it leaves the magnitude over most of the band unchanged: a peak, a notch, or a change of phase over
+        frequency."""
+        return self.law.description.axis == "frequency_hz" and (self.is_phase or self.law.description.form == "peak")
+
+    @property
     def is_constant(self) -> bool:
         """Whether it is the same all along its axis."""
         return isinstance(self.law, RecordingLaw) and self.law.shape.variant == EVERYWHERE
 
     def variance(self, x: Floats) -> Floats:
         """Variance of the change, from the covariance of the law's parameters."""
-        span = parameter_slices(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
-        mean = self.explanation.best.hypothesis.mean_indices
-        rows = [mean.index(index) for index in range(span.start, span.stop)]
-        covariance = self.explanation.best.covariance[np.ix_(rows, rows)]
-        here = self.change(x, self.values)
+        span = spans(self.explanation)[self.law.name]
+        here = self.change(x)
         slopes = []
         for parameter in self.law.parameters_stated:
-            moved = {
-                **self.values,
-                parameter.name: parameter.from_fit(parameter.to_fit(self.values[parameter.name]) + _STEP),
-            }
-            slopes.append((self.change(x, moved) - here) / _STEP)
-        jacobian = np.array(slopes)
-        return np.maximum(np.einsum("px,pq,qx->x", jacobian, covariance, jacobian), 0.0)
+            at = parameter.to_fit(self.values[parameter.name]) + _STEP
+            slopes.append((self.change(x, {**self.values, parameter.name: parameter.from_fit(at)}) - here) / _STEP)
+        covariance = covariance_of(self.explanation, range(span.start, span.stop))
+        return np.maximum(np.einsum("px,pq,qx->x", np.array(slopes), covariance, np.array(slopes)), 0.0)
 
 
 def law_document(
@@ -146,46 +163,43 @@ def law_document(
 ) -> dict[str, Any]:
     """The report's `unnamed`: expression, parameters, probability, rivals, held-out errors and range."""
     shares = _shares(search, problem)
-    combination = _combination(problem, leading.explanation)
     before, after = cross_validation.total(groups)
-    low, high = leading.ends
+    acts_on, axis, form = leading.combination
+    is_relative = leading.axis is not None and leading.axis.relative
+    suffix = "_h" if axis in SHOWN_AS_HOURS else "_over_own" if is_relative else ""
+    words = () if leading.axis is None else leading.axis.words
     return {
-        "acts_on": leading.law.description.acts_on,
-        "axis": leading.law.description.axis,
-        "form": leading.form,
+        "acts_on": acts_on,
+        "axis": axis,
+        "form": form,
         "expression": expression(leading.law, leading.values),
         "parameters": _parameters(leading),
-        "probability": round(shares[combination], 3),
+        "probability": round(shares[leading.combination], 3),
         "rivals": [
             {"acts_on": acts_on, "axis": axis, "form": form, "probability": round(share, 3)}
             for (acts_on, axis, form), share in list(shares.items())[: _RIVALS + 1]
-            if (acts_on, axis, form) != combination and share >= _LEAST_RIVAL
+            if (acts_on, axis, form) != leading.combination and share >= _LEAST_RIVAL
         ],
         "heldout_rmse_percent": {"before": rounded(before.rmse_percent), "after": rounded(after.rmse_percent)},
-        "range": {_range_name(leading): _range(leading, low, high)},
-        **({"course": _change_along_axis(leading)} if leading.form == "free" else {}),
+        "range": {axis + suffix: list(words) or [rounded(end) for end in leading.ends]},
+        **({"course": _change_along_axis(leading)} if form == "free" else {}),
     }
 
 
 def _change_along_axis(leading: LeadingLaw) -> list[dict[str, Any]]:
     """The change at values of the measured axis with its 95 % interval: relative, of a force in N, of a position the
     distance in mm, over frequency the magnitude minus 1."""
-    low, high = leading.ends
-    words: tuple[str, ...] = ()
-    if leading.axis is None:
-        x = np.geomspace(low, high, _STATED)
-    else:
-        words, x = leading.axis.words, _axis_values(leading.axis, _STATED)
+    words = () if leading.axis is None else leading.axis.words
+    x = np.geomspace(*leading.ends, _STATED) if leading.axis is None else _axis_values(leading.axis, _STATED)
     change, half = leading.change(x), SDS_OF_95 * np.sqrt(leading.variance(x))
-    ends = zip(x.tolist(), change.tolist(), (change - half).tolist(), (change + half).tolist(), strict=True)
     return [
         {
             "at": words[round(at)] if words else rounded(at),
             "change": rounded(middle, 3),
-            "low": rounded(least, 3),
-            "high": rounded(most, 3),
+            "low": rounded(middle - half_width, 3),
+            "high": rounded(middle + half_width, 3),
         }
-        for at, middle, least, most in ends
+        for at, middle, half_width in zip(x.tolist(), change.tolist(), half.tolist(), strict=True)
     ]
 
 
@@ -195,75 +209,41 @@ def _axis_values(axis: Axis, most: int) -> Floats:
     return axis.levels if few else np.linspace(axis.low, axis.high, most)
 
 
-def _range_name(leading: LeadingLaw) -> str:
-    name = leading.law.description.axis
-    if name in SHOWN_AS_HOURS:
-        return f"{name}_h"
-    return f"{name}_over_own" if leading.axis is not None and leading.axis.relative else name
-
-
-def _range(leading: LeadingLaw, low: float, high: float) -> list[Any]:
-    if leading.axis is not None and leading.axis.words:
-        return list(leading.axis.words)
-    return [rounded(low), rounded(high)]
-
-
-def _combination(problem: FittingProblem, explanation: Explanation) -> tuple[str, str, str]:
-    leading = LeadingLaw.of(problem, explanation)
-    assert leading is not None
-    return leading.law.description.acts_on, leading.law.description.axis, leading.form
-
-
 def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str], float]:
     """Probability of each combination of quantity, axis and form among all unlisted laws, the largest first."""
-    weights: dict[tuple[str, str, str], float] = {}
-    for explanation in search.laws:
-        if search.is_supported(explanation):
-            key = _combination(problem, explanation)
-            weights[key] = float(np.logaddexp(weights.get(key, -np.inf), search.log_weight(explanation)))
-    total = np.logaddexp.reduce(list(weights.values()))
-    ranked = sorted(weights.items(), key=lambda item: -item[1])
-    return {key: float(np.exp(weight - total)) for key, weight in ranked}
+    shares: dict[tuple[str, str, str], float] = {}
+    for explanation, share in law_shares(search):
+        law = LeadingLaw.of(problem, explanation)
+        assert law is not None
+        shares[law.combination] = shares.get(law.combination, 0.0) + share
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
-    """The fitted parameters with readable names; of a sine the amplitude, start and period."""
-    law, explanation = leading.law, leading.explanation
-    first = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[law.name].start
-    stated = [parameter_with_interval(explanation, first + index) for index in range(len(law.parameters_stated))]
+    """The fitted parameters with readable names; of a sine the amplitude, start and period; of a step its position,
+    between two neighbouring levels of the axis."""
+    law = leading.law
+    stated = parameters_of(leading.explanation, law.name)
     if isinstance(law, RecordingLaw | LagLaw | CurveLaw):
         if law.shape.form == "periodic" and len(law.amplitudes) == law.shape.count:
             stated = [*_wave(leading, law), *stated[2:]]
         if law.shape.form == "step" and not (law.axis.words or isinstance(law, CurveLaw)):
-            stated.append(_edge(law))
+            at, levels = float(law.shape.variant), law.axis.levels
+            ends = with_ends(at, levels[levels < at].max(), levels[levels > at].min())
+            stated.append({"name": "at", "unit": law.axis.unit, **ends})
     return [{**parameter, "name": parameter["name"].removeprefix("law_")} for parameter in stated]
 
 
 def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[dict[str, Any]]:
-    amplitudes = [leading.values[name] for name in law.amplitudes]
-    size, start = wave(law, leading.values, amplitudes)
-    quarter = np.array([start + leading.values["law_period"] / 4])
-    half_width = SDS_OF_95 * float(np.sqrt(leading.variance(quarter)[0]))
-    amplitude_interval = {
-        "value": rounded(size),
-        "low": rounded(max(size - half_width, 0.0)),
-        "high": rounded(size + half_width),
-    }
-    turn = half_width / max(size, 1e-12) * leading.values["law_period"] / (2 * np.pi)
-    start_interval = {"value": rounded(start), "low": rounded(start - turn), "high": rounded(start + turn)}
-    unit = law.parameters_stated[0].unit
+    size, start = wave(law, leading.values, [leading.values[name] for name in law.amplitudes])
+    period = leading.values["law_period"]
+    half_width = SDS_OF_95 * float(np.sqrt(leading.variance(np.array([start + period / 4]))[0]))
+    turn = half_width / max(size, 1e-12) * period / (2 * np.pi)
+    amplitude = with_ends(size, max(size - half_width, 0.0), size + half_width)
     return [
-        {"name": "amplitude", "unit": unit, **amplitude_interval},
-        {"name": "start", "unit": law.axis.unit, **start_interval},
+        {"name": "amplitude", "unit": law.parameters_stated[0].unit, **amplitude},
+        {"name": "start", "unit": law.axis.unit, **with_ends(start, start - turn, start + turn)},
     ]
-
-
-def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
-    """The position of a step: between two neighbouring levels of the axis."""
-    at, levels = float(law.shape.variant), law.axis.levels
-    low, high = levels[levels < at].max(), levels[levels > at].min()
-    ends = {"value": rounded(at), "low": rounded(float(low)), "high": rounded(float(high))}
-    return {"name": "at", "unit": law.axis.unit, **ends}
 
 
 _MOST = 4  # recordings at each end
@@ -275,20 +255,6 @@ _HOW = {
     "time_of_day": " Take them on another day.",
     "previous_preload_n": " Come to the preload from each of these.",
 }
-
-
-@dataclass(frozen=True)
-class _Ends:
-    """The values of the axis where the law gives the least and the most charge, and the difference of ln charge."""
-
-    low: float
-    high: float
-    difference: float
-
-    @property
-    def both(self) -> tuple[float, float]:
-        """The lower end first."""
-        return self.low, self.high
 
 
 def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
@@ -303,60 +269,50 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
         or law.axis.name in _GIVEN_BY_SKIN
     ):
         return {}
-    base = _commonest(problem)
-    ends = _ends(leading, law, base)
-    is_past = law.axis.name in _NOT_REPEATABLE
-    templates = [_nearest(problem, law.axis, at) if is_past else base for at in ends.both]
-    count, probability = _enough(abs(ends.difference) / max(_scatter(problem, leading, index) for index in templates))
-    recordings = [_conditions_of(problem, index) for index in templates]
-    if not is_past:
-        for recording, at in zip(recordings, ends.both, strict=True):
-            recording[law.axis.name] = float(f"{at:.4g}")
+    recordings, axis = frf_of(problem.collapsed.campaign), law.axis
+    contacts = [(one.sensor, one.indenter_radius_mm, one.preload_n, one.dynamic_force_n) for one in recordings]
+    commonest = contacts.index(max(contacts, key=contacts.count))
+    # The values of the axis where the law gives the least and the most charge, the lower one first
+    changes = np.array([_log_factor(leading, law, commonest, at) for at in axis.levels.tolist()])
+    first, last = sorted((int(np.argmin(changes)), int(np.argmax(changes))))
+    ends = axis.levels[[first, last]]
+    difference = float(changes[last] - changes[first])
+    is_past = axis.name in _NOT_REPEATABLE
+    values = axis.of([recording.id for recording in recordings])
+    templates = [int(np.argmin(np.abs(values - at))) if is_past else commonest for at in ends]
+    size = abs(difference) / max(_scatter(problem, leading, index) for index in templates)
+    probabilities = {count: float(ndtr(0.5 * size * np.sqrt(count / 2))) for count in range(1, _MOST + 1)}
+    count = next((number for number, probability in probabilities.items() if probability >= _SURE), _MOST)
     count_text = "one recording" if count == 1 else f"{count} recordings"
-    differs = f"{100 * abs(np.expm1(ends.difference)):.2g} %"
-    chance = f"with a probability of {in_percent(probability)}"
+    differs = f"{100 * abs(np.expm1(difference)):.2g} %"
+    chance = f"with a probability of {in_percent(probabilities[count])}"
+    planned = [_conditions_of(recordings[index]) for index in templates]
     if is_past:
-        first, second = (problem.collapsed.campaign.recordings[index].id for index in templates)
+        first_id, second_id = (recordings[index].id for index in templates)
         statement = (
-            f"Repeating {first} and {second} after one another, {count_text} of each in turns, should tell whether it "
-            f"is the time, {chance}: if it is, the {differs} are gone by which they differ beyond what the known "
-            f"physics says."
+            f"Repeating {first_id} and {second_id} after one another, {count_text} of each in turns, should tell "
+            f"whether it is the time, {chance}: if it is, the {differs} are gone by which they differ beyond what the "
+            "known physics says."
         )
     else:
-        words = AXES[law.axis.name][0] if law.axis.name in AXES else law.axis.name
-        low, high = (f"{at:.4g}{'' if law.axis.unit == '-' else f' {law.axis.unit}'}" for at in ends.both)
+        for recording, at in zip(planned, ends, strict=True):
+            recording[axis.name] = float(f"{at:.4g}")
+        words = AXES[axis.name][0] if axis.name in AXES else axis.name
+        low, high = (f"{at:.4g}{'' if axis.unit == '-' else f' {axis.unit}'}" for at in ends)
         statement = (
             f"{count_text.capitalize()} with {words} at {low} and as many at {high}, in turns and all else equal, "
             f"should tell whether the law holds, {chance}: if it does, the charge differs by {differs} "
-            f"beyond what the known physics says."
-            f"{_HOW.get(law.axis.name, '')}"
+            f"beyond what the known physics says.{_HOW.get(axis.name, '')}"
         )
-    other_names = [name for name in leading.explanation.names if name != law.name]
+    other_names = list(leading.other_names)
     return {
-        "recordings": [recording | {"repeats": count} for recording in recordings],
+        "recordings": [recording | {"repeats": count} for recording in planned],
         "separates": [other_names, [*other_names, "unnamed"]],
-        "probability_of_deciding": round(probability, 3),
+        "probability_of_deciding": round(probabilities[count], 3),
         "without_it": 0.5,
         "minutes": round(2 * count * RigLimits().minutes_per_recording, 1),
         "statement": statement,
     }
-
-
-def _commonest(problem: FittingProblem) -> int:
-    """Index of the first recording of the contact that was recorded most often."""
-    keys = [
-        (recording.sensor, recording.indenter_radius_mm, recording.preload_n, recording.dynamic_force_n)
-        for recording in frf_of(problem.collapsed.campaign)
-    ]
-    return keys.index(max(keys, key=keys.count))
-
-
-def _ends(leading: LeadingLaw, law: RecordingLaw, base: int) -> _Ends:
-    levels = law.axis.levels
-    changes = np.array([_log_factor(leading, law, base, at) for at in levels.tolist()])
-    low, high = int(np.argmin(changes)), int(np.argmax(changes))
-    low, high = min(low, high), max(low, high)
-    return _Ends(float(levels[low]), float(levels[high]), float(changes[high] - changes[low]))
 
 
 def _log_factor(leading: LeadingLaw, law: RecordingLaw, base: int, at: float) -> float:
@@ -376,21 +332,7 @@ def _scatter(problem: FittingProblem, leading: LeadingLaw, base: int) -> float:
     return float(np.sqrt(best.levels.gain**2 + position**2 + line**2))
 
 
-def _enough(size: float) -> tuple[int, float]:
-    """The number of recordings needed at each end, `_MOST` at most, and the probability that they decide."""
-    probabilities = [float(ndtr(0.5 * size * np.sqrt(count / 2))) for count in range(1, _MOST + 1)]
-    count = next((number for number, probability in enumerate(probabilities, 1) if probability >= _SURE), _MOST)
-    return count, probabilities[count - 1]
-
-
-def _nearest(problem: FittingProblem, axis: Axis, at: float) -> int:
-    """Index of the recording nearest on the axis."""
-    values = axis.of([recording.id for recording in problem.collapsed.campaign.recordings])
-    return int(np.argmin(np.abs(values - at)))
-
-
-def _conditions_of(problem: FittingProblem, index: int) -> dict[str, Any]:
+def _conditions_of(recording: FrfConditions) -> dict[str, Any]:
     """The conditions of a recording, in lab units."""
-    recording: FrfConditions = frf_of(problem.collapsed.campaign)[index]
     fields = {name: getattr(recording, name) for name in _FIELDS}
     return {name: value for name, value in fields.items() if value is not None}

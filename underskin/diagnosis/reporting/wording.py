@@ -9,8 +9,8 @@ from typing import Any
 from underskin.diagnosis.data.dataset import WORDS
 from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.figure_data import AXES
-from underskin.diagnosis.reporting.law_statement import capital
 from underskin.diagnosis.reporting.page_styles import FIELD_OF, with_minus, without_powers
+from underskin.findings.formatting import capital
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import AXES as FOLLOWED
 from underskin.mechanisms.unlisted.vocabulary import followed
@@ -101,14 +101,9 @@ def group(name: str) -> str:
     return f"{axis(field)}: {value}" if field in {*AXES, *WORDS, *FOLLOWED} else name
 
 
-def number(value: float | None) -> str:
-    """A number to four digits."""
-    return "–" if value is None else with_minus(f"{value:.4g}")
-
-
-def as_stated(value: float | None) -> str:
-    """A number to three digits, as in the statement next to it."""
-    return "–" if value is None else with_minus(f"{value:.3g}")
+def number(value: float | None, digits: int = 4) -> str:
+    """A number to four digits, or to three as in the statement next to it."""
+    return "–" if value is None else with_minus(f"{value:.{digits}g}")
 
 
 def error(value: float | None) -> str:

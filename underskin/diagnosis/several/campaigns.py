@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.report import DiagnosisResult, Reported, reported
+from underskin.diagnosis.reporting.facts import DiagnosisResult
+from underskin.diagnosis.reporting.report import Reported, reported
 from underskin.diagnosis.several.histories import (
     CampaignFits,
     SharedParameters,

@@ -17,7 +17,8 @@ from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.report import DiagnosisResult, report, reported
+from underskin.diagnosis.reporting.facts import DiagnosisResult
+from underskin.diagnosis.reporting.report import report, reported
 from underskin.diagnosis.selection.priors import SHOWS, log_prior
 from underskin.diagnosis.several.campaigns import by_frfs, curves_once, refuse_copies, with_curves
 from underskin.diagnosis.several.histories import CampaignFits, Names, log_change, p_described

@@ -19,8 +19,8 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.inference.residuals import with_hidden_mechanism
+from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.numbers import parameter_index
-from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Search
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.mechanisms.parameter import Parameter

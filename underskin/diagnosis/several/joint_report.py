@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
-from underskin.diagnosis.reporting.law_statement import of_clauses
+from underskin.diagnosis.reporting.d33 import StatedD33
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, Reported
-from underskin.diagnosis.reporting.statements import StatedD33, listed
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
 from underskin.diagnosis.several.population import D33, REGULAR, STATED, Populations
 from underskin.diagnosis.several.sensors import (
@@ -29,7 +28,7 @@ from underskin.diagnosis.several.sensors import (
 )
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.findings.formatting import in_percent
+from underskin.findings.formatting import in_percent, listed, of_clauses
 from underskin.inversion.array_course import FEWEST_DATES
 from underskin.inversion.array_history import TWO_DATES, array_change_in_words
 from underskin.units import Floats

@@ -16,8 +16,8 @@ from typing import Self
 
 import numpy as np
 
+from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
-from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.diagnosis.several.histories import USUAL_CHANGE, log_normal
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode, Reason

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from underskin.errors import unusable
-from underskin.findings import sentences
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.findings.sentences import DefectKind
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.units import Complexes, Floats, Indices, Mask
@@ -290,7 +291,7 @@ def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, 
     count = int(undamaged.sum())
     if not count:
         first = defects[0]
-        words = sentences.defect(first.kind, first.channel, first.samples, first.first_sample)
+        words = Finding(Reason.DEFECT, arguments=vars(first)).statement
         raise unusable(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
     force_spectra, charge_spectra = (blocks.spectra(signal)[undamaged] for signal in (force, charge))
     frequency: Floats = sample_rate * np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)

@@ -1,0 +1,248 @@
+"""d33 of a report: over all answers, whether it is to be quoted, and what would change it without showing.
+
+The level at which the factor of an unlisted law is 1 is a convention of its form. A resonance may leave the low
+frequencies as they are, or the high ones: both fit equally well, and d33 differs by what the law does in between. d33
+is therefore averaged over the law's factor at all rows (`law_levels`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.inference.evidence import marginalise_sensor_spread
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.gaussian import NormalMixture
+from underskin.diagnosis.inference.hypothesis import parameter_slices
+from underskin.diagnosis.inference.residuals import declared_d33, with_hidden_mechanism
+from underskin.diagnosis.reporting.numbers import (
+    COUNTS,
+    HIDES,
+    covariance_of,
+    law_shares,
+    of_logarithms,
+    parameter_index,
+)
+from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, declared_laws
+from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
+from underskin.findings.formatting import in_digits, listed
+from underskin.mechanisms.unlisted.laws import UnlistedLaw
+from underskin.units import Floats
+
+_LEVELS = 9  # quantiles over the rows
+_FACTORS = ("gain", "frequency_response")
+_MOST_NAMED = 2  # mechanisms that would not show, named with a value to quote
+SEVERAL_ANSWERS = "several answers remain"
+BY_NUISANCES = ("d33", "noise")  # confounders of mechanisms that d33, E, h or the noise hide
+
+
+def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
+    """Logarithms of equally probable factors on d33 (levels,) from the reference level of unlisted laws; only 0 where
+    no law is a factor."""
+    mechanisms, names = problem.lines.mechanisms, explanation.names
+    laws = [
+        name
+        for name in names
+        if isinstance(law := mechanisms[name], UnlistedLaw) and law.description.acts_on in _FACTORS
+    ]
+    if not laws:
+        return np.zeros(1)
+    other_names = tuple(name for name in names if name not in laws)
+    with_law, without = (
+        problem.hypothesis(mechanism_names, has_position_scatter=False, all_lines=True)
+        for mechanism_names in (names, other_names)
+    )
+    fit = np.zeros(len(without.model.parameters))
+    for name, span in parameter_slices(other_names, without.lines).items():
+        fit[span] = explanation.coordinates(name)
+    fit[without.mechanism_parameter_count :] = explanation.point.fit[with_law.mechanism_parameter_count :]
+    here, there = (
+        np.abs(hypothesis.frf_model.predict(at, slopes=False, place=False).value)
+        for hypothesis, at in ((with_law, explanation.point.fit), (without, fit))
+    )
+    nonzero = (there > 0) & (here > 0)
+    shares = (np.arange(_LEVELS) + 0.5) / _LEVELS
+    return np.quantile(np.log(here[nonzero] / there[nonzero]), shares)
+
+
+def d33_over_answers(search: Search, problem: FittingProblem, unsure: float) -> dict[str, Any] | None:
+    """The median and the 95 % interval of d33 over all answers, weighted with their probabilities and allowing for
+    mechanisms that would not show; None where answers without d33 are more probable than all others.
+
+    `none_of_these` counts with all supported unlisted laws, which may predict the same and differ in d33. The
+    tolerances of the skin's declared values widen the interval, but not `relative`, which is for comparing sensors,
+    dates and spheres. `unsure` is a further relative standard uncertainty.
+    """
+    probabilities: dict[int, float] = {}  # by identity: curves' own mechanisms do not change d33
+    explanations: dict[int, Explanation] = {}
+    for answer in search.answers:
+        parts = law_shares(search) if answer.explanation is None else [(answer.explanation, 1.0)]
+        for explanation, share in parts:
+            key = id(explanation)
+            explanations[key] = explanation
+            probabilities[key] = answer.probability * share + probabilities.get(key, 0.0)
+    weighted = [(probability, explanations[key]) for key, probability in probabilities.items() if probability > COUNTS]
+    if sum(probability for probability, _ in weighted) < 0.5:
+        return None
+    mixtures = [
+        _d33_under(search, problem, explanation, probability).times(probability)
+        for probability, explanation in weighted
+    ]
+    mixture = NormalMixture.joined(mixtures)
+    declared = np.repeat(
+        [declared_d33(problem, explanation) for _, explanation in weighted], [len(part.share) for part in mixtures]
+    )
+    shares = mixture.share / mixture.share.sum()
+    relative = np.hypot(mixture.deviation, unsure)
+    relative_ends = of_logarithms(shares, mixture.mean, relative)
+    _, first = weighted[0]
+    return {
+        "name": "d33",
+        "unit": first.model.parameters[parameter_index(first, "d33")].unit,
+        **of_logarithms(shares, mixture.mean, np.hypot(relative, declared)),
+        "relative": {key: relative_ends[key] for key in ("low", "high")},
+    }
+
+
+def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> NormalMixture:
+    """ln d33 under an answer, at each reference level of its laws, and with one more mechanism that does not show; the
+    shares sum to 1."""
+    index = parameter_index(explanation, "d33")
+    best = explanation.best
+    parts = marginalise_sensor_spread(best.fitter, best.at, index)
+    if parts is None:
+        deviation = np.sqrt(covariance_of(explanation, [index])[0])
+        parts = [NormalMixture(np.ones(1), explanation.point.fit[index : index + 1], deviation)]
+    parts = list(parts)
+    if probability > HIDES:
+        odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
+        declared = declared_laws(problem.lines)
+        answers = [set(answer.explanation.names) for answer in search.answers if answer.explanation is not None]
+        for name in problem.lines.mechanisms.named:
+            if name in explanation.names or {name, *explanation.names} in answers:
+                continue
+            hidden = with_hidden_mechanism(problem, explanation, name, "d33")
+            if hidden is None:
+                continue
+            # A law that declared facts imply has even odds; of others no answer holds more than what does not show
+            unseen = 1.0 if name in declared else odds * min(1.0, float(np.exp(SHOWS) / hidden.share.sum()))
+            parts.append(hidden.times(unseen))
+    mixture = NormalMixture.joined(parts)
+    mixture = mixture.times(1 / float(mixture.share.sum()))
+    levels = law_levels(problem, explanation)
+    return NormalMixture.joined([mixture.moved(level).times(1 / len(levels)) for level in levels.tolist()])
+
+
+@dataclass(frozen=True)
+class StatedD33:
+    """The report's d33 and whether it is to be quoted.
+
+    `number` is None where there is no d33, as of curves. `hidden`: mechanisms that would not show here and move d33
+    beyond its interval; those that are wrong declared numbers prevent quoting it. `why_not`: further reasons against
+    quoting it, in words. `skin_pc_per_n`: the skin's declared d33, None where it declares none.
+    """
+
+    number: Mapping[str, Any] | None
+    hidden: Sequence[HiddenShift] = ()
+    why_not: Sequence[str] = ()
+    skin_pc_per_n: float | None = None
+
+    @property
+    def deciding(self) -> list[HiddenShift]:
+        """Hidden mechanisms that prevent quoting d33, the largest first: wrong declared numbers and what would change
+        d33 as much; none where no declared number does."""
+        least = min((abs(shift.log_factor) for shift in self.hidden if shift.declared), default=np.inf)
+        return [shift for shift in self._largest_first if abs(shift.log_factor) >= least]
+
+    @property
+    def _largest_first(self) -> list[HiddenShift]:
+        return sorted(self.hidden, key=lambda shift: -abs(shift.log_factor))
+
+    @property
+    def document(self) -> dict[str, Any] | None:
+        """The report's `d33`."""
+        return None if self.number is None else {**self.number, "quotable": not (self.why_not or self.deciding)}
+
+    def clause(self) -> str:
+        """A clause on the value to quote, or on why none is quoted; empty where there is no d33."""
+        if self.document is None:
+            return ""
+        if self.document["quotable"]:
+            return f"d33 to quote: {self.quoted()}"
+        return f"d33 is not to be quoted: {self.interval()}"
+
+    def quoted(self) -> str:
+        """The value with its interval, also without the tolerances of declared values, and the hidden mechanisms that
+        would change it most beyond that."""
+        assert self.number is not None
+        value, low, high = (f"{self.number[key]:.3g}" for key in ("value", "low", "high"))
+        least, most = (f"{self.number['relative'][key]:.3g}" for key in ("low", "high"))
+        named = " or ".join(
+            f"{in_words([shift.mechanism])} ({_percent(shift)})" for shift in self._largest_first[:_MOST_NAMED]
+        )
+        hides = f", provided that no {named} hides" if named else ""
+        return (
+            f"{value} {self.number['unit']} (95 %: {low} to {high} with what declared values may be off, {least} to "
+            f"{most} to compare sensors or dates){self._over_declared()}{hides}"
+        )
+
+    def _over_declared(self) -> str:
+        """The ratio to the skin's declared d33, where the interval excludes it: a peak-to-peak force or charge taken
+        for an amplitude halves or doubles every FRF, which nothing else in the recordings reveals."""
+        assert self.number is not None
+        declared = self.skin_pc_per_n
+        if declared is None or self.number["low"] <= declared <= self.number["high"]:
+            return ""
+        return f", {self.number['value'] / declared:.2g} times the declared {declared:g} {self.number['unit']}"
+
+    def interval(self) -> str:
+        """The interval of d33, and why it is not to be quoted."""
+        assert self.number is not None
+        low, high = (f"{self.number[key]:.3g}" for key in ("low", "high"))
+        lies = f"it lies from {low} to {high} {self.number['unit']}{self._over_declared()}"
+        deciding = [f"{in_words([shift.mechanism])} by {_percent(shift)}" for shift in self.deciding[:_MOST_NAMED]]
+        if deciding:
+            return f"{lies}, but what would not show here would change it, {listed(deciding)}"
+        over = " over the answers that remain" if SEVERAL_ANSWERS in self.why_not else ""
+        others = " and ".join(words for words in self.why_not if words != SEVERAL_ANSWERS)
+        return f"{lies}{over}" + (f", {'and' if over else 'but'} {others}" if others else "")
+
+    @property
+    def reasons(self) -> list[str]:
+        """Reasons against quoting d33; empty where it is to be quoted."""
+        if self.number is None:
+            return list(self.why_not) or ["no answer explains its recordings"]
+        hidden = in_words([shift.mechanism for shift in self.deciding[:_MOST_NAMED]])
+        return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
+
+    def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
+        """The report's entries, with the change of d33 by each beyond its interval."""
+        hidden = {shift.mechanism: shift for shift in self.hidden}
+        by_nuisances = {entry.mechanism for entry in confounded if entry.confounded_with in BY_NUISANCES}
+        further = [Confounding(name, "d33", Likeness.TAKEN_UP) for name in hidden if name not in by_nuisances]
+        entries = []
+        for entry in (*confounded, *further):
+            reason = _CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with)
+            shift = hidden.get(entry.mechanism)
+            if shift is not None and entry.confounded_with in BY_NUISANCES:
+                way = "large" if shift.log_factor > 0 else "small"
+                reason += f"; d33 would then be {_percent(shift)} too {way}"
+            row = {"mechanism": entry.mechanism, "confounded_with": entry.confounded_with, "reason": reason}
+            entries.append(row)
+        return entries
+
+
+_CONFOUNDED: Mapping[Likeness, str] = {
+    Likeness.NOISE: "at a typical strength it stays within the noise here",
+    Likeness.TAKEN_UP: "at a typical strength it looks here like another d33, E or h within their tolerances",
+    Likeness.IMITATED: "what {mechanism} typically does to these recordings, {other} can do as well",
+    Likeness.IMITATES: "what {other} typically does to these recordings, {mechanism} can do as well",
+    Likeness.FITS_AS_WELL: "{other} explains these recordings about as well as {mechanism}",
+}
+
+
+def _percent(hidden: HiddenShift) -> str:
+    return f"{in_digits(abs(hidden.percent), 2)} %"

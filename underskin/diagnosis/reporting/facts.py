@@ -1,0 +1,456 @@
+"""The facts of a report: the results of a diagnosis, and every number that documents and sentences need, made once.
+
+`DiagnosisResult` holds the results of all steps, `Facts` what follows from them: the verdict, errors before and after
+in sample and on held-out groups, mechanisms with their parameters, d33 and whether it is to be quoted, findings.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.localisation import AxisResult, EffectSize, Shape
+from underskin.diagnosis.planning.optimal_design import NextRecordings
+from underskin.diagnosis.reporting import kinds, numbers
+from underskin.diagnosis.reporting.d33 import BY_NUISANCES, SEVERAL_ANSWERS, StatedD33, d33_over_answers
+from underskin.diagnosis.reporting.numbers import parameter_index, parameter_with_interval, parameters_of, rounded
+from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, law_document
+from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.other_kinds import hidden_factors, may_hide
+from underskin.diagnosis.selection.priors import least_evidence
+from underskin.diagnosis.selection.search import KindsTogether
+from underskin.diagnosis.validation import cross_validation
+from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Power
+from underskin.findings.codes import FindingCode, Reason
+from underskin.findings.finding import Finding
+from underskin.findings.formatting import in_digits
+from underskin.findings.lacking import Lacking
+from underskin.mechanisms.base import Mechanism, Stage
+from underskin.mechanisms.laws import contact_creep, strain_stiffening
+from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unlisted.expressions import CurveLaw
+from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
+from underskin.prediction import plausibility
+from underskin.recordings.campaign import Campaign
+
+_STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})
+# Mechanisms that stiffen the response with depth, as a layer on a stiff base does
+_STIFFENS = (*_STIFFER_WITH_DEPTH, "compressible_layer")
+_LARGEST_FLOOR = 20.0  # % of the response: noise above which no d33 is quoted
+
+
+@dataclass(frozen=True)
+class DiagnosisResult:
+    """The results of all steps on one campaign; `search` is None where the data were too few."""
+
+    name: str
+    findings: Sequence[Finding]
+    provenance: Mapping[str, Any]
+    skin_d33_pc_per_n: float | None = None  # as the skin declares it
+    level_unsure: float = 0.0  # relative uncertainty of all FRFs due to noise in their channels
+    lacking: Lacking | None = None  # of a campaign from which nothing can be concluded
+    search: Search | None = None
+    few: Search | None = None  # instead of `search` where recordings agree with the model but are too few to say so
+    problem: FittingProblem | None = None
+    axes: Sequence[AxisResult] = ()
+    region: Mapping[str, list[float | str]] = field(default_factory=dict)
+    effect: EffectSize | None = None
+    groups: Sequence[cross_validation.HeldOut] = ()
+    confounded: Sequence[Confounding] = ()
+    power: Sequence[Power] = ()
+    shifts: Sequence[HiddenShift] = ()
+    shape: Shape | None = None  # of the residual, where no mechanism describes it
+    plan: NextRecordings | None = None
+    curves: Campaign | None = None  # with every sample, where curves were diagnosed
+    joined: KindsTogether | None = None  # with recordings of other kinds; not None where there is a search
+
+    def with_findings(self, *further: Finding) -> "DiagnosisResult":
+        """The same result with further findings appended."""
+        return replace(self, findings=(*self.findings, *further))
+
+
+class Facts:
+    """What follows from a diagnosis that has a search.
+
+    `base` is the explanation without mechanisms, `shown` that behind the leading answer.
+    """
+
+    def __init__(self, diagnosis: DiagnosisResult) -> None:
+        """Of a diagnosis with a search."""
+        assert diagnosis.search is not None
+        assert diagnosis.problem is not None
+        assert diagnosis.joined is not None
+        self.diagnosis, self.search, self.problem = diagnosis, diagnosis.search, diagnosis.problem
+        self.joined = diagnosis.joined
+        self.leader = self.search.answers[0]
+        self.base = next(explanation for explanation in self.search.explanations if not explanation.names)
+        self.shown = self.search.fit_behind(self.leader)
+        self.traits = kinds.KINDS[self.problem.kind]
+
+    @cached_property
+    def verdict(self) -> str:
+        """The verdict by the probabilities, as docs/diagnosis.md explains it.
+
+        A set of mechanisms explains nothing if one of them may as well have no effect, or has a parameter at the bound
+        of its search; nor does the base model with d33 or a free modulus at a bound.
+        """
+        if self.leader.explanation is None:
+            return "unexplained"
+        if self.bounds:
+            return "ambiguous"
+        if self.leader.names == (NOTHING_MISSING,):
+            return "no_mismatch"
+        certain = self.leader.probability >= EXPLAINED and not self.idle and not self._may_be_the_other
+        return "explained" if certain else "ambiguous"
+
+    @cached_property
+    def bounds(self) -> dict[str, Finding]:
+        """Parameters at bounds: why each is no result, and the finding."""
+        return numbers.at_bounds(self.shown)
+
+    @cached_property
+    def idle(self) -> list[str]:
+        """Mechanisms of a set that may as well have no effect, and are not supported by recordings of another kind."""
+        if self.leader.explanation is None:
+            return []
+        names = self.shown.names
+        return [name for name in numbers.without_effect(self.shown) if not self.joined.shows_on_curves(name, names)]
+
+    @property
+    def _has_unknown_thickness(self) -> bool:
+        """Whether an indented sample has no declared thickness."""
+        return self.problem.kind == "indentation" and self.problem.lines.campaign.skin.thickness_mm is None
+
+    @property
+    def _may_be_the_other(self) -> bool:
+        """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens with depth.
+
+        That is so where the evidence of one in place of the other is above that which an idealised contact law may
+        have.
+        """
+        names = frozenset(self.shown.names)
+        stiffening = names & _STIFFER_WITH_DEPTH
+        if not self._has_unknown_thickness or len(stiffening) != 1:
+            return False
+        other = names ^ _STIFFER_WITH_DEPTH
+        least = self.shown.log_evidence - least_evidence(self.shown)
+        evidence = {frozenset(fitted.names): fitted.log_evidence for fitted in self.search.explanations}
+        return evidence.get(other, -math.inf) > least
+
+    @cached_property
+    def leading(self) -> LeadingLaw | None:
+        """The unlisted law behind an answer that no known mechanism gives."""
+        return LeadingLaw.of(self.problem, self.shown) if self.verdict == "unexplained" else None
+
+    @cached_property
+    def law(self) -> dict[str, Any] | None:
+        """The report's `unnamed`."""
+        leading = self.leading
+        return None if leading is None else law_document(self.search, self.problem, leading, self.diagnosis.groups)
+
+    @cached_property
+    def scores(self) -> tuple[cross_validation.PredictionScore, cross_validation.PredictionScore]:
+        """Of the recordings that were fitted, before and after."""
+        before, after = (cross_validation.in_sample(self.problem, fitted) for fitted in (self.base, self.shown))
+        return before, after
+
+    @cached_property
+    def fit(self) -> dict[str, Any]:
+        """Errors before and after, held-out groups, the fitted noise, and the modulus of curves."""
+        groups, named = self.diagnosis.groups, self.problem.lines.mechanisms.named
+        outside = cross_validation.total(groups)
+        levels = self.shown.best.levels
+        floor = (outside[1] if outside[1].recordings else self.scores[1]).floor_percent
+        return {
+            "before": self._errors(self.base, self.scores[0], outside[0]),
+            "after": self._errors(self.shown, self.scores[1], outside[1]),
+            "mechanisms": [name for name in self.shown.names if name in named],  # also where more is unexplained
+            "noise_floor_percent": rounded(floor),
+            "groups": [
+                {
+                    "group": group.group,
+                    "chosen": [self._plainly(name) for name in group.chosen] or [NOTHING_MISSING],
+                    "before_rmse_percent": rounded(group.before.rmse_percent),
+                    "after_rmse_percent": rounded(group.after.rmse_percent),
+                    "noise_floor_percent": rounded(group.after.floor_percent),
+                }
+                for group in groups
+            ],
+            "noise": {
+                "gain_percent": rounded(100 * levels.gain),
+                "position_mm": rounded(1e3 * levels.position),
+                "line_level": rounded(levels.level),
+                "smooth_percent": rounded(100 * levels.smooth),
+            },
+        }
+
+    def _errors(
+        self,
+        explanation: Explanation,
+        inside: cross_validation.PredictionScore,
+        outside: cross_validation.PredictionScore,
+    ) -> dict[str, Any]:
+        """Of indentations the error and the modulus of a plain least-squares fit of the same law as well [%, MPa]."""
+        lines, error = self.problem.lines, rounded(inside.rmse_percent)
+        errors: dict[str, Any] = {"rmse_percent": error}
+        if lines.kind == "indentation":
+            fit, residual_percent = explanation.least_squares
+            index = parameter_index(explanation, "youngs_modulus")
+            declared = lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is a factor on it
+            modulus_mpa = declared * explanation.model.parameters[index].from_fit(float(fit[index]))
+            errors = {
+                "rmse_percent": rounded(residual_percent),
+                "least_squares_modulus_mpa": rounded(float(modulus_mpa)),
+            }
+        return {
+            **errors,
+            **({"correlated_rmse_percent": error} if lines.curves else {}),
+            "heldout_rmse_percent": rounded(outside.rmse_percent),
+            "log_score": rounded(outside.log_score / outside.recordings) if outside.recordings else None,
+            **({"youngs_modulus": self._modulus(explanation)} if lines.curves else {}),
+        }
+
+    def _plainly(self, name: str) -> str:
+        """A mechanism's name; of an unlisted law the quantity it acts on, its axis and its form."""
+        law = self.problem.lines.mechanisms[name]
+        if not isinstance(law, UnlistedLaw):
+            return name
+        return f"unnamed: {law.description.acts_on} over {law.description.axis}, {law.description.form}"
+
+    def _modulus(self, explanation: Explanation) -> dict[str, Any]:
+        """Young's modulus under an explanation with its 95 % interval, from factors on the declared one, or free.
+
+        The interval allows for mechanisms that an apparent modulus may hide.
+        """
+        mechanisms, campaign = self.problem.lines.mechanisms, self.problem.lines.campaign
+        index = parameter_index(explanation, "youngs_modulus")
+        modulus = parameter_with_interval(explanation, index)
+        declared = campaign.skin.youngs_modulus_mpa
+        if declared is not None:
+            factors = [i for i, parameter in enumerate(explanation.model.parameters) if parameter.name == _FACTOR]
+            if factors:
+                value, factor = numbers.product(explanation, [index, *factors])
+                modulus |= numbers.with_ends(value, value / factor, value * factor, digits=6)
+            modulus |= {"unit": "MPa", **numbers.scaled(modulus, declared)}
+        hiding = may_hide(campaign, mechanisms.named)
+        return numbers.with_hidden(modulus, hidden_factors(hiding, explanation.names))
+
+    @cached_property
+    def present(self) -> dict[str, float]:
+        """The posterior of each mechanism."""
+        return numbers.present(self.search)
+
+    @cached_property
+    def presence(self) -> list[dict[str, Any]]:
+        """The report's `presence`: groups of mechanisms that these recordings cannot tell apart."""
+        return numbers.presence(self.search, self.present)
+
+    @cached_property
+    def mechanisms(self) -> list[dict[str, Any]]:
+        """The report's `mechanisms`: those of the stated answer, and those that act on other kinds' curves alone."""
+        if self.verdict == "unexplained" and self.leading is None:
+            return []
+        named = self.problem.lines.mechanisms.named
+        own = [
+            {
+                "name": name,
+                "probability": self._probability(name),
+                "parameters": parameters_of(self.shown, name),
+                "explains_percent": self._explains_percent(name),
+            }
+            for name in self.shown.names
+            if name in named
+        ]
+        on_curves = kinds.mechanisms_of_curves(self.joined, self.leader.alone, self.shown.names)
+        return own + [{**mechanism, "probability": self._probability(mechanism["name"])} for mechanism in on_curves]
+
+    def _probability(self, name: str) -> float:
+        return round(self.present.get(name, 0.0), 3)
+
+    def _explains_percent(self, name: str) -> float | None:
+        """Share of the base model's misfit beyond noise that returns where the mechanism is left out of its set [%].
+
+        None where the misfit without it is within noise: an effect that only many recordings together show. A mechanism
+        that adds variance reduces no misfit; of mains pick-up q it is the share in the lines' variance, n being a
+        line's own noise: Σ q² · q²/(q² + n²) / Σ q².
+        """
+        problem, best = self.problem, self.shown.best
+        parameters = problem.lines.mechanisms[name].parameters(problem.lines.campaign, problem.kind)
+        if any(parameter.acts_on == "line_variance" for parameter in parameters):
+            pickup = best.pickup_variance
+            noise = (best.levels.level * best.hypothesis.lines.deviation) ** 2
+            return round(100 * float((pickup**2 / (pickup + noise)).sum() / pickup.sum()), 1)
+        rest = tuple(other for other in self.shown.names if other != name)
+        fitted = [candidate for candidate in (*self.search.explanations, *self.search.laws) if candidate.names == rest]
+        without = fitted[0] if fitted else problem.explain([Request(rest)])[0]
+        assert without is not None  # a single request is never pruned
+        scores = (*self.scores, cross_validation.in_sample(problem, without))
+        floor = self.scores[1].noise / self.scores[1].size
+        before, after, left = (score.square / score.size - floor for score in scores)
+        if left <= 0:
+            return None
+        share = (left - max(after, 0.0)) / max(before, left)
+        return round(100 * float(np.clip(share, 0.0, 1.0)), 1)
+
+    @property
+    def meanings(self) -> list[str]:
+        """The joint meaning of each mechanism's parameters, where a single value does not show it."""
+        meanings = [
+            _MEANINGS[mechanism["name"]](
+                {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+            )
+            for mechanism in self.mechanisms
+            if mechanism["name"] in _MEANINGS
+        ]
+        return [meaning for meaning in meanings if meaning]
+
+    @cached_property
+    def by_kind(self) -> list[dict[str, Any]]:
+        """The report's `by_kind`."""
+        return kinds.by_kind(self.joined, self.shown.names)
+
+    @cached_property
+    def contradictions(self) -> list[dict[str, Any]]:
+        """The report's `contradictions`."""
+        return kinds.contradictions(self.joined)
+
+    @cached_property
+    def alike(self) -> dict[str, Any] | None:
+        """Answers to FRFs that predict them alike."""
+        floor = float(self.fit["noise_floor_percent"] or 0.0)
+        return numbers.alike(self.search, self.problem, floor) if self.traits.measured == "d33" else None
+
+    @cached_property
+    def d33(self) -> StatedD33:
+        """d33 over all answers, and whether it is to be quoted.
+
+        It is if one answer stands, kinds of recordings do not contradict each other, no parameter is at the bound of
+        its search, no unlisted law acts within the band, d33 is plausible, the answer fits the recordings to their
+        noise, which is a fifth of the response at most, and no wrong declared number that would not show here would
+        move d33 beyond its interval.
+        """
+        diagnosis, law = self.diagnosis, self.leading
+        unsure = diagnosis.level_unsure
+        d33 = d33_over_answers(self.search, self.problem, unsure) if self.traits.measured == "d33" else None
+        if d33 is None:
+            return StatedD33(None)
+        stands = self.verdict in ("explained", "no_mismatch") or law is not None
+        floor, error = self.fit["noise_floor_percent"], self.fit["after"]["rmse_percent"]
+        against = {
+            SEVERAL_ANSWERS: not stands or self.leader.probability < EXPLAINED,
+            "kinds of recordings contradict each other": bool(self.contradictions),
+            " and ".join(self.bounds): bool(self.bounds),
+            "a law that is in no list acts on it": law is not None and not law.is_outside_band,
+            "no PVDF has such a value": plausibility.implausibility(d33["value"]) is not None,
+            f"the error in the recordings, {in_digits(error, 2)} %, is well above their noise": not (
+                error <= cross_validation.REACHES_NOISE * floor
+            ),
+            f"noise alone is {in_digits(floor, 2)} % of the response": not floor <= _LARGEST_FLOOR,
+        }
+        why_not = [words for words, holds in against.items() if holds]
+        half_width = float(np.log(d33["high"] / d33["low"])) / 2
+        # Hidden mechanisms matter only where there is no other reason against quoting d33.
+        shifts = () if why_not else diagnosis.shifts
+        hidden = [shift for shift in shifts if abs(shift.log_factor) > half_width]
+        return StatedD33(d33, hidden, why_not, diagnosis.skin_d33_pc_per_n)
+
+    @property
+    def power(self) -> list[Power]:
+        """Detection limits, without mechanisms that would not show at a typical strength: they are not ruled out."""
+        unseen = {entry.mechanism for entry in self.diagnosis.confounded if entry.confounded_with in BY_NUISANCES}
+        unseen |= {shift.mechanism for shift in self.d33.hidden}
+        return [limit for limit in self.diagnosis.power if limit.mechanism not in unseen]
+
+    @cached_property
+    def findings(self) -> list[dict[str, str]]:
+        """The report's `findings`: those of the recordings, then those on the fit and on d33."""
+        further = [*self._fit_findings(), *self._contacts_kept(), *self._thickness_unknown()]
+        number = self.d33.number
+        implausible = None if number is None else plausibility.implausibility(number["value"])
+        if number is not None and implausible is not None:
+            arguments = {"d33_pc_per_n": number["value"], "kind": implausible}
+            further.append(Finding(Reason.D33_FITTED, "", "d33_pc_per_n", arguments))
+        return [finding.in_report() for finding in (*self.diagnosis.findings, *further)]
+
+    def _fit_findings(self) -> list[Finding]:
+        """Parameters at bounds, contacts beyond the tables, and noise larger than the lines' own."""
+        best, lines = self.shown.best, self.problem.lines
+        outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside]).tolist()
+        answer = {"answer": self._answer(self.shown.names) or SIMPLEST[lines.kind]}
+        ids = [recording.id for recording in lines.campaign.recordings]
+        beyond = [Finding(Reason.OUT_OF_TABLES_FITTED, ids[index], "preload_n", answer) for index in outside]
+        level = best.levels.level
+        is_noisy = not lines.curves and level >= cross_validation.NOISY
+        noisy = [Finding(Reason.LINE_NOISE_LEVEL, "", "frf_re_pc_per_n", {"level": level})] if is_noisy else []
+        return [*self.bounds.values(), *beyond, *noisy]
+
+    def _answer(self, names: Sequence[str]) -> str:
+        return in_words([in_plain_words(self.problem.lines.mechanisms[name]) for name in names])
+
+    def _contacts_kept(self) -> list[Finding]:
+        """Contacts of FRFs that lie within the tables with the fitted modulus, and beyond them with the declared."""
+        best, model, skin = self.shown.best, self.shown.model, self.problem.lines.campaign.skin
+        if not isinstance(model, FrfModel):
+            return []
+        contacts = len(np.unique(best.hypothesis.lines.recording[best.prediction.inside & ~model.valid]))
+        if not contacts:
+            return []
+        assert skin.youngs_modulus_mpa is not None
+        fit = dict(zip([parameter.name for parameter in model.parameters], self.shown.point.fit, strict=True))
+        fitted_mpa = None
+        if _FACTOR in fit:
+            fitted_mpa = skin.youngs_modulus_mpa * float(np.exp(fit[_FACTOR] + fit["youngs_modulus"]))
+        arguments = {
+            "contacts": contacts,
+            "recordings": self.problem.lines.recordings,
+            "declared_mpa": skin.youngs_modulus_mpa,
+            "found_mpa": fitted_mpa,
+            "answer": self._answer(self.shown.names),
+        }
+        return [Finding(Reason.CONTACTS_KEPT, "", "skin.youngs_modulus_mpa", arguments)]
+
+    def _thickness_unknown(self) -> list[Finding]:
+        """A thickness inferred from curves alone."""
+        mechanisms = self.problem.lines.mechanisms
+        stiffening = [name for name in self.shown.names if name in _STIFFENS or _is_of_depth(mechanisms[name])]
+        if not self._has_unknown_thickness or not stiffening:
+            return []
+        is_tried = "layered_contact" in mechanisms.named
+        arguments = {"answer": self._answer(stiffening), "is_tried": is_tried}
+        return [Finding(Reason.THICKNESS_UNKNOWN, "", "thickness_mm", arguments)]
+
+    @cached_property
+    def untried(self) -> list[str]:
+        """Clauses on the mechanisms of curves that their recordings do not support, where they could explain a
+        residual: one of them may be missing.
+
+        Other values of declared quantities are not among them: they are free for curves without a declared one.
+        """
+        remains = self.verdict in ("unexplained", "ambiguous")
+        remains = remains or any(finding["code"] == FindingCode.REMAINDER for finding in self.findings)
+        if not remains or not self.traits.lists_untried:
+            return []
+        return [
+            f"{name.replace('_', ' ')} was not tried: {reason}"
+            for name, reason in self.search.unsupported.items()
+            if name in CATALOGUE
+            and self.problem.kind in CATALOGUE[name].kinds
+            and CATALOGUE[name].stage is not Stage.DECLARED
+        ]
+
+
+_FACTOR = "modulus_factor"  # of modulus_error
+_MEANINGS = {
+    contact_creep.ContactCreep.name: contact_creep.meaning,
+    strain_stiffening.StrainStiffening.name: strain_stiffening.meaning,
+}
+
+
+def _is_of_depth(mechanism: Mechanism) -> bool:
+    return isinstance(mechanism, CurveLaw) and mechanism.description.axis in ("displacement_mm", "force_n")
