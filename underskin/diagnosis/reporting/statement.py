@@ -18,7 +18,7 @@ from underskin.diagnosis.reporting.facts import Facts
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.diagnosis.reporting.numbers import NAMED, SDS_OF_95
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
-from underskin.diagnosis.selection.answers import Answer
+from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.validation.signatures import Power
 from underskin.findings.codes import FindingCode
 from underskin.findings.english import lacking
@@ -135,7 +135,9 @@ def answer_clauses(
     listed = _answers_in_words(rivals)
     mentioned = list(dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE))
     if verdict == "no_mismatch":
-        agree = f"recordings and {model} agree within the noise (probability {percent})"
+        left = None if leader.explanation is None else remainder(leader.explanation)
+        within = "the noise" if left is None else f"{100 * left[0]:.2g} % of the largest force"
+        agree = f"recordings and {model} agree within {within} (probability {percent})"
         if leader.probability >= EXPLAINED or not rivals:
             return [f"{agree}, and nothing needs to be added{'' if all_used else ' for those that were used'}"]
         return [f"{agree}, but they do not rule out: {listed}", _law(mentioned)]
