@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from underskin.surrogate.sigma_table import SigmaTable, load_table
     from underskin.surrogate.solved_contact import solved_contact
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Campaign",
