@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import Levels
+from underskin.diagnosis.slips.levels import Levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import Cause, Levels, explained, smooth_along
+from underskin.diagnosis.slips.levels import Cause, Levels, explained, smooth_along
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.axes import recording_order

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import aligned_lines
-from underskin.diagnosis.screening.no_response import no_response
+from underskin.diagnosis.slips.levels import aligned_lines
+from underskin.diagnosis.slips.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.axes import recording_order

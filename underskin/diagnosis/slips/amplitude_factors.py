@@ -11,7 +11,7 @@ from math import comb, log
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import Levels, follows_an_axis
+from underskin.diagnosis.slips.levels import Levels, follows_an_axis
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording

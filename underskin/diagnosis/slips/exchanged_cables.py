@@ -14,7 +14,7 @@ from math import log
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import LevelFit, Levels
+from underskin.diagnosis.slips.levels import LevelFit, Levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording

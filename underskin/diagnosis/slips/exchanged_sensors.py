@@ -24,8 +24,8 @@ from math import dist, log
 import numpy as np
 from scipy.special import logsumexp
 
-from underskin.diagnosis.screening.levels import aligned_lines, flat_level
-from underskin.diagnosis.screening.no_response import no_response
+from underskin.diagnosis.slips.levels import aligned_lines, flat_level
+from underskin.diagnosis.slips.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose

@@ -12,20 +12,20 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Inspected, agree, recording_axes
-from underskin.diagnosis.screening.amplitude_factors import Step, amplitude_step, without_step
-from underskin.diagnosis.screening.declared_values import unlikely
-from underskin.diagnosis.screening.exchanged_cables import exchanged_cables, with_right_sensors
-from underskin.diagnosis.screening.exchanged_sensors import without_exchanges
-from underskin.diagnosis.screening.levels import causes_of, levels
-from underskin.diagnosis.screening.model_consistency import against_model
-from underskin.diagnosis.screening.phase_convention import in_common_convention
-from underskin.diagnosis.screening.position_errors import at_sensors, misplaced
-from underskin.diagnosis.screening.sensor_alone import OutlyingSensor, outlying_sensor, without_sensor_gain
-from underskin.diagnosis.screening.silent_together import without_silent_pair
-from underskin.diagnosis.screening.time_series import as_given, as_lines
-from underskin.diagnosis.screening.unit_errors import faint_oscillation, single_unit_errors
-from underskin.diagnosis.screening.warm_up import WarmUp, warming, without_first
-from underskin.diagnosis.screening.weak_sensors import weak_sensors
+from underskin.diagnosis.slips.amplitude_factors import Step, amplitude_step, without_step
+from underskin.diagnosis.slips.declared_values import unlikely
+from underskin.diagnosis.slips.exchanged_cables import exchanged_cables, with_right_sensors
+from underskin.diagnosis.slips.exchanged_sensors import without_exchanges
+from underskin.diagnosis.slips.levels import causes_of, levels
+from underskin.diagnosis.slips.model_consistency import against_model
+from underskin.diagnosis.slips.phase_convention import in_common_convention
+from underskin.diagnosis.slips.position_errors import at_sensors, misplaced
+from underskin.diagnosis.slips.sensor_alone import OutlyingSensor, outlying_sensor, without_sensor_gain
+from underskin.diagnosis.slips.silent_together import without_silent_pair
+from underskin.diagnosis.slips.time_series import as_given, as_lines
+from underskin.diagnosis.slips.unit_errors import faint_oscillation, single_unit_errors
+from underskin.diagnosis.slips.warm_up import WarmUp, warming, without_first
+from underskin.diagnosis.slips.weak_sensors import weak_sensors
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking

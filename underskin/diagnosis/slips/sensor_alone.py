@@ -10,7 +10,7 @@ from math import exp, log
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import LevelFit, Levels, smooth_along
+from underskin.diagnosis.slips.levels import LevelFit, Levels, smooth_along
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.screening.levels import aligned_lines
-from underskin.diagnosis.screening.no_response import dead, no_response
-from underskin.diagnosis.screening.reversed_signs import signs_of
-from underskin.diagnosis.screening.table_domain import within_tables
+from underskin.diagnosis.slips.levels import aligned_lines
+from underskin.diagnosis.slips.no_response import dead, no_response
+from underskin.diagnosis.slips.reversed_signs import signs_of
+from underskin.diagnosis.slips.table_domain import within_tables
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
