@@ -1,22 +1,25 @@
-"""Levels of recordings over the base model's, the model of these levels, and what may change them.
+"""Levels of recordings over the base model's, the model of these levels, and what may have changed them.
 
 A recording's level is the magnitude of its FRF in the flat zone. With y_i = ln |level_i / shape_i|, shape_i being the
 base model's, the model of levels is
     y = X b + ε,  b ~ N(0, P),  ε_i ~ N(0, s² + (g_i p)²),
-where X holds a gain, one gain per sensor (of standard deviation t), and smooth functions of what physics may depend on
-(sphere, preload, position, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter
-of positions. The evidence is the largest ln N(y; 0, C) + ln p(s), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the
-size of the smooth functions, p(s) being the prior of a recording's gain. A recording error is accepted where removing
-it from y raises the evidence by far more than the cost of describing it.
+where X holds a gain, one gain per sensor (of standard deviation t) and the columns of a cause, g_i is
+|∂ ln shape/∂ position| and p the scatter of positions. The evidence is the largest ln N(y; 0, C) + ln p(s),
+C = X P Xᵀ + diag(s² + g² p²), over s, t and p, p(s) being the prior of a recording's gain.
 
-Causes of a change in level: none, one mechanism of the catalogue, or a smooth change (several mechanisms, or an
-unlisted law). The changes Δ of ln level under a mechanism, at K points from the priors of its parameters, enter as a
-normal change of the same second moments, Σ Δ Δᵀ/K. With no cause, and with each mechanism, the declared modulus and
-thickness may be off as far as their priors allow.
+Causes of a change in level: none, one mechanism of the catalogue, or a smooth change along what physics may depend on
+(sphere, preload, position, order, load cycles, dwell, dynamic force), as by several mechanisms or an unlisted law. The
+changes Δ of ln level under a mechanism, at K points from the priors of its parameters, enter as a normal change of the
+same second moments, Σ Δ Δᵀ/K. With no cause, and with each mechanism, the declared modulus and thickness may be off as
+far as their priors allow.
+
+An alternative is a slip, or what resembles one: known changes of y, unknown ones as further columns of X, or other
+sensors. Its evidence is summed over all causes (`explained`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from math import log
 
@@ -26,47 +29,34 @@ from scipy.special import logsumexp
 from scipy.stats import qmc
 
 from underskin.diagnosis.noise import GAIN_FALL, Plateau
+from underskin.diagnosis.slips.comparison import LEAST_RESPONSE, flat_level
+from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.axes import axes_of, recording_order
-from underskin.recordings.campaign import Campaign, Conditions, FrfRecording
-from underskin.recordings.frf.estimation import advanced, common_delay, lines_of
-from underskin.recordings.frf.spectra import stacked
+from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, offsets
 from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Array, Complexes, Floats, Indices, Mask
+from underskin.units import Array, Floats, Indices
+
+GAIN = log(25)  # ln odds that a slip must have against none
+CHANGE = 0.45  # prior standard deviation of a slip's change of ln level of unknown size
+LEAST_CHANGE = 0.12  # of ln level; smaller ones are within the scatter of gains
 
 
-def aligned_lines(recordings: Sequence[FrfRecording]) -> list[Complexes]:
-    """The values [C/N] of each recording's lines without the delay common to all."""
-    measured = [lines_of(recording) for recording in recordings]
-    delay = common_delay(stacked(measured))
-    return [advanced(frf.values, frf.frequency, delay) if delay else frf.values for frf in measured]
+def times(recording: FrfRecording, real: float, imaginary: float | None = None) -> FrfRecording:
+    """The recording with its FRF times a factor, its imaginary part times another one where that is given."""
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    imaginary = real if imaginary is None else imaginary
+    scaled = real * recording.frf_re_pc_per_n, imaginary * recording.frf_im_pc_per_n
+    return replace(recording, frf_re_pc_per_n=scaled[0], frf_im_pc_per_n=scaled[1])
 
 
-_LEAST = 2  # recordings: a single one is always extreme along some axis
-_MISMATCH = 0.25  # share of the recordings that may differ
 _TERMS, _SIZE = 4, 0.3  # number of cosines over the rank along an axis, and the prior standard deviation of each
-
-
-def follows_an_axis(chosen: Mask, axes: Sequence[Floats]) -> bool:
-    """Whether the chosen recordings are, but for a few, those on one side of an axis, or on one level of it.
-
-    Then a law along the axis may act, and the recordings need not be wrong.
-    """
-    if chosen.sum() < _LEAST:
-        return False
-    allowed = _MISMATCH * chosen.sum()
-    for axis in axes:
-        for level in np.unique(axis):
-            for part in (axis >= level, axis == level):
-                mismatches = int((part ^ chosen).sum())
-                if min(mismatches, len(chosen) - mismatches) <= allowed:
-                    return True
-    return False
 
 
 def smooth_along(axis: Floats) -> Floats:
@@ -76,15 +66,12 @@ def smooth_along(axis: Floats) -> Floats:
     return np.asarray(_SIZE * np.cos(np.pi * np.outer(share, np.arange(1, _TERMS + 1))))
 
 
-_FLAT_HZ = 130.0  # below it the response is about flat
-_LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a zero crossing, a level is not informative
-SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s
-SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
-_SPREAD = (0.01, 0.06, 0.25)  # t
-SMOOTH_SIZES = (0.0, 0.1, 0.4, 1.0)  # of all smooth functions together; 0 where nothing moves the levels
-_POSITION_MM = (0.0, 0.1, 0.3)  # p
-_USUAL_SPREAD, _USUAL_POSITION_MM = 0.06, 0.1
-_OVERALL, _SMOOTH, _CURVATURE = 3.0, 0.3, 0.15  # prior standard deviations of the other coefficients
+_SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s, about the range of a rig's gain (recordings/usual_scatter.py)
+_SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
+_SPREAD = (0.01, 0.06, 0.25)  # t, of calibrated, of good and of poled sensors
+_SMOOTH_SIZES = (0.1, 0.4, 1.0)  # of all smooth functions together
+_POSITION_MM = (0.0, 0.1, 0.3)  # p, of a stage (recordings/usual_scatter.py)
+_OVERALL = 3.0  # prior standard deviation of ln of the gain, the d33 of all sensors
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,38 +83,22 @@ class Levels:
     sensor: Indices
     order: Floats  # 0, 1, … in time
     slope: Floats  # g [1/mm]
-    smooth: Floats  # (recordings, columns) of X, times their prior standard deviation
-    cycles: Floats | None
-    axes: tuple[Floats, ...]  # each axis on which the recordings differ (recordings,)
+    may_age: bool  # whether load cycles are noted, by which sensors age
+    axes: tuple[Floats, ...]  # each axis on which the recordings differ, and their offsets (recordings,)
 
-    def fit(self, value: Floats, further: Floats | None = None, sensor: Indices | None = None) -> "LevelFit":
-        """The best s, t, p and size of the smooth functions for `value` (recordings,).
+    @cached_property
+    def smooth(self) -> Floats:
+        """Smooth functions along all axes, times their prior standard deviation (recordings, functions)."""
+        return np.hstack([np.zeros((len(self.value), 0)), *(smooth_along(axis) for axis in self.axes)])
 
-        `further` (recordings, columns), scaled by its prior, is added to X; `sensor` replaces the recordings' sensors.
-        """
-        added = 0.0 if further is None else further @ further.T
-        best, chosen, best_spread = -np.inf, np.eye(len(value)), self.spreads[0]
-        for spread, position_scatter, smooth_size in product(self.spreads, self.position_scatters, SMOOTH_SIZES):
-            fixed = (
-                self.expected(spread, smooth_size * self.smooth, sensor)
-                + np.diag((self.slope * position_scatter) ** 2)
-                + added
-            )
-            for scatter in SCATTER:
-                covariance = fixed + np.diag(np.full(len(value), scatter**2))
-                density = _log_density(value, covariance) + float(SCATTER_PRIOR.log_density(log(scatter)))
-                if density > best:
-                    best, chosen, best_spread = density, covariance, spread
-        return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), best_spread)
+    def precision(self, scatter: float, smooth_size: float, spread: float = _SPREAD[1]) -> Floats:
+        """C⁻¹ (recordings, recordings) of smooth functions of a given size, at given s and t."""
+        noise = scatter**2 + (_POSITION_MM[1] * self.slope) ** 2
+        return np.asarray(np.linalg.inv(self.expected(spread, smooth_size * self.smooth) + np.diag(noise)))
 
-    def precision(self, scatter: float, smooth_size: float) -> Floats:
-        """C⁻¹ (recordings, recordings) at a given s and size of the smooth functions."""
-        noise = scatter**2 + (_USUAL_POSITION_MM * self.slope) ** 2
-        return np.asarray(np.linalg.inv(self.expected(_USUAL_SPREAD, smooth_size * self.smooth) + np.diag(noise)))
-
-    def expected(self, spread: float, columns: Floats, sensor: Indices | None = None) -> Floats:
+    def expected(self, spread: float, columns: Floats) -> Floats:
         """X P Xᵀ (recordings, recordings) at the sensors' spread t, for a gain, the sensors' gains and `columns`."""
-        indicator = np.eye(int(self.sensor.max()) + 1)[self.sensor if sensor is None else sensor]
+        indicator = np.eye(int(self.sensor.max()) + 1)[self.sensor]
         return np.asarray(_OVERALL**2 + columns @ columns.T + spread**2 * indicator @ indicator.T)
 
     @property
@@ -141,26 +112,6 @@ class Levels:
         return _POSITION_MM if self.slope.max(initial=0.0) > 0.05 else _POSITION_MM[:1]
 
 
-@dataclass(frozen=True, eq=False)
-class LevelFit:
-    """ln N(y; 0, C) + ln p(s) but for the normal density's constant at the best standard deviations, C⁻¹, and the
-    sensors' spread t."""
-
-    evidence: float
-    precision: Floats
-    spread: float
-
-    def amplitude(self, value: Floats, column: Floats) -> tuple[float, float]:
-        """The amplitude of a column in y by generalised least squares, and its standard deviation."""
-        weight = self.precision @ column
-        total = float(weight @ column)
-        return float(weight @ value) / total, total**-0.5
-
-    def residual(self, value: Floats) -> Floats:
-        """Each value minus its expectation given all others."""
-        return np.asarray((self.precision @ value) / np.diag(self.precision))
-
-
 def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable) -> Levels:
     """The levels of a campaign's recordings, whose signs are correct."""
     subset = replace(campaign, recordings=tuple(recordings))
@@ -170,82 +121,28 @@ def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaT
     shape = np.abs(prediction.value[first].real)
     level = np.array([flat_level(recording) for recording in recordings])
     chosen = np.flatnonzero(
-        model.valid[first] & (shape > _LEAST_RESPONSE * shape.max(initial=0.0)) & (level > 0) & np.isfinite(level)
+        model.valid[first] & (shape > LEAST_RESPONSE * shape.max(initial=0.0)) & (level > 0) & np.isfinite(level)
     )
     slope = np.zeros(len(recordings))
     if prediction.position_slopes is not None:
         slope = 1e-3 * np.hypot(*np.abs(prediction.position_slopes[:, first])) / np.where(shape > 0, shape, 1.0)
+    offset = offsets(subset)
+    columns = [axis.of([recording.id for recording in recordings]) for axis in axes_of(subset)]
+    columns += [*offset.T, np.hypot(*offset.T)]
     ids = [sensor.id for sensor in campaign.skin.sensors]
-    cycles = [recording.load_cycles for recording in recordings]
-    counted = None if any(count is None for count in cycles) else np.array(cycles, dtype=float)[chosen]
     return Levels(
         index=chosen,
         value=np.log(level[chosen] / shape[chosen]),
         sensor=np.array([ids.index(recordings[index].sensor) for index in chosen.tolist()], dtype=np.intp),
         order=recording_order(recordings)[chosen],
         slope=slope[chosen],
-        smooth=_smooth(campaign, [recordings[index] for index in chosen.tolist()], recording_order(recordings)[chosen]),
-        cycles=counted,
-        axes=tuple(axis.of([recordings[index].id for index in chosen.tolist()]) for axis in axes_of(subset)),
+        may_age=all(recording.load_cycles is not None for recording in recordings),
+        axes=tuple(column[chosen] for column in columns if len(chosen) and np.ptp(column[chosen])),
     )
 
 
-def flat_level(recording: FrfRecording) -> float:
-    """|FRF| in the flat zone [C/N]."""
-    measured = lines_of(recording)
-    flat: Mask = measured.frequency <= _FLAT_HZ
-    values = np.abs(measured.values[flat] if flat.any() else measured.values)
-    return float(np.nanmedian(values))
-
-
-def _smooth(campaign: Campaign, recordings: Sequence[FrfRecording], order: Floats) -> Floats:
-    """The smooth columns of X, times their prior standard deviations."""
-    if not recordings:
-        return np.zeros((0, 0))
-    preload = _standard(np.log([recording.preload_n for recording in recordings]))
-    sphere = np.array([recording.indenter_radius_mm for recording in recordings])
-    columns = []
-    for radius in np.unique(sphere):
-        of_sphere = (sphere == radius).astype(float)
-        columns += [
-            _SMOOTH * of_sphere,
-            _SMOOTH * of_sphere * preload,
-            _CURVATURE * of_sphere * preload**2,
-            _CURVATURE * of_sphere * preload**3,
-        ]
-    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    offsets = [
-        np.subtract(recording.position_mm or positions[recording.sensor], positions[recording.sensor])
-        for recording in recordings
-    ]
-    x, y = np.array(offsets).T / (campaign.skin.thickness_mm or 1.0)
-    columns += [_SMOOTH * column for column in (x, y, x**2 + y**2, x**2 - y**2, x * y)]
-    columns += [_SMOOTH * column * np.hypot(x, y) ** 2 for column in (x, y, x**2 + y**2)]
-    columns += [_CURVATURE * column * preload for column in (x, y, x**2 + y**2)]
-    along = _standard(order)
-    columns += [_CURVATURE * along, _CURVATURE * along**2]
-    for name in ("load_cycles", "dwell_s", "dynamic_force_n"):
-        noted = [getattr(recording, name) for recording in recordings]
-        if all(value is not None and value > 0 for value in noted):
-            columns.append(_CURVATURE * _standard(np.log(np.array(noted, dtype=float))))
-    return np.stack(columns, axis=1)
-
-
-def _standard(column: Floats) -> Floats:
-    """The column scaled to −1 … 1."""
-    middle, half = (np.max(column) + np.min(column)) / 2, (np.max(column) - np.min(column)) / 2
-    return np.asarray((column - middle) / half if half > 0 else np.zeros(len(column)))
-
-
-def _log_density(value: Floats, covariance: Floats) -> float:
-    """ln N(value; 0, covariance) but for its constant."""
-    root = np.linalg.cholesky(covariance)
-    white = solve_triangular(root, value, lower=True, check_finite=False)
-    return float(-0.5 * white @ white - np.log(np.diag(root)).sum())
-
-
 _NO_CAUSE, _SINGLE_CAUSE, _SMOOTH_CAUSE = 0.6, 0.25, 0.15  # prior probabilities
-_DRAWS = 8
+_DRAWS = 8  # points K
 _LEAST_RATIO = 1e-3  # of the base model's response
 
 
@@ -257,13 +154,33 @@ class Cause:
     columns: Floats
 
 
+Undone = tuple[list[FrfRecording], Finding]
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """A slip, or what resembles one: the logarithm of its prior less that of the number of choices, and what it does.
+
+    `offset` (recordings,) is a known change of y; `column` (recordings,) one of unknown amplitude, times its prior
+    standard deviation; `sensor` (recordings,) are the true sensors. `undo` gives the recordings without the slip and
+    the finding, from the recordings and the amplitude in prior standard deviations, or None where it is none of a slip;
+    without it the alternative is no slip.
+    """
+
+    log_prior: float
+    offset: Floats | None = None
+    column: Floats | None = None
+    sensor: Indices | None = None
+    undo: Callable[[Sequence[FrfRecording], float], Undone | None] | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """ln evidence of each alternative (alternatives,), and the means of its coefficients over their prior standard
-    deviations (alternatives, columns)."""
+    """ln evidence of each alternative (alternatives,), and the mean of its amplitude in prior standard deviations
+    (alternatives,)."""
 
     evidence: Floats
-    coefficient: Floats
+    amplitude: Floats
 
 
 def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Levels, table: SigmaTable) -> list[Cause]:
@@ -295,48 +212,49 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
             relative = np.abs([changed[levels.index] / value for changed in model.values(_drawn(model, start))])
             change = np.log(np.maximum(relative, _LEAST_RATIO))
             laws.append(change.T / len(change) ** 0.5)
-    smooth_sizes = [smooth_size for smooth_size in SMOOTH_SIZES if smooth_size > 0]
     return [
         Cause(log(_NO_CAUSE), declared),
         *(Cause(log(_SINGLE_CAUSE / len(laws)), np.hstack([declared, law])) for law in laws),
-        *(Cause(log(_SMOOTH_CAUSE / len(smooth_sizes)), smooth_size * levels.smooth) for smooth_size in smooth_sizes),
+        *(Cause(log(_SMOOTH_CAUSE / len(_SMOOTH_SIZES)), smooth_size * levels.smooth) for smooth_size in _SMOOTH_SIZES),
     ]
 
 
-def explained(levels: Levels, causes: Sequence[Cause], further: Floats) -> Explained:
-    """The evidence of each alternative, summed over all causes, at the best s, t, p of each.
+def explained(levels: Levels, causes: Sequence[Cause], alternatives: Sequence[Alternative]) -> Explained:
+    """The evidence of each alternative, summed over all causes, at the best s, t, p of each."""
+    evidence, amplitude = np.zeros(len(alternatives)), np.zeros(len(alternatives))
+    as_labelled = [index for index, alternative in enumerate(alternatives) if alternative.sensor is None]
+    relabelled = [index for index in range(len(alternatives)) if index not in as_labelled]
+    for indices in (as_labelled, *([index] for index in relabelled)):
+        chosen = [alternatives[index] for index in indices]
+        sensor = levels.sensor if chosen[0].sensor is None else chosen[0].sensor
+        by_cause = [_by_cause(replace(levels, sensor=sensor), cause.columns, chosen) for cause in causes]
+        joint = np.array([cause.log_prior + result.evidence for cause, result in zip(causes, by_cause, strict=True)])
+        evidence[indices] = logsumexp(joint, axis=0)
+        share = np.exp(joint - evidence[indices])
+        amplitude[indices] = (share * np.array([result.amplitude for result in by_cause])).sum(axis=0)
+    return Explained(evidence, amplitude)
 
-    `further` (alternatives, recordings, columns): columns that each alternative adds to X, times their prior standard
-    deviations.
-    """
-    by_cause = [_by_cause(levels, cause.columns, further) for cause in causes]
-    joint = np.array([cause.log_prior + result.evidence for cause, result in zip(causes, by_cause, strict=True)])
-    total = logsumexp(joint, axis=0)
-    share = np.exp(joint - total)
-    coefficient = (share[:, :, None] * np.array([result.coefficient for result in by_cause])).sum(axis=0)
-    return Explained(np.asarray(total), np.asarray(coefficient))
 
-
-def _by_cause(levels: Levels, columns: Floats, further: Floats) -> Explained:
+def _by_cause(levels: Levels, columns: Floats, alternatives: Sequence[Alternative]) -> Explained:
     """The evidence of each alternative under one cause."""
-    alternatives, recordings, width = further.shape
-    right = np.column_stack([levels.value, further.transpose(1, 0, 2).reshape(recordings, -1)])
-    evidence, coefficient = np.full(alternatives, -np.inf), np.zeros((alternatives, width))
+    count, none = len(alternatives), np.zeros(len(levels.value))
+    values = [levels.value - (none if one.offset is None else one.offset) for one in alternatives]
+    right = np.stack([*values, *(none if one.column is None else one.column for one in alternatives)], axis=1)
+    evidence, amplitude = np.full(count, -np.inf), np.zeros(count)
     for spread, position_scatter in product(levels.spreads, levels.position_scatters):
         fixed = levels.expected(spread, columns) + np.diag((levels.slope * position_scatter) ** 2)
-        for scatter in SCATTER:
-            root = np.linalg.cholesky(fixed + scatter**2 * np.eye(recordings))
+        for scatter in _SCATTER:
+            root = np.linalg.cholesky(fixed + scatter**2 * np.eye(len(none)))
             white = solve_triangular(root, right, lower=True, check_finite=False)
-            value, white_columns = white[:, 0], white[:, 1:].reshape(recordings, alternatives, width).transpose(1, 0, 2)
-            precision = np.eye(width) + white_columns.transpose(0, 2, 1) @ white_columns
-            along = value @ white_columns
-            best = np.linalg.solve(precision, along[:, :, None])[:, :, 0]
-            nothing = -0.5 * value @ value - np.log(np.diag(root)).sum() + SCATTER_PRIOR.log_density(log(scatter))
-            density = nothing + 0.5 * (along * best).sum(axis=1) - 0.5 * np.linalg.slogdet(precision)[1]
+            value, column = white[:, :count], white[:, count:]
+            size = 1 + (column**2).sum(axis=0)
+            best = (value * column).sum(axis=0) / size
+            density = 0.5 * (size * best**2 - np.log(size) - (value**2).sum(axis=0)) - np.log(np.diag(root)).sum()
+            density += float(_SCATTER_PRIOR.log_density(log(scatter)))
             better = density > evidence
             evidence = np.where(better, density, evidence)
-            coefficient = np.where(better[:, None], best, coefficient)
-    return Explained(evidence, coefficient)
+            amplitude = np.where(better, best, amplitude)
+    return Explained(evidence, amplitude)
 
 
 def _drawn(model: FrfModel, start: Floats) -> Array:
