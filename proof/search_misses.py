@@ -19,9 +19,9 @@ from proof.text_wide import is_miss
 from proof.true_starts import with_true_values
 from rig.wide_tails import WIDE
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import frf_problem, search
+from underskin.diagnosis.slips.inspection import inspect
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import from_dict

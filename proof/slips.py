@@ -20,8 +20,8 @@ from proof.text_slips import slips
 from rig.draw import drawn, record
 from rig.recorded import RecordedLines, campaign
 from rig.true_response import TrueResponse
-from underskin.diagnosis.screening.inspection import inspect
-from underskin.diagnosis.screening.levels import levels
+from underskin.diagnosis.slips.inspection import inspect
+from underskin.diagnosis.slips.levels import levels
 from underskin.findings.codes import Reason
 from underskin.recordings.campaign import Campaign, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table

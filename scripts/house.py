@@ -15,8 +15,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 LIBRARY = ROOT / "underskin"
 WRITTEN = LIBRARY / "client" / "documents.py"  # by make, not kept in git
-CATALOGUE = ("mechanisms/laws/", "recordings/readers/", "diagnosis/screening/", "diagnosis/slips/", "units.py")
-SLIPS = ("diagnosis/screening/", "diagnosis/slips/")
+CATALOGUE = ("mechanisms/laws/", "recordings/readers/", "diagnosis/slips/", "units.py")
+SLIPS = ("diagnosis/slips/",)
 ENGINE = ("diagnosis/", "inference/")
 _KINDS = ("frf", "indentation", "compression")
 _RECORDINGS = re.compile(r"\w*Recording$")

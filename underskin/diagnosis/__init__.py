@@ -1,5 +1,5 @@
 """Where recordings and model differ, and what physics was left out.
 
-Data flow one way, one folder a step: data and noise → screening → inference → selection → validation and planning →
+Data flow one way, one folder a step: data and noise → slips → inference → selection → validation and planning →
 localisation → reporting; `pipeline` calls them. docs/how-it-works.md describes them.
 """

@@ -1,4 +1,4 @@
-"""A campaign's diagnosis: screening → rows with noise → search → location → held-out groups → plan → report."""
+"""A campaign's diagnosis: slips → rows with noise → search → location → held-out groups → plan → report."""
 
 import importlib.metadata
 from collections.abc import Callable, Collection, Sequence
@@ -16,14 +16,14 @@ from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.facts import DiagnosisResult
-from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
-from underskin.diagnosis.screening.inspection import inspect
-from underskin.diagnosis.screening.physical_limits import without_extremes
-from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search
 from underskin.diagnosis.selection.unlisted_search import with_laws
+from underskin.diagnosis.slips.curve_unit_errors import without_inconsistent
+from underskin.diagnosis.slips.inspection import inspect
+from underskin.diagnosis.slips.physical_limits import without_extremes
+from underskin.diagnosis.slips.unusable_curves import without_unusable
 from underskin.diagnosis.validation.cross_validation import (
     above_noise,
     held_out,

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.diagnosis.data.dataset import hours
+from underskin.diagnosis.slips.unit_errors import SLIP
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -17,14 +18,16 @@ from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import pitch_mm
 from underskin.units import unit_guess, unusual
 
-_PRELOADS_N = (0.01, 150.0)  # least for the highest preload of a campaign, most for the lowest
-_FREQUENCIES_HZ = (0.5, 2e4)  # range of the highest line of a campaign
+_PRELOADS_N = (
+    0.01,
+    150.0,
+)  # of stages and load cells: least for the highest preload of a campaign, most for the lowest
+_FREQUENCIES_HZ = (0.5, 2e4)  # of shakers and charge amplifiers: range of the highest line of a campaign
 _LEAST_PAUSE_S = 5.0  # no sweep takes less
 _SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency
 _ELASTOMERS_MPA = (0.02, 300.0)  # from gels to the hardest polyurethanes
-_WIDEST_PITCH_MM = 300.0
+_WIDEST_PITCH_MM = 300.0  # skins of robots have 2 to 50
 _GEOMETRY = ("thickness_mm", "sensor_radius_mm", "width_mm", "length_mm")
-_SLIP = 1000.0
 
 
 def unlikely(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
@@ -86,7 +89,7 @@ def _of_frequencies(recordings: Sequence[FrfRecording]) -> list[Finding]:
             arguments = {"lowest_hz": lowest, "highest_hz": highest, "too_large": too_large, "given_in": unit}
             return [Finding(Reason.FREQUENCIES, "", "frequency_hz", arguments)]
     pause = _pause_s(recordings)
-    if pause is not None and pause * lowest < 1 and _SLIP * highest <= _FREQUENCIES_HZ[1]:
+    if pause is not None and pause * lowest < 1 and SLIP * highest <= _FREQUENCIES_HZ[1]:
         arguments = {"lowest_hz": lowest, "pause_s": pause}
         return [Finding(Reason.PERIODS_TOO_LONG, "", "frequency_hz", arguments)]
     return []

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
+from underskin.diagnosis.slips.unit_errors import MOST_SHARE, SLIP
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -20,7 +21,7 @@ from underskin.recordings.frf.line_choice import Usable, noise_findings, usable_
 from underskin.recordings.frf.spectra import Frf, mean_of
 from underskin.units import Floats, to_lab
 
-_SLIP, _WITHIN = 1000.0, 30.0
+_WITHIN = 30.0  # times what is declared, or a thousand times it
 
 
 def contradiction_of(recording: FrfRecording) -> Finding | None:
@@ -35,7 +36,7 @@ def contradiction_of(recording: FrfRecording) -> Finding | None:
     agrees = any(_near(ratio, 1.0) for ratio in oscillation)
     nearest = oscillation[int(np.argmin(np.abs(np.log(np.maximum(oscillation, 1e-300)))))] * recording.dynamic_force_n
     pressed = None if preload is None else abs(preload) / recording.preload_n
-    for factor, unit, other_unit in ((_SLIP, "mN", "kN"), (1 / _SLIP, "kN", "mN")):
+    for factor, unit, other_unit in ((SLIP, "mN", "kN"), (1 / SLIP, "kN", "mN")):
         off = any(_near(ratio, factor) for ratio in oscillation)
         dynamic_force = {"dynamic_force_n": recording.dynamic_force_n}
         if off and (not agrees if pressed is None else _near(pressed, factor)):
@@ -59,7 +60,6 @@ def _near(ratio: float, factor: float) -> bool:
     return factor / _WITHIN < ratio < factor * _WITHIN
 
 
-_MOST_SHARE = 0.25  # of the recordings at most
 _MANY = 0.1  # of the lines
 _GIVEN_AS = {"frequency_hz": "sample_rate_hz", "frf_re_pc_per_n": "charge_pc"}
 
@@ -86,7 +86,7 @@ def as_lines(recordings: Sequence[FrfRecording], *, units_checked: bool) -> Esti
     With `units_checked` contradictions are findings and nothing is left out.
     """
     contradictions = [finding for recording in recordings if (finding := contradiction_of(recording)) is not None]
-    are_many = len(contradictions) > max(1.0, _MOST_SHARE * len(recordings))
+    are_many = len(contradictions) > max(1.0, MOST_SHARE * len(recordings))
     if are_many and not units_checked:
         return Estimated([], [], doubtful=_together(contradictions, len(recordings)))
     if are_many or units_checked:

@@ -5,11 +5,10 @@ plausible modulus brings within the tables are kept until the fit has found E; u
 continuation of the tables (mechanisms/models/sigma_curves.py).
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -18,12 +17,15 @@ from underskin.mechanisms.models.composed import Model, compose
 from underskin.physics import hertz
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import to_si
+from underskin.units import Mask, to_si
 
 _ENOUGH = 0.5  # of the contacts within the tables: then a wrong unit, or modulus, is worth naming
-
-Mask = NDArray[np.bool_]
-Undo = Callable[[Campaign, float], Campaign]
+_UNITS = {  # given instead of the field's own: 1000 times smaller, and larger
+    "preload_n": ("mN", "kN"),
+    "indenter_radius_mm": ("µm", "m"),
+    "skin.youngs_modulus_mpa": ("kPa", "GPa"),
+    "skin.thickness_mm": ("µm", "m"),
+}
 
 
 def within_tables(
@@ -80,36 +82,25 @@ def _inside(model: Model, recordings: int) -> Mask:
 
 def _inside_where_stiffest(campaign: Campaign, table: SigmaTable) -> Mask:
     """Which contacts lie within the tables at the largest plausible modulus, where contacts are narrowest."""
-    stiffest = _skin_times("youngs_modulus_mpa")(campaign, LARGEST_FACTOR)
+    stiffest = _times(campaign, "skin.youngs_modulus_mpa", LARGEST_FACTOR)
     return _inside(compose((), stiffest, table, "frf"), len(campaign.recordings))
 
 
 def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding]:
     """Findings on single fields that, taken 1000 times smaller or larger, bring most contacts within the tables."""
     findings = []
-    for field, times, units in (
-        ("preload_n", _recordings_times("preload_n"), ("mN", "kN")),
-        ("indenter_radius_mm", _recordings_times("indenter_radius_mm"), ("µm", "m")),
-        ("skin.youngs_modulus_mpa", _skin_times("youngs_modulus_mpa"), ("kPa", "GPa")),
-        ("skin.thickness_mm", _skin_times("thickness_mm"), ("µm", "m")),
-    ):
+    for field, units in _UNITS.items():
         for factor, unit in zip((1e-3, 1e3), units, strict=True):
-            inside = _inside(compose((), times(campaign, factor), table, "frf"), len(campaign.recordings))
+            inside = _inside(compose((), _times(campaign, field, factor), table, "frf"), len(campaign.recordings))
             if inside.mean() > _ENOUGH:
                 findings.append(Finding(Reason.WITHIN_TABLES, "", field, {"larger": factor > 1, "given_in": unit}))
     return findings
 
 
-def _recordings_times(name: str) -> Undo:
-    def times(campaign: Campaign, factor: float) -> Campaign:
-        changed = (replace(recording, **{name: factor * getattr(recording, name)}) for recording in campaign.recordings)
-        return replace(campaign, recordings=tuple(changed))
-
-    return times
-
-
-def _skin_times(name: str) -> Undo:
-    def times(campaign: Campaign, factor: float) -> Campaign:
+def _times(campaign: Campaign, field: str, factor: float) -> Campaign:
+    """The campaign with a field of its skin, or of all its recordings, times a factor."""
+    if field.startswith("skin."):
+        name = field.removeprefix("skin.")
         return replace(campaign, skin=replace(campaign.skin, **{name: factor * getattr(campaign.skin, name)}))
-
-    return times
+    changed = (replace(recording, **{field: factor * getattr(recording, field)}) for recording in campaign.recordings)
+    return replace(campaign, recordings=tuple(changed))

@@ -14,17 +14,17 @@ nor a vibrating part explain the phase as it is. Where a lag of the force channe
 stated and nothing is changed.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from itertools import product
 from math import comb, log
-from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.special import log_ndtr
+from scipy.optimize import nnls
 from scipy.stats import norm
 
+from underskin.diagnosis.slips.comparison import LEAST_LINES
+from underskin.diagnosis.slips.levels import times
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
@@ -32,13 +32,10 @@ from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.frf.spectra import Frf
 from underskin.units import Complexes, Floats, Indices, Mask
 
-_BANDS = 24  # of equal width in the logarithm of frequency
-_LEAST_LINES = 6
+_BANDS = 24  # of equal width in the logarithm of frequency: a fraction of the width of any element
 _MAINS_HZ, _NEAR_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # mains pick-up has its own phase
-_STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: near a zero the phase may step either way
-_UNSURE = 6.0  # times a line's noise
+_UNSURE = 6.0  # times a line's noise, which no step of noise exceeds
 _WIDEST = 0.3  # rad, noise of a line above which the phase cannot be unwrapped
-_SECOND = 0.6745 * np.sqrt(6.0)  # median magnitude of second differences over the noise of a line
 _ENOUGH = 12  # second differences in a band, or in it and its two neighbours on either side
 
 
@@ -70,15 +67,15 @@ def log_frf_bands(recordings: Sequence[FrfRecording]) -> LogFrfBands:
     rough: list[tuple[Indices, Floats]] = []
     for index, frf in enumerate(measured):
         frequency, lines = _usable(frf)
-        if len(lines) < _LEAST_LINES:
+        if len(lines) < LEAST_LINES:
             continue
         logarithm = _logarithm(lines)
-        second = np.abs(np.diff([logarithm.real, logarithm.imag], 2)) / _SECOND
-        noise = float(np.median(second))
+        second = np.abs(np.diff([logarithm.real, logarithm.imag], 2))
+        noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0))
         if not 0 < noise < _WIDEST:
             continue
         band = np.clip(np.searchsorted(edges, frequency) - 1, 0, _BANDS - 1)
-        rough += [(part, second / noise) for part in (band[:-2], band[1:-1], band[2:])]
+        rough += [(part, second / np.median(second)) for part in (band[:-2], band[1:-1], band[2:])]
         followed[index] = np.arange(_BANDS) < _lost(logarithm, band, noise)
         count = np.bincount(band, minlength=_BANDS)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -101,11 +98,9 @@ def _usable(measured: Frf) -> tuple[Floats, Complexes]:
 
 
 def _lost(logarithm: Complexes, band: Indices, noise: float) -> int:
-    """The first band where unwrapping is ambiguous: the phase steps near a zero of the response, or by half a turn
-    within the noise of a line."""
-    near_zero = np.minimum(logarithm.real[1:], logarithm.real[:-1]) < np.median(logarithm.real) + np.log(_FAINT)
-    step = np.abs(np.diff(logarithm.imag))
-    steps = np.flatnonzero((near_zero & (step > _STEP)) | (step > np.pi - _UNSURE * noise))
+    """The first band where unwrapping is ambiguous: the phase steps by half a turn within the noise of a line, as
+    at a zero of the response or a sharp resonance."""
+    steps = np.flatnonzero(np.abs(np.diff(logarithm.imag)) > np.pi - _UNSURE * noise)
     return int(band[steps[0]]) if len(steps) else _BANDS
 
 
@@ -131,96 +126,12 @@ def _logarithm(lines: Complexes) -> Complexes:
     return np.asarray(np.log(np.abs(lines)) + 1j * (phase - start))
 
 
-_CHANNEL_DEVIATION, _IDEALISED = (
-    1.5e-3,
-    0.08,
-)  # of ln H: difference between channels, and relative departure of a real FRF from the laws
-_TOLERANCE, _FARTHEST = 1e-3, 30.0  # of a fit, and the bound of its logarithms
-_COST = 5.0  # of χ², for each law
-
-
-@dataclass(frozen=True)
-class _Law:
-    """ln H(f; fit, spread), starting points of `fit`, and centre and deviation of the prior of each parameter.
-
-    `spread` holds the contacts' natural frequencies over the median one.
-    """
-
-    value: Callable[[Floats, Floats, Floats], Complexes]
-    starts: Callable[[Floats], tuple[tuple[float, ...], ...]]  # of the bands' frequencies
-    centre: tuple[float, ...]
-    deviation: tuple[float, ...]
-
-
-def _exp(logarithm: float) -> float:
-    return float(np.exp(np.clip(logarithm, -_FARTHEST, _FARTHEST)))
-
-
-def _high_pass(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
-    return -np.log(1 + _exp(fit[0]) / (1j * frequency))
-
-
-def _low_pass(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
-    return -np.log(1 + 1j * frequency / _exp(fit[0]))
-
-
-def _relaxation(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
-    step = np.abs(fit[1]) / (1 + 1j * frequency / _exp(fit[2]))
-    return -np.abs(fit[0]) * np.log(1j * frequency) + np.log(1 + step)
-
-
-def _delay(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
-    return -2e-6j * np.pi * frequency * np.abs(fit[0])
-
-
-def _lead(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
-    return -_delay(frequency, fit, _)
-
-
-def _resonance(frequency: Floats, fit: Floats, spread: Floats) -> Complexes:
-    ratio = frequency[:, None] / (_exp(fit[0]) * spread)
-    return -np.log(1 - ratio**2 + 2j * _exp(fit[1]) * ratio).mean(axis=1)
-
-
-def _loose_part(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
-    turn = 1j * frequency / _exp(fit[0])
-    return np.log(1 + (fit[2] * turn**2 + fit[3] * turn) / (turn**2 + 2 * _exp(fit[1]) * turn + 1))
-
-
-_DELAY = _Law(_delay, lambda f: ((1e4 / f[-1],),), (0.0,), (300.0,))
-_LEAD = replace(_DELAY, value=_lead)
-# As in the mechanisms' files: corner 0.5 Hz, upper corner 300 Hz, n 0.08, s 0.4 at 20 Hz, 300 µs, ζ 0.05.
-# The resonance of a tip depends on contact and mass: 1 kHz within a factor of 10.
-_LAWS: Mapping[str, _Law] = {
-    "amplifier_high_pass": _Law(
-        _high_pass, lambda f: ((np.log(f[0] / 20),), (np.log(f[0]),)), (-0.7,), (1.5,)
-    ),
-    "amplifier_low_pass": _Law(
-        _low_pass, lambda f: ((np.log(f[-1]),), (np.log(3 * f[-1]),)), (5.7,), (1.5,)
-    ),
-    "sensor_relaxation": _Law(
-        _relaxation,
-        lambda f: ((0.01, 1e-3, np.log(20.0)), (1e-4, 0.05, np.log(20.0)), (1e-4, 0.05, np.log(f[-1]))),
-        (0.0, 0.0, 3.0),
-        (0.08, 0.4, 1.5),
-    ),
-    "timing_delay": _DELAY,
-    "contact_resonance": _Law(
-        _resonance,
-        lambda f: tuple((np.log(times * f[-1]), -3.0) for times in (0.5, 1.3, 4.0)),
-        (np.log(1000.0), -3.0),
-        (2.3, 1.0),
-    ),
-}  # fmt: skip
-# A part that vibrates within the band, such as a cable or a loose screw, or a notch: 1 + (A r² + B r)/(r² + 2ζr + 1),
-# r = if/f1. It is unlisted, so that it may be of either sign.
-_UNLISTED = _Law(
-    _loose_part,
-    lambda f: tuple((np.log(f[0]) + share * np.log(f[-1] / f[0]), -1.0, size, 0.0)
-                    for share, size in product((0.4, 0.6, 0.8, 0.95), (-0.1, 0.1))),
-    (5.0, -1.0, 0.0, 0.0),
-    (1.5, 1.0, 0.3, 0.3),
-)  # fmt: skip
+_CHANNEL_DEVIATION = 1.5e-3  # of ln H: difference between channels
+_IDEALISED = 0.08  # relative departure of a real FRF from the elements
+_COST = 2.5  # of ½ χ², for each element
+_SHAPES = 8  # corners of each kind of element, and three times as many resonances
+_ZETAS = (0.02, 0.05, 0.14)  # of resonances, as in mechanisms/laws/contact_resonance.py
+_TILT = 1e-2  # of the row that adds the costs to the squares; small enough that they stay linear
 
 
 @dataclass(frozen=True)
@@ -239,78 +150,95 @@ class LogFrf:
         return LogFrf(self.frequency, self.value.conj(), self.deviation, self.spread)
 
 
-class Lead(NamedTuple):
-    """χ² of the best fit with a lag of the force channel, as `misfit`, and that lag [µs]."""
+@dataclass(frozen=True)
+class Elements:
+    """ln H of elements with weights that are not negative (bands, elements), and the cost in ½ χ² of weight 1."""
 
-    misfit: float
-    lag_us: float
-
-
-def misfit(log_frf: LogFrf) -> float:
-    """χ² of the best fit of at most two mechanisms, including the costs of their priors and number."""
-    single = {name: _nearest(log_frf, (law,))[0] for name, law in _LAWS.items()}
-    first = min(single, key=lambda name: single[name])
-    pairs = [_nearest(log_frf, (_LAWS[first], law))[0] for name, law in _LAWS.items() if name != first]
-    return min(_nearest(log_frf, ())[0], single[first], *pairs)
+    value: Complexes
+    cost: Floats
 
 
-def leading(log_frf: LogFrf) -> Lead:
-    """The best fit of a lag of the force channel, alone or with one mechanism."""
-    combinations = [(), *((law,) for law in _LAWS.values() if law is not _DELAY)]
-    chi2, fit = min((_nearest(log_frf, (_LEAD, *laws)) for laws in combinations), key=lambda nearest: nearest[0])
-    return Lead(chi2, abs(float(fit[0])))
+def _together(parts: Sequence[Elements]) -> Elements:
+    return Elements(np.hstack([part.value for part in parts]), np.concatenate([part.cost for part in parts]))
 
 
-def unlisted_misfit(log_frf: LogFrf) -> float:
-    """χ² of the best fit of a vibrating part or a notch, with the same costs."""
-    return _nearest(log_frf, (_UNLISTED,))[0]
+def _delay(frequency: Floats, sign: float) -> Elements:
+    """A delay of 300 µs of the charge, or with sign −1 of the force, as typical of `timing_delay`."""
+    return Elements(np.asarray(-6e-4j * sign * np.pi * frequency[:, None], dtype=np.complex128), np.ones(1))
 
 
-def _nearest(log_frf: LogFrf, laws: tuple[_Law, ...]) -> tuple[float, Floats]:
-    """χ² of the best fit including its costs, and the parameters of the laws."""
-    ends = np.cumsum([0, *(len(law.centre) for law in laws)])
-    centre = np.concatenate([[], *(law.centre for law in laws)])
-    deviation = np.concatenate([[], *(law.deviation for law in laws)])
+def _causal(log_frf: LogFrf) -> list[Elements]:
+    """The listed elements at typical strengths, with the priors of the mechanisms' files: high pass at 0.5 Hz, low pass
+    at 300 Hz, relaxations of exponent 0.08 and of a step 0.4 at 20 Hz, resonance of a tip at 1 kHz with ζ = 0.05."""
+    frequency = log_frf.frequency
+    turn = 1j * frequency[:, None]
+
+    def corners(usual: float, deviation: float, number: int) -> tuple[Floats, Floats]:
+        score = np.linspace(-2.5, 2.5, number)
+        return usual * np.exp(deviation * score), _COST + score**2 / 2
+
+    high, high_cost = corners(0.5, 1.5, _SHAPES)
+    low, low_cost = corners(300.0, 1.5, _SHAPES)
+    step, step_cost = corners(20.0, 1.5, _SHAPES)
+    natural, natural_cost = corners(1000.0, 2.3, 6 * _SHAPES)
+    ratio = frequency[:, None, None] / (natural[:, None] * log_frf.spread)
+    resonances = [-np.log(1 - ratio**2 + 2j * zeta * ratio).mean(axis=2) for zeta in _ZETAS]
+    return [
+        _delay(frequency, 1.0),
+        Elements(-np.log(1 + high / turn), high_cost),
+        Elements(-np.log(1 + turn / low), low_cost),
+        Elements(-0.08 * np.log(turn), np.array([_COST])),
+        Elements(np.log(1 + 0.4 / (1 + turn / step)), step_cost),
+        Elements(np.hstack(resonances), np.concatenate([natural_cost + log(zeta / 0.05) ** 2 / 2 for zeta in _ZETAS])),
+    ]
+
+
+def _unlisted_chi2(log_frf: LogFrf) -> float:
+    """χ² of the best part that vibrates within the band, such as a cable or a loose screw, or a notch:
+    (A r² + B r)/(r² + 2ζr + 1), r = if/f1, of either sign and typically 0.3."""
+    frequency = log_frf.frequency
+    chi2 = []
+    for natural, zeta in product(np.geomspace(frequency[0], frequency[-1], 3 * _SHAPES), (0.2, 0.4, 0.8)):
+        turn = 1j * frequency / natural
+        share = 0.3 / (turn**2 + 2 * zeta * turn + 1)
+        parts = np.column_stack([share * turn**2, -share * turn**2, share * turn, -share * turn])
+        chi2.append(_fit(log_frf, Elements(parts, np.ones(4)))[0])
+    return 2 * _COST + min(chi2)
+
+
+def _lead(log_frf: LogFrf, kinds: Sequence[Elements]) -> tuple[float, float]:
+    """χ² of the best lag of the force channel, alone or beside one kind of elements, and its size [µs]
+    in the simplest good fit."""
+    lead = _delay(log_frf.frequency, -1.0)
+    fits = [_fit(log_frf, _together([lead, *kind])) for kind in ((), *((kind,) for kind in kinds))]
+    best = min(fits, key=lambda fit: fit[0])
+    plain = fits[0] if fits[0][0] < best[0] + 2 * _PLAIN else best
+    return best[0], 300.0 * float(plain[1][0])
+
+
+def _fit(log_frf: LogFrf, elements: Elements) -> tuple[float, Floats]:
+    """The least χ² including the costs, and the weights: of ½ |(y − A w)/d|² + cost · w over w ≥ 0."""
     size = _IDEALISED * np.abs(log_frf.value)
     weight = [
         1 / np.hypot(np.hypot(part, _CHANNEL_DEVIATION), size)
         for part in (log_frf.deviation.real, log_frf.deviation.imag)
     ]
     level = weight[0] ** 2 / (weight[0] ** 2).sum()
-
-    def residual(fit: Floats) -> Floats:
-        difference = log_frf.value - sum(
-            law.value(log_frf.frequency, fit[first:last], log_frf.spread)
-            for law, first, last in zip(laws, ends, ends[1:], strict=False)
-        )
-        parts = [
-            (difference.real - level @ difference.real) * weight[0],
-            difference.imag * weight[1],
-            (fit - centre) / deviation,
-        ]
-        return np.concatenate(parts)
-
-    if not laws:
-        return float((residual(np.zeros(0)) ** 2).sum()), np.zeros(0)
-    starts = [np.concatenate(start) for start in product(*(law.starts(log_frf.frequency) for law in laws))]
-    fitted = (least_squares(residual, start, method="lm", ftol=_TOLERANCE, xtol=_TOLERANCE) for start in starts)
-    best = min(fitted, key=lambda solution: float(solution.cost))
-    return float(2 * best.cost) + _COST * len(laws), best.x
+    columns = np.column_stack([log_frf.value, elements.value])
+    real = (columns.real - level @ columns.real) * weight[0][:, None]
+    rows = np.vstack([real, columns.imag * weight[1][:, None]])
+    matrix, target = rows[:, 1:], rows[:, 0]
+    weights, _ = nnls(np.vstack([matrix, _TILT * elements.cost]), np.append(target, -1 / _TILT))
+    chi2 = float(((target - matrix @ weights) ** 2).sum() + 2 * elements.cost @ weights)
+    return chi2, weights
 
 
 _LEAST = 3  # recordings with a phase, so that some can contradict the others
 _LARGEST = 0.7  # rad: limit that reduces the weight of sharp resonances, whose frequency differs between recordings
 _RELAXATIONS, _COEFFICIENT = 4, 0.1  # terms of a smooth phase, and the prior standard deviation of each [rad]
-_PLAIN_SIGNS = 9.0  # of ln likelihood: about one campaign in a hundred has conjugated recordings
-_OVER_CHANNELS = 6.0  # of ln likelihood: phases of channels are ten times as frequent
-_CHANNEL = tuple(np.array([0.0, 0.5, 1, 2, 4, 8, 16]) * 1e-3)  # rad, a channel's own phase
-_USUAL_CHANNEL = 3e-3
-_VARIED = (0.0, 0.2, 0.5, 1.0)  # of the mean phase: variation between contacts
-_STRAY, _STRAY_SIZE = 0.05, 3.0  # share of recordings of any phase, and its size over the mean phase
-_PLAIN = 14.0  # χ² by which the listed mechanisms must explain one orientation better
-_RARER = 10.0  # χ² by which an unlisted part must explain it better, since it is rarer
-_STILL = 1.5e-3  # rad
-_QUANTILES = np.linspace(0.0625, 0.9375, 8)  # of the contacts' natural frequencies, ∝ (force · radius)^(1/6)
+_OVER_CHANNELS = 4.5  # of ln likelihood: phases of channels are ten times as frequent
+_VARIED = (0.0, 0.1, 0.2, 0.4, 0.7, 1.0, 1.4)  # of the mean phase: variation between recordings
+_PLAIN = 14.0  # of χ²: about one campaign in a hundred has conjugated recordings
 
 
 def in_common_convention(
@@ -348,7 +276,7 @@ def _conjugation_undone(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRec
         about = ids[0] if len(ids) == 1 else ""
         findings.append(Finding(Reason.RECORDINGS_CONJUGATED, about, "frf_im_pc_per_n", arguments))
     return [
-        _conjugated(recording) if wrong else recording for recording, wrong in zip(recordings, turned, strict=True)
+        times(recording, 1.0, -1.0) if wrong else recording for recording, wrong in zip(recordings, turned, strict=True)
     ], findings
 
 
@@ -362,15 +290,10 @@ def _aligned(bands: LogFrfBands) -> Floats:
     phase, weight = _phases(bands)
     smooth = _SmoothPhase(bands.frequency, weight)
     signs = _leading_signs(phase, weight) * same
-    for _ in range(10):
-        better = np.where(_projection(phase, weight, smooth.of(phase, signs)) < 0, -1.0, 1.0) * same
-        if (better == signs).all():
-            break
-        signs = better
     fewer = int(min((signs < 0).sum(), (signs > 0).sum()))
     choices = log(comb(int(telling.sum()), fewer)) + log(telling.sum())
     gain = smooth.evidence(phase, signs) - max(smooth.evidence(phase, same), 0.0)
-    if fewer == 0 or gain < choices + _PLAIN_SIGNS:
+    if fewer == 0 or gain < choices + _PLAIN / 2:
         return same
     return signs if _of_two_signs(phase, weight, signs) > _OVER_CHANNELS else same
 
@@ -386,55 +309,33 @@ class _SmoothPhase:
         self.weight = weight
         self.information = self.shapes.T @ (weight.sum(axis=0)[:, None] * self.shapes) + np.eye(self.shapes.shape[1])
 
-    def of(self, phase: Floats, signs: Floats) -> Floats:
-        """The phase (bands,) from phases (recordings, bands) and signs (recordings,)."""
-        return np.asarray(self.shapes @ np.linalg.solve(self.information, self._pull(phase, signs)))
-
     def evidence(self, phase: Floats, signs: Floats) -> float:
         """ln evidence, relative to no phase."""
-        pull = self._pull(phase, signs)
+        pull = self.shapes.T @ (signs @ (self.weight * phase))
         explained = float(pull @ np.linalg.solve(self.information, pull))
         return 0.5 * (explained - float(np.linalg.slogdet(self.information)[1]))
-
-    def _pull(self, phase: Floats, signs: Floats) -> Floats:
-        return np.asarray(self.shapes.T @ (signs @ (self.weight * phase)))
 
 
 def _of_two_signs(phase: Floats, weight: Floats, signs: Floats) -> float:
     """ln likelihood of phases ±1 times the mean, relative to one phase plus a channel's own in each recording; in both
-    a few recordings are stray."""
+    they vary between recordings."""
     mean_phase = _mean(phase, weight, signs)
     information = (weight * mean_phase**2).sum(axis=1)
     informative = (signs != 0) & (information > 0)
-    amplitude, variance = (
-        _projection(phase, weight, mean_phase)[informative] / information[informative],
-        1 / information[informative],
-    )
-    size = np.sqrt((weight * mean_phase**2).sum() / weight.sum())
-    share = min((signs[informative] < 0).mean(), (signs[informative] > 0).mean())
-    usual = 1.0 if (signs < 0).sum() < (signs > 0).sum() else -1.0
-    stray = np.log(_STRAY) + norm.logpdf(amplitude, 0.0, _STRAY_SIZE)
+    amplitude = _projection(phase, weight, mean_phase)[informative] / information[informative]
+    variance = 1 / information[informative]
+    share = float((signs[informative] < 0).mean())
     two_signs, one_sign = [], []
-    for channel, varied in product(_CHANNEL, _VARIED):
-        spread = np.sqrt(variance + (channel / size) ** 2)
-        same, opposite = (_log_density(sign * usual * amplitude, spread, varied) for sign in (1, -1))
+    for varied in _VARIED:
+        spread = np.sqrt(variance + varied**2)
+        parts = (
+            np.log(1 - share) + norm.logpdf(amplitude, 1.0, spread),
+            np.log(share) + norm.logpdf(amplitude, -1.0, spread),
+        )
+        two_signs.append(float(np.logaddexp(*parts).sum()))
         mean = float(np.average(amplitude, weights=spread**-2))
-        shifted = norm.logpdf(amplitude, mean, np.hypot(spread, varied)) if varied < 1 else same
-        either = np.logaddexp(np.log1p(-share) + same, np.log(share) + opposite)
-        prior = -0.5 * (channel / _USUAL_CHANNEL) ** 2
-        two_signs.append(prior + float(np.logaddexp(either + np.log1p(-_STRAY), stray).sum()))
-        one_sign.append(prior + float(np.logaddexp(shifted + np.log1p(-_STRAY), stray).sum()))
+        one_sign.append(float(norm.logpdf(amplitude, mean, spread).sum()))
     return max(two_signs) - max(one_sign)
-
-
-def _log_density(amplitude: Floats, spread: Floats, varied: float) -> Floats:
-    """Log density of amplitudes near 1 that vary by `varied` between contacts, or exponentially if that is 1, with
-    noise `spread`."""
-    if varied < 1:
-        return np.asarray(norm.logpdf(amplitude, 1.0, np.hypot(spread, varied)))
-    size = float(np.abs(amplitude).mean())
-    ratio = spread / size
-    return np.asarray(ratio**2 / 2 - amplitude / size - np.log(size) + log_ndtr(amplitude / spread - ratio))
 
 
 def _orientation(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: Floats) -> tuple[int, float | None]:
@@ -442,18 +343,21 @@ def _orientation(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: 
     conjugate, and neither an unlisted part nor a lag of the force channel explains the phase itself; 0 where both are
     possible. Second, that lag [µs] where it is the alternative."""
     log_frf = _mean_log_frf(recordings, bands, signs)
-    phase = log_frf.value.imag / np.hypot(log_frf.deviation.imag, _STILL)
+    phase = log_frf.value.imag / np.hypot(log_frf.deviation.imag, _CHANNEL_DEVIATION)
     if phase @ phase < len(phase) + _PLAIN:
         return 0, None
-    given, turned = misfit(log_frf), misfit(log_frf.conjugated)
+    kinds = _causal(log_frf)
+    given, turned = (_fit(either, _together(kinds))[0] for either in (log_frf, log_frf.conjugated))
+    if min(given, turned) > 4 * len(log_frf.frequency):  # twice the number of values: neither is explained
+        return 0, None
     if turned - given > _PLAIN:
         return 1, None
-    if given - turned <= _PLAIN or turned - unlisted_misfit(log_frf) >= _RARER:
+    if given - turned <= _PLAIN or turned - _unlisted_chi2(log_frf) > _PLAIN:
         return 0, None
-    lead = leading(log_frf)
-    if turned - lead.misfit > _PLAIN:
+    leading, lag_us = _lead(log_frf, kinds[1:])
+    if turned - leading > _PLAIN:
         return 1, None
-    return (-1, None) if lead.misfit - turned > _PLAIN else (0, lead.lag_us)
+    return (-1, None) if leading - turned > _PLAIN else (0, lag_us)
 
 
 def _mean_log_frf(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: Floats) -> LogFrf:
@@ -471,7 +375,7 @@ def _mean_log_frf(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs:
     real, imaginary = (np.maximum(noise, part) for part in parts)
     used = total > 0
     natural = np.array([(recording.preload_n * recording.indenter_radius_mm) ** (1 / 6) for recording in recordings])
-    spread = np.quantile(natural / np.median(natural), _QUANTILES)
+    spread = np.quantile(natural / np.median(natural), np.linspace(0.0625, 0.9375, 8))
     return LogFrf(bands.frequency[used], mean[used], (real + 1j * imaginary)[used], spread)
 
 
@@ -494,8 +398,3 @@ def _mean(phase: Floats, weight: Floats, signs: Floats) -> Floats:
 
 def _projection(phase: Floats, weight: Floats, mean_phase: Floats) -> Floats:
     return np.asarray((weight * phase * mean_phase).sum(axis=1))
-
-
-def _conjugated(recording: FrfRecording) -> FrfRecording:
-    assert recording.frf_im_pc_per_n is not None
-    return replace(recording, frf_im_pc_per_n=-recording.frf_im_pc_per_n)

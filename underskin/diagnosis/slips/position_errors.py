@@ -7,23 +7,20 @@ in the origin this cannot be detected, and has little effect.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from underskin.diagnosis.slips.unit_errors import MOST_SHARE
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 _UNIT_FACTORS = (
     # factor, least distance from the sensor [mm], unit of the positions, or of the sensors
     (1e3, 1.0, "m", "µm"),
     (1e-3, 200.0, "µm", "m"),
 )
-_NEARER = 5.0
+_NEARER = 5.0  # times: a contact is seldom farther from its sensor than the sensors are apart
 _AT_SENSORS_MM = (1e-4, 0.01)  # implausible distances from a sensor: no stage is that precise
-_MOST_SHARE = 0.25  # of the recordings at most; more are no error of single ones
-
-Mask = NDArray[np.bool_]
 
 
 def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[Mask, list[Finding], list[Finding]]:
@@ -38,7 +35,7 @@ def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[M
         given, meant = (np.hypot(*(scale * contact_mm - sensor_mm).T) for scale in (1.0, factor))
         off = (given > least) & (_NEARER * meant < given)
         slip = {"too_small": factor > 1, "given_in": unit}
-        if off.sum() > _MOST_SHARE * len(recordings):
+        if off.sum() > MOST_SHARE * len(recordings):
             shared.append(Finding(Reason.PLACES, "", "position_mm", {**slip, "sensors_in": sensors_unit}))
             continue
         single += [

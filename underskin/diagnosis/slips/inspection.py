@@ -12,23 +12,26 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Inspected, agree, recording_axes
-from underskin.diagnosis.screening.amplitude_factors import Step, amplitude_step, without_step
-from underskin.diagnosis.screening.declared_values import unlikely
-from underskin.diagnosis.screening.exchanged_cables import exchanged_cables, with_right_sensors
-from underskin.diagnosis.screening.exchanged_sensors import without_exchanges
-from underskin.diagnosis.screening.levels import causes_of, levels
-from underskin.diagnosis.screening.model_consistency import against_model
-from underskin.diagnosis.screening.phase_convention import in_common_convention
-from underskin.diagnosis.screening.position_errors import at_sensors, misplaced
-from underskin.diagnosis.screening.sensor_alone import OutlyingSensor, outlying_sensor, without_sensor_gain
-from underskin.diagnosis.screening.silent_together import without_silent_pair
-from underskin.diagnosis.screening.time_series import as_given, as_lines
-from underskin.diagnosis.screening.unit_errors import faint_oscillation, single_unit_errors
-from underskin.diagnosis.screening.warm_up import WarmUp, warming, without_first
-from underskin.diagnosis.screening.weak_sensors import weak_sensors
+from underskin.diagnosis.slips.comparison import compared
+from underskin.diagnosis.slips.declared_values import unlikely
+from underskin.diagnosis.slips.exchanged_sensors import without_exchanges
+from underskin.diagnosis.slips.level_slips import without_level_slips
+from underskin.diagnosis.slips.phase_convention import in_common_convention
+from underskin.diagnosis.slips.position_errors import at_sensors, misplaced
+from underskin.diagnosis.slips.reversed_signs import without_reversed
+from underskin.diagnosis.slips.silent import dead, without_silent_pair
+from underskin.diagnosis.slips.table_domain import within_tables
+from underskin.diagnosis.slips.time_series import as_given, as_lines
+from underskin.diagnosis.slips.unit_errors import (
+    faint_oscillation,
+    levels_off_by_1000,
+    single_unit_errors,
+    unlikely_d33,
+)
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
+from underskin.mechanisms.models.composed import compose
 from underskin.prediction.exchanged_values import exchanged_values
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
@@ -36,56 +39,7 @@ from underskin.recordings.plausibility import loose_sphere, overlapping_sensors
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes
 
-_LEAST = 4  # recordings
-_MOST = 300  # recordings: the covariance of more takes minutes
-_MOST_SLIPS = 3
-
-
-def without_level_slips(
-    campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable
-) -> tuple[list[FrfRecording], list[Finding]]:
-    """The recordings corrected for errors in their levels, or without them, and the findings."""
-    remaining, findings = list(recordings), list[Finding]()
-    if len(remaining) >= _LEAST:
-        weak, findings = weak_sensors(remaining, levels(campaign, remaining, table))
-        remaining = [recording for recording, off in zip(remaining, weak, strict=True) if not off]
-    for _ in range(_MOST_SLIPS):
-        correction = _plainest_slip(campaign, remaining, table)
-        if correction is None:
-            break
-        remaining, finding = correction
-        findings.append(finding)
-    return remaining, findings
-
-
-def _plainest_slip(
-    campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable
-) -> tuple[list[FrfRecording], Finding] | None:
-    """The recordings corrected for the error of largest gain, and the finding; None where there is none."""
-    if len(recordings) < _LEAST:
-        return None
-    recorded_levels = levels(campaign, recordings, table)
-    if not _LEAST <= len(recorded_levels.value) <= _MOST:
-        return None
-    slips = (
-        amplitude_step(recorded_levels),
-        warming(recorded_levels, causes_of(campaign, recordings, recorded_levels, table)),
-        exchanged_cables(recorded_levels),
-        outlying_sensor(recorded_levels),
-    )
-    plain = [slip for slip in slips if slip is not None]
-    best = max(plain, key=lambda slip: slip.gain, default=None)
-    if isinstance(best, Step):
-        return without_step(recordings, recorded_levels, best)
-    if isinstance(best, WarmUp):
-        return without_first(recordings, best)
-    if isinstance(best, OutlyingSensor):
-        return without_sensor_gain(recordings, recorded_levels, best)
-    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    return None if best is None else with_right_sensors(recordings, recorded_levels, best, positions)
-
-
-LEAST_RECORDINGS = 2
+LEAST_RECORDINGS = 2  # to compare one with another
 _SAME = 1e-4  # relative difference of copies: files round numbers to some digits
 _AXES = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
 
@@ -132,13 +86,38 @@ def _inspect_lines(
     recordings, of_phase = in_common_convention(recordings, imported)
     recordings, of_sensors = without_exchanges(campaign, recordings, table)
     recordings, silent = without_silent_pair(recordings)
-    consistent = against_model(campaign, recordings, table, keep_ids)
+    consistent = _against_model(campaign, recordings, table, keep_ids)
     findings += [*of_phase, *of_sensors, *silent, *consistent.findings]
+    recordings = list(frf_recordings(consistent.campaign)) if consistent.campaign.recordings else []
     if consistent.lacking is not None:
-        return _inspected(campaign, consistent.recordings, findings, consistent.lacking)
-    recordings, of_levels = without_level_slips(campaign, consistent.recordings, table)
+        return _inspected(campaign, recordings, findings, consistent.lacking)
+    recordings, of_levels = without_level_slips(campaign, recordings, table)
     inspected = _inspected(campaign, recordings, [*findings, *of_levels])
     return replace(inspected, beyond=consistent.beyond & {recording.id for recording in recordings})
+
+
+def _against_model(
+    campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable, keep_ids: Collection[str] | None
+) -> Inspected:
+    """The recordings compared with the base model: those within the tables that respond, with their true signs."""
+    model = compose((), replace(campaign, recordings=tuple(recordings)), table, "frf")
+    inside, beyond, findings = within_tables(campaign, recordings, model, table, keep_ids)
+    comparison = compared(recordings, model, inside | beyond)
+    if comparison.unresponsive.all():
+        silent = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(recordings)})
+        return Inspected(replace(campaign, recordings=()), [silent], Lacking(Lack.NO_RESPONSE))
+    lost, dead_findings = dead(recordings, comparison)
+    ratio = np.where(lost, np.nan, comparison.ratio)
+    off, off_findings, lacking = levels_off_by_1000(recordings, ratio)
+    findings += [*dead_findings, *off_findings]
+    if lacking is not None:
+        return Inspected(replace(campaign, recordings=()), findings, lacking)
+    right, known, sign_findings = without_reversed(recordings, np.where(off, np.nan, ratio))
+    findings += [*unlikely_d33(ratio, campaign.skin.d33_pc_per_n), *sign_findings]
+    usable = (inside | beyond) & ~lost & ~off & known
+    kept = tuple(recording for recording, chosen in zip(right, usable, strict=True) if chosen)
+    far = frozenset(recording.id for recording, chosen in zip(right, usable & beyond, strict=True) if chosen)
+    return Inspected(replace(campaign, recordings=kept), findings, beyond=far)
 
 
 def _inspected(

@@ -1,0 +1,90 @@
+"""Each recording beside what the base model and the other recordings let expect of it.
+
+The common delay of the chain is removed first. A recording's ratio is the median of its lines in the flat zone over the
+base model's response; recordings for which little is predicted, near a zero crossing, have none. The level expected of
+a recording is the base model's response times the median ratio.
+
+The noise of a line is estimated from differences of neighbouring lines, σ² = median |z_j+1 − z_j|²/(2 ln 2), which a
+resonance between a few lines does not affect. A recording shows no response where its mean over n lines is within
+noise, n |mean|²/σ² < 9 (which noise alone exceeds once in 8000 recordings), and so are its lines, mean |z|² < 3 σ².
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from underskin.mechanisms.models.composed import Model
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf.estimation import advanced, common_delay, lines_of
+from underskin.recordings.frf.spectra import stacked
+from underskin.units import Complexes, Floats, Mask
+
+LEAST_LINES = 4  # for a median of their differences
+_MEAN, _LINES = 9.0, 3.0  # over their variance
+_FLAT_HZ = 130.0  # below it the response is about flat
+LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a zero crossing, a level or sign is not informative
+
+
+def aligned_lines(recordings: Sequence[FrfRecording]) -> list[Complexes]:
+    """The values [C/N] of each recording's lines without the delay common to all."""
+    measured = [lines_of(recording) for recording in recordings]
+    delay = common_delay(stacked(measured))
+    return [advanced(frf.values, frf.frequency, delay) if delay else frf.values for frf in measured]
+
+
+def flat_level(recording: FrfRecording) -> float:
+    """|FRF| in the flat zone [C/N]."""
+    measured = lines_of(recording)
+    return float(np.nanmedian(np.abs(measured.values[_flat(measured.frequency)])))
+
+
+def _flat(frequency: Floats) -> Mask:
+    """The lines in the flat zone; all where none is."""
+    flat: Mask = frequency <= _FLAT_HZ
+    return flat if flat.any() else np.ones_like(flat)
+
+
+def no_response(aligned: Sequence[Complexes]) -> tuple[Mask, Floats]:
+    """Which recordings show no response, and the variance of each mean [(C/N)²], 0 where there are too few lines.
+
+    `aligned` holds the lines of each recording (lines,) [C/N] without the common delay.
+    """
+    unresponsive, variance = np.zeros(len(aligned), dtype=bool), np.zeros(len(aligned))
+    for index, values in enumerate(aligned):
+        lines = values[np.isfinite(values)]
+        if len(lines) < LEAST_LINES:
+            continue
+        noise = float(np.median(np.abs(np.diff(lines)) ** 2)) / (2 * np.log(2.0))
+        variance[index] = noise / len(lines)
+        small_mean = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[index]
+        unresponsive[index] = small_mean and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
+    return unresponsive, variance
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Columns over the recordings: level |mean| [C/N], its variance by noise [(C/N)²], whether it shows no response,
+    the ratio to the base model, NaN where it is not informative, and the expected level [C/N], 0 where unknown."""
+
+    level: Floats
+    variance: Floats
+    unresponsive: Mask
+    ratio: Floats
+    expected: Floats
+
+
+def compared(recordings: Sequence[FrfRecording], model: Model, inside: Mask) -> Comparison:
+    """The recordings compared with the base model where their contacts are `inside` the tables."""
+    aligned = aligned_lines(recordings)
+    unresponsive, variance = no_response(aligned)
+    predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
+    shape = predicted[np.searchsorted(model.recording, np.arange(len(aligned)))].real
+    usable = inside & ~unresponsive
+    telling = usable & (np.abs(shape) > LEAST_RESPONSE * np.abs(shape[usable]).max(initial=0.0))
+    flat = [_flat(lines_of(recording).frequency) for recording in recordings]
+    median = np.array([float(np.nanmedian(values.real[low])) for values, low in zip(aligned, flat, strict=True)])
+    ratio = np.where(telling, median / np.where(shape == 0, 1.0, shape), np.nan)
+    usual = float(np.nanmedian(np.abs(ratio))) if telling.any() else 0.0
+    level = np.array([float(np.abs(np.nanmean(values))) for values in aligned])
+    return Comparison(level, variance, unresponsive & inside, ratio, np.where(inside, np.abs(shape) * usual, 0.0))
