@@ -26,7 +26,7 @@ from pathlib import Path
 import underskin
 root = Path(underskin.__file__).parent
 for path in root.rglob("*.py"):  # all first, so that what runs at an import is not taken for the path
-    if path.stem != "__main__":
+    if path.stem not in ("__main__", "__init__"):  # packages are imported by their modules
         importlib.import_module(".".join(("underskin", *path.relative_to(root).with_suffix("").parts)))
 from underskin.cli.app import main
 passed = set()
