@@ -294,7 +294,6 @@ def groups(
 _SCATTER_CERTAINTY = (
     0.999  # probability of position scatter, or of none, beyond which children are fitted as the parent
 )
-_NEGLIGIBLE_NATS = 8.0  # behind the better fit of a set, beyond which a fit is negligible
 _LEAST_GAIN = 1.0  # in log posterior density over the parent
 _PRUNE_NATS = 30.0  # of log posterior density behind the best: the evidence is more than 10 nats behind
 _LEAST_SCATTER = 3e-3  # relative effect of position scatter on a recording, below which it is not fitted

@@ -24,7 +24,6 @@ _TOLERANCE, _OF_STARTS = 1e-4, 1e-3  # of the sum of squares, and the same for s
 _EVALUATIONS = 40  # at most
 _STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far wider than a snap-in is deep
 _PASSED = 4  # most samples, either way, that a contact point is moved past
-_RETURN = 0.5  # of the range of displacement: a way back that may end a contact
 _OFF_SAMPLE = 1e-6  # of the gap between two samples: a contact point at a sample is past it
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
 _SAME = 1e-9  # of the range of displacement: smaller differences are rounding
