@@ -444,13 +444,14 @@ class IndentationModel(CurveModel):
             :, None
         ]  # m/N
         self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
-        contacts = [_visible_contact(recording) for recording in recordings]
+        contacts = [_visible_contact(recording) if sticks else None for recording in recordings]
         self._seen = np.array([contact is not None for contact in contacts])[:, None]
-        none = [np.zeros(len(recording.displacement_mm)) for recording in recordings]
-        columns = [
-            column if contact is None else column + contact for column, contact in zip(none, contacts, strict=True)
-        ]
-        self._seen_contact = self._arranged(columns) > 0
+        self._seen_contact = 0 < self._arranged(
+            [
+                np.zeros(len(recording.displacement_mm)) if contact is None else contact.astype(float)
+                for recording, contact in zip(recordings, contacts, strict=True)
+            ]
+        )
         self.hidden_jumps = sticks and not bool(self._seen.all())
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
         deepest = self.displacement.max(axis=1) - 1e-3 * middles
