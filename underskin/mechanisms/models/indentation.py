@@ -446,11 +446,14 @@ class IndentationModel(CurveModel):
         self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
         contacts = [_visible_contact(recording) if sticks else None for recording in recordings]
         self._seen = np.array([contact is not None for contact in contacts])[:, None]
-        self._seen_contact = 0 < self._arranged(
-            [
-                np.zeros(len(recording.displacement_mm)) if contact is None else contact.astype(float)
-                for recording, contact in zip(recordings, contacts, strict=True)
-            ]
+        self._seen_contact = (
+            self._arranged(
+                [
+                    np.zeros(len(recording.displacement_mm)) if contact is None else contact.astype(float)
+                    for recording, contact in zip(recordings, contacts, strict=True)
+                ]
+            )
+            > 0
         )
         self.hidden_jumps = sticks and not bool(self._seen.all())
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
