@@ -226,8 +226,8 @@ _DEEPEST_OF_RADIUS = 2.0  # a/R is 0.96 there: a sphere pressed deeper is held a
 _DEEPEST_OF_THICKNESS = 0.5  # largest depth of the linear layer: strains are of order 1 beyond
 _NOT_ALL = 3.0  # residual over a sample's noise, beyond which the law is incomplete
 _PLAINLY = 0.7  # ratio of residuals below which the half space is chosen instead of the layer
-_MISSES = 0.01  # least rms residual of a wrong law, of the range of force
-_BEYOND_NOISE = 4.0  # the same over a sample's noise
+_MISSES = 0.01  # least rms residual of a wrong law beyond the noise, of the range of force
+_SURE = 10.0  # nats that another of the 24 powers gains, of which ln 24 would be chance
 _POWERS = np.arange(0.7, 3.05, 0.1)  # powers of the depth that are compared with the law
 _TAKES = 0.4  # largest residual of another power, of the law's, where the law is wrong
 _AS_NOISE, _AS_IDEAL = 1.5, 1e-3  # largest residual of a sufficient power: times the noise, and of the force
@@ -406,12 +406,16 @@ def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip
     """The tip where another power n of the depth, (f(d − d0))^(n/1.5), which includes the stiffening of a declared
     layer, fits far better and is outside the range of spheres; else None."""
     span, noise = float(np.ptp(load)), roughness(load)
-    if fit.rms < max(_MISSES * span, _BEYOND_NOISE * noise):
+    missed = _beyond(fit.rms, noise)
+    if missed < _MISSES * span:
         return None
     at = np.unique(np.linspace(0, len(load) - 1, min(len(load), _THINNED)).round().astype(np.intp))
     fits = {float(power): _fitted(depth[at], load[at], _to_power(fit.law, float(power))) for power in _POWERS}
     power = min(fits, key=lambda power: fits[power].rms)
-    if fits[power].rms > _TAKES * fit.rms or _SPHERES[0] <= power <= _SPHERES[1]:
+    best = fits[power].rms
+    scale = max(noise, best, _AS_IDEAL * span)
+    gained = len(at) * (fit.rms**2 - best**2) / (2 * scale**2)  # nats of normal noise
+    if _beyond(best, noise) > _TAKES * missed or gained < _SURE or _SPHERES[0] <= power <= _SPHERES[1]:
         return None
     like = "as under a cone (2)"
     if power < _SPHERES[0]:
@@ -423,8 +427,13 @@ def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip
         f"{fit.rms / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a block "
         "of known modulus"
     )
-    is_plain = fits[power].rms < max(_AS_NOISE * noise, _AS_IDEAL * span)
+    is_plain = best < max(_AS_NOISE * noise, _AS_IDEAL * span)
     return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed), is_plain)
+
+
+def _beyond(rms: float, noise: float) -> float:
+    """The part of a residual that is not noise."""
+    return float(np.sqrt(max(rms**2 - noise**2, 0.0)))
 
 
 def _sphere_fit(
