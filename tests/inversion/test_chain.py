@@ -130,6 +130,17 @@ def test_band_behind_filter_told_beside_d33(chain: Any, named: str, table: Sigma
     assert low < D33 < high or any(named in sentence for sentence in told), (value, told)
 
 
+@pytest.mark.parametrize("corner_hz", [60.0, 80.0, 120.0])
+def test_two_poles_hide_no_sign(corner_hz: float, table: SigmaTable) -> None:
+    """Behind a high-pass of two poles the filter is named, and no reversed sign.
+
+    The phase goes from a half turn to nothing over the band, so that it says nothing of the sign.
+    """
+    inversion = invert(shaken(charge=lambda f: 1 / (1 - (corner_hz / f) ** 2 - 1j * np.sqrt(2) * corner_hz / f)), table)
+    assert FindingCode.BEHIND_FILTER in codes(inversion)
+    assert not any("sign" in finding.sentence for finding in inversion.findings)
+
+
 def test_a_quiet_chain_has_no_findings(table: SigmaTable) -> None:
     inversion = invert(shaken(), table)
     value, low, high = array_d33(inversion)

@@ -70,16 +70,27 @@ def test_a_sphere_pressed_deep_is_no_paraboloid(over_radius: float) -> None:
     assert f"pressed {over_radius:.2g} of the radius" in result(read).statement
 
 
+@pytest.mark.parametrize("noise", [1e-3, 1e-2, 2e-2])
 @pytest.mark.parametrize("skin", [{}, {"thickness_mm": 30.0, "youngs_modulus_mpa": 1.0}])
 @pytest.mark.parametrize(("power", "radius_mm", "like"), [(1.0, 1.0, "flat punch"), (2.0, 5.0, "cone")])
-def test_tip_no_sphere_gives_no_modulus(power: float, radius_mm: float, like: str, skin: dict[str, float]) -> None:
-    """A tip that is no sphere gives no modulus.
+def test_tip_no_sphere_gives_no_modulus(
+    power: float, radius_mm: float, like: str, skin: dict[str, float], noise: float
+) -> None:
+    """A tip that is no sphere gives no modulus, whatever the noise of the force.
 
     The force follows another power of the depth than a sphere's.
     """
     depth = ways(-0.1, 0.3, -0.1, samples=400)
-    force = pressed(depth, lambda at: at**power)
+    force = pressed(depth, lambda at: at**power, noise=noise)
     assert like in refusal(campaign(depth, force, indenter_radius_mm=radius_mm, skin=skin))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_makes_no_other_tip(seed: int) -> None:
+    """A sphere stays one under noise of 5 % of the force."""
+    depth = ways(-0.1, 0.3, samples=200)
+    read = campaign(depth, pressed(depth, seed=seed, noise=0.05))
+    assert result(read).modulus == pytest.approx(1e6, rel=0.1)
 
 
 def test_beyond_a_law_no_modulus_is_quoted() -> None:

@@ -57,7 +57,9 @@ def force_of(reading: Reading) -> Any:
     [
         ("lbs", "N"), ("mN", "N"), ("kgf", "N"), ("Millinewton", "N"), ("MN", "mN"), ("дин. Н", "mN"), ("牛", "mN"),
         ("Pikonewton", "N"),
-        ("dB re 1 N", "N"), ("dB", "N"), ("livres", "N"), ("Pfund", "N"), ("mV rms", "N"), ("kn", "mN"),
+        ("dB re 1 N", "N"), ("dB", "N"), ("livres", "N"),
+        ("Dezibel", "N"), ("décibels", "N"), ("дБ", "N"), ("log", "N"),
+        ("Pfund", "N"), ("mV rms", "N"), ("kn", "mN"),
     ],
 )  # fmt: skip
 def test_label_contradicts_rig_refused(label: str, stated: str) -> None:

@@ -60,7 +60,7 @@ class Session:
             raise ServiceError(response.status_code, _problem(response))
         return document, response.headers
 
-    def pages(self, kind: type[Item], noun: str, **filters: str | None) -> Iterator[Item]:
+    def pages(self, kind: type[Item], noun: str, /, **filters: str | None) -> Iterator[Item]:
         """The items of a list, page after page."""
         cursor: str | None = None
         while True:

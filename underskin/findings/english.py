@@ -47,6 +47,8 @@ _WORDS: Mapping[str, Callable[[Any, str], str]] = {
     "listed": sentences.listed,
     "sensors": lambda ids, _: sentences.listed_sensors(ids),
     "more": sentences.more_alike,
+    "defect": lambda kind, _: sentences.DefectKind(kind).words,
+    "implausible": lambda kind, _: sentences.ImplausibleD33(kind).words,
 }
 
 
@@ -87,7 +89,7 @@ _NEEDED = (
 )
 _THOUSANDFOLD = "{too_small:a thousandfold|divided by 1000}"
 _ALL_AS_IN, _LEFT_OUT = "{example:in all recordings, as in {example}: |}", "{left_out: Left out|}"  # of time series
-DEFECT = "{channel}: {samples} samples from sample {first_sample} {kind}"
+DEFECT = "{channel}: {samples} samples from sample {first_sample} {kind:defect}"
 
 LACKING: Mapping[Lack, Words] = {
     Lack.CURVES_CONTRADICT: "force, displacement and modulus cannot all be right as declared (see findings); if they "
@@ -253,9 +255,9 @@ ENGLISH: Mapping[Reason, Words] = {
     "and places right?",
     Reason.TIME_TO_COME: "recorded_at is {written}, which is still to come: is the year a slip?{more:more recording}",
     Reason.TIME_TOO_OLD: "recorded_at is {written}, before {year}: was the clock not set?{more:more recording}",
-    Reason.D33_FITTED: "d33 comes out as {d33_pc_per_n:.4g} pC/N, {kind}",
-    Reason.D33_OF_ARRAY: "d33 of the array is {d33_pc_per_n:.3g} pC/N, {kind}",
-    Reason.D33_OF_ROW: f"d33 is {{d33_pc_per_n:.3g}} pC/N, {{kind}}{_MORE_ROWS}",
+    Reason.D33_FITTED: "d33 comes out as {d33_pc_per_n:.4g} pC/N, {kind:implausible}",
+    Reason.D33_OF_ARRAY: "d33 of the array is {d33_pc_per_n:.3g} pC/N, {kind:implausible}",
+    Reason.D33_OF_ROW: f"d33 is {{d33_pc_per_n:.3g}} pC/N, {{kind:implausible}}{_MORE_ROWS}",
     Reason.DEFECT: DEFECT,
     Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",
     Reason.LINES_LEFT_OUT: sentences.lines_left_out,

@@ -40,18 +40,37 @@ class UnitGuess:
 class ImplausibleD33(StrEnum):
     """Why a d33 is implausible."""
 
-    TOO_LARGE = "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?"
-    TOO_SMALL = "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?"
-    NEGATIVE = "negative: is the sign of charge or force turned?"
-    NOT_PVDF = "which PVDF cannot have: it and its copolymers have 10 to 40"
+    TOO_LARGE = "too_large"
+    TOO_SMALL = "too_small"
+    NEGATIVE = "negative"
+    NOT_PVDF = "not_pvdf"
+
+    @property
+    def words(self) -> str:
+        """Why, and what may be wrong."""
+        return {
+            self.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
+            self.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
+            self.NEGATIVE: "negative: is the sign of charge or force turned?",
+            self.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
+        }[self]
 
 
 class DefectKind(StrEnum):
     """What a run of damaged samples does."""
 
-    OVERLOAD = "stay at the end of the range: overload"
-    HELD_SAMPLES = "repeat one value: samples were dropped and the last one held"
-    JUMP = "break the signal's course: samples were dropped, or a spike"
+    OVERLOAD = "overload"
+    HELD_SAMPLES = "held_samples"
+    JUMP = "jump"
+
+    @property
+    def words(self) -> str:
+        """What the samples do."""
+        return {
+            DefectKind.OVERLOAD: "stay at the end of the range: overload",
+            DefectKind.HELD_SAMPLES: "repeat one value: samples were dropped and the last one held",
+            DefectKind.JUMP: "break the signal's course: samples were dropped, or a spike",
+        }[self]
 
 
 _MOST_SENSORS = 3  # named one by one

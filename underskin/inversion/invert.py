@@ -25,6 +25,7 @@ from underskin.findings import english
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
+from underskin.findings.sentences import ImplausibleD33
 from underskin.inversion import mixed_model
 from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
 from underskin.physics.charge_response import gain
@@ -446,6 +447,8 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     inversion = _estimated(ids, rows, contact, zone).wider(common_uncertainty)
     filtered = of_roll_off(roll_off(frfs, zone, level), zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33)
+    if filtered:  # whose phase hides the sign
+        others = tuple(finding for finding in others if finding.arguments.get("kind") != ImplausibleD33.NEGATIVE)
     findings = (*at_reading(campaign), *exchange_findings, *filtered, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 

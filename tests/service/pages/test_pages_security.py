@@ -106,6 +106,7 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
         page.wait_for_url("**/skins/example")
         page.get_by_text("Name, notes and tags").click()
         page.get_by_label("Notes").fill("a scratch")
+        page.wait_for_load_state("networkidle")  # what the page asks for without a cookie would fail
         page.context.clear_cookies()
         page.get_by_role("button", name="Save").click()
         page.wait_for_url("**/login?next=/skins/example&unsent=1")

@@ -384,6 +384,7 @@ _FEWEST_BINS = 6
 _CORNERS = 60  # corner frequencies tried for each filter
 _BELOW, _ABOVE = 30.0, 10.0  # range of corner frequencies, as factors on the ends of the band
 _LOW_PASSES = ((1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (1, 4))  # k and m: Butterworth's of order k, m times in a row
+_HIGH_PASSES = ((1, 1), (2, 1), (1, 2))
 _FIRST_ORDER = (1, 1)
 _SLOPES = np.linspace(0.0, STEEPEST, 6)
 _LEAST_NOISE = 0.003  # of a bin's magnitude
@@ -422,11 +423,11 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
         return None
     highs = [0.0, *np.geomspace(frequency[0] / _BELOW, frequency[end - 1] * _ABOVE, _CORNERS).tolist()]
     lows = [np.inf, *np.geomspace(frequency[0] / _ABOVE, frequency[end - 1] * _BELOW, _CORNERS).tolist()]
-    single = [(high, np.inf, _FIRST_ORDER) for high in highs] + [
-        (0.0, low, order) for low in lows for order in _LOW_PASSES
+    single = [(high, np.inf, kind, _FIRST_ORDER) for high in highs for kind in _HIGH_PASSES] + [
+        (0.0, low, _FIRST_ORDER, kind) for low in lows for kind in _LOW_PASSES
     ]
     best = min(single, key=lambda corners: _fitted(x, y, weight, *corners)[0])
-    in_order = [(high, low, _FIRST_ORDER) for high, low in product(highs[1::2], lows[1::2]) if high < low]
+    in_order = [(high, low, _FIRST_ORDER, _FIRST_ORDER) for high, low in product(highs[1::2], lows[1::2]) if high < low]
     both = min(in_order, key=lambda corners: _fitted(x, y, weight, *corners)[0])
     if _fitted(x, y, weight, *best)[0] - _fitted(x, y, weight, *both)[0] > _SPEAKS:
         best = both
@@ -442,13 +443,22 @@ def _falls_after(magnitude: Floats, index: int) -> bool:
 
 
 def _fitted(
-    x: Floats, y: Floats, weight: Floats, high: float, low: float, kind: tuple[int, int] = _FIRST_ORDER
+    x: Floats,
+    y: Floats,
+    weight: Floats,
+    high: float,
+    low: float,
+    high_pass: tuple[int, int] = _FIRST_ORDER,
+    low_pass: tuple[int, int] = _FIRST_ORDER,
 ) -> tuple[float, float]:
-    """χ² of the best plateau and slope with these corners and this kind of low-pass (k, m), and the logarithm of the
+    """χ² of the best plateau and slope with these corners and these kinds of filters (k, m), and the logarithm of the
     plateau at the middle of the band, where the slope has no effect."""
     frequency = np.exp(x)
-    order, times = kind
-    filters = -0.5 * (np.log1p((high / frequency) ** 2) + times * np.log1p((frequency / low) ** (2 * order)))
+    (high_order, high_times), (low_order, low_times) = high_pass, low_pass
+    filters = -0.5 * (
+        high_times * np.log1p((high / frequency) ** (2 * high_order))
+        + low_times * np.log1p((frequency / low) ** (2 * low_order))
+    )
     laws = filters - np.outer(_SLOPES, x - x.mean())
     plateaus = (weight * (y - laws)).sum(axis=1) / weight.sum()
     misfits = (weight * (y - laws - plateaus[:, None]) ** 2).sum(axis=1)

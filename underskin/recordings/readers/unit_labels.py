@@ -160,10 +160,12 @@ _USUAL_PREFIXES = {
     "s": "mun",
 }  # usual prefixes
 _DIAMETER, _RADIUS = "indenter_diameter", "indenter_radius"
+_DECIBEL_WORD = r"d[eé][cz]ib[eè]l\w*|дБ|децибел\w*|分贝|デシベル"  # in the languages of instruments
 _DECIBEL = re.compile(
-    r"(dB|db|DB) ?((?i:V|mV|uV|µV|m|u|N|C|g|A|FS|SPL|rms|mag)|[\s(/,].*)?|(?i:decibels?)|20 ?\*? ?log.*"
+    r"(dB|db|DB) ?((?i:V|mV|uV|µV|m|u|N|C|g|A|FS|SPL|rms|mag)|[\s(/,].*)?|20 ?\*? ?log.*|"
+    rf"(?i:{_DECIBEL_WORD}|pegel|log(?:arithmi[ck]\w*)?(?: ?mag(?:nitude)?)?)"
 )
-_SAYS_DECIBEL = re.compile(r"(?<![A-Za-z])(dB|DB)(?![A-Za-z])|(?i:decibel)|20 ?\*? ?log")
+_SAYS_DECIBEL = re.compile(rf"(?<![A-Za-z])(dB|DB)(?![A-Za-z])|20 ?\*? ?log|(?i:{_DECIBEL_WORD}|\bpegel\b|\blog ?mag)")
 _REFERENCE = re.compile(r"(?i:dB)\s*(?:\(|(?i:re|rel|ref)\.?)\s*(?:1(?:\.0*)?\s*)?(?P<unit>[^\s()\d][^()]*?)\s*\)?")
 _LEAD = re.compile(r"(?i:in|units?|einheit)(\s*[:=]\s*|\s+)(?=\S)")
 _AMPLITUDE = re.compile(r"[\s,_]*(?i:rms|peak|pk|pk-pk|p-?p|eff)\.?$")
