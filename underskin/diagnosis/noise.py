@@ -14,7 +14,7 @@ coefficients, scaled to the prior's standard deviation. Where samples in the air
 else a tared cell is within a hundredth of the largest force. The drift over the curve is 2 % of the largest force, or a
 larger one that the air shows; without air there is none. The position of the surface, friction in a stage and the
 idealisation of every law also bend a curve a little. With s the force (at least 0.7 of the largest near the beginning
-of contact and 0.2 in the air), x the position along the curve (data/dataset.path_fractions) and η the size,
+of contact and 0.2 in the air), x the position along the curve (`path_fractions`) and η the size,
 
     ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
 
@@ -46,6 +46,8 @@ from typing import Self
 import numpy as np
 from scipy.optimize import minimize
 
+from underskin.mechanisms.base import Kind
+from underskin.recordings.curve_course import CurveLandmarks
 from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
 from underskin.units import Complexes, Floats, Indices
 
@@ -250,6 +252,55 @@ def _correlation(path_fraction: Floats) -> Floats:
         distance = np.sqrt(3.0) * np.abs(path_fraction[:, None] - path_fraction) / length
         total += (1 + distance) * np.exp(-distance) / len(_LENGTHS)
     return total
+
+
+_COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which a way is summed, standard deviations of noise
+_RADIUS_SHARE = 0.7  # of the way along a curve, that of the contact radius
+_LEAST_CONTACT = 1e-3  # of the largest force, below which a sample is out of contact
+
+
+def path_fractions(displacement: Floats, force: Floats, seen: CurveLandmarks, kind: Kind) -> Floats:
+    """The position x of each sample along the curve, by which the error of a law is smooth; about 0 to 1.
+
+    Of a sphere mostly the way of its contact radius a, over twice the largest one: laws of contact idealise by a/R and
+    a/h, and a surface or tip that is not smooth shows while the contact is small. Of a cylinder the way of its force.
+    Shares of displacement and of samples give the air and a hold a length.
+    """
+    if kind == "indentation":
+        share, changed, whole = _RADIUS_SHARE, np.abs(np.diff(_contact_radius(displacement, force, seen))), 2.0
+    else:
+        coarse = _evenly(len(force))
+        steps = np.maximum(np.abs(np.diff(force[coarse])) - _BEYOND_NOISE * seen.noise, 0.0)
+        changed = np.diff(np.interp(np.arange(len(force)), coarse, np.concatenate([[0.0], np.cumsum(steps)])))
+        share, whole = 1 / 3, float(changed.sum())
+    moved = np.abs(np.diff(displacement))
+    parts = (
+        (share, changed, whole),
+        ((1 - share) / 2, moved, float(moved.sum())),
+        ((1 - share) / 2, np.ones(len(moved)), float(len(moved))),
+    )
+    ways = [(weight, weight * np.cumsum(steps) / unit) for weight, steps, unit in parts if unit > 0]
+    total = sum(way for _, way in ways) / sum(weight for weight, _ in ways) if ways else np.zeros(len(moved))
+    return np.concatenate([[0.0], total])
+
+
+def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -> Floats:
+    """The contact radius over the largest one by Hertz's depth (samples,), 0 in the air."""
+    largest = float(np.abs(force).max())
+    without = np.flatnonzero(force <= max(_BEYOND_NOISE * seen.noise, _LEAST_CONTACT * largest))
+    before, after = without[without < seen.turn], without[without > seen.turn]
+    first = seen.snap_in if seen.snap_in is not None else (before[-1] + 1 if len(before) else 0)
+    end = seen.pull_off if seen.pull_off is not None else (after[0] if len(after) else len(force))
+    lowest = float(displacement[first:end].min())
+    depth = np.maximum(displacement - lowest, 0.0)
+    depth[:first], depth[end:] = 0.0, 0.0
+    coarse = _evenly(len(force))
+    return np.sqrt(np.interp(np.arange(len(force)), coarse, depth[coarse]) / (float(depth.max()) or 1.0))
+
+
+def _evenly(samples: int) -> Indices:
+    """At most `_COARSE` of the samples, evenly: the way along them does not grow with their noise."""
+    return np.linspace(0, samples - 1, min(samples, _COARSE)).round().astype(np.intp)
 
 
 _KNOTS_PER_DECADE = 2.0

@@ -21,7 +21,15 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.noise import USUAL_DRIFT, CurveError, LineNoise, Whitening, instrument_columns, line_noise
+from underskin.diagnosis.noise import (
+    USUAL_DRIFT,
+    CurveError,
+    LineNoise,
+    Whitening,
+    instrument_columns,
+    line_noise,
+    path_fractions,
+)
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking
 from underskin.mechanisms.base import Kind
@@ -123,9 +131,6 @@ class Inspected:
 _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
 _STRAIGHT = 3.0  # standard deviations of χ² about a straight line above which a block is split
 _LEAST_NOISE = 2e-5  # of the range of force: resolution of numbers with five digits
-_COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which a way is summed, standard deviations of noise
-_RADIUS_SHARE = 0.7  # of the way along a curve, that of the contact radius
-_LEAST_CONTACT = 1e-3  # of the largest force, below which a sample is out of contact
 _NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # first samples of blocks, from a jump: in
 # samples, or in steps as large as the noise of the travel, since noisy single displacements bias a non-linear law
 _SIDE_SAMPLES = 5  # samples on either side of the deepest one
@@ -319,50 +324,6 @@ def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
     for column, ((up, at_up), (down, at_down)) in zip(corrected, lines, strict=True):
         column[turn] = 0.5 * (at_up + up * corner + at_down + down * corner)
     return corrected
-
-
-def path_fractions(displacement: Floats, force: Floats, seen: CurveLandmarks, kind: Kind) -> Floats:
-    """The position x of each sample along the curve, by which the error of a law is smooth; about 0 to 1.
-
-    Of a sphere mostly the way of its contact radius a, over twice the largest one: laws of contact idealise by a/R and
-    a/h, and a surface or tip that is not smooth shows while the contact is small. Of a cylinder the way of its force.
-    Shares of displacement and of samples give the air and a hold a length.
-    """
-    if kind == "indentation":
-        share, changed, whole = _RADIUS_SHARE, np.abs(np.diff(_contact_radius(displacement, force, seen))), 2.0
-    else:
-        coarse = _evenly(len(force))
-        steps = np.maximum(np.abs(np.diff(force[coarse])) - _BEYOND_NOISE * seen.noise, 0.0)
-        changed = np.diff(np.interp(np.arange(len(force)), coarse, np.concatenate([[0.0], np.cumsum(steps)])))
-        share, whole = 1 / 3, float(changed.sum())
-    moved = np.abs(np.diff(displacement))
-    parts = (
-        (share, changed, whole),
-        ((1 - share) / 2, moved, float(moved.sum())),
-        ((1 - share) / 2, np.ones(len(moved)), float(len(moved))),
-    )
-    ways = [(weight, weight * np.cumsum(steps) / unit) for weight, steps, unit in parts if unit > 0]
-    total = sum(way for _, way in ways) / sum(weight for weight, _ in ways) if ways else np.zeros(len(moved))
-    return np.concatenate([[0.0], total])
-
-
-def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -> Floats:
-    """The contact radius over the largest one by Hertz's depth (samples,), 0 in the air."""
-    largest = float(np.abs(force).max())
-    without = np.flatnonzero(force <= max(_BEYOND_NOISE * seen.noise, _LEAST_CONTACT * largest))
-    before, after = without[without < seen.turn], without[without > seen.turn]
-    first = seen.snap_in if seen.snap_in is not None else (before[-1] + 1 if len(before) else 0)
-    end = seen.pull_off if seen.pull_off is not None else (after[0] if len(after) else len(force))
-    lowest = float(displacement[first:end].min())
-    depth = np.maximum(displacement - lowest, 0.0)
-    depth[:first], depth[end:] = 0.0, 0.0
-    coarse = _evenly(len(force))
-    return np.sqrt(np.interp(np.arange(len(force)), coarse, depth[coarse]) / (float(depth.max()) or 1.0))
-
-
-def _evenly(samples: int) -> Indices:
-    """At most `_COARSE` of the samples, evenly: the way along them does not grow with their noise."""
-    return np.linspace(0, samples - 1, min(samples, _COARSE)).round().astype(np.intp)
 
 
 COLLAPSED_HZ = 30.0  # frequency of a collapsed line; models without frequency do not use it

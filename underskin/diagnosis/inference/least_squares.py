@@ -3,8 +3,8 @@
 The residuals are in units of a law's usual error, with the parameters' priors, a gain of each recording, and zero and
 drift of its cell taken out (variable projection). Scipy's trust-region reflective algorithm converges from far away,
 where steps on the likelihood, whose covariance depends on the model, do not. With adhesion the force jumps at the
-contact point, and no derivative leads past a sample there: contact points start where a snap-in is seen, and the curve
-is fitted again between the samples where it fits best.
+contact point, and no derivative leads past a sample there: where a curve does not show its jumps, it is fitted again
+between the samples where it fits best.
 """
 
 from collections.abc import Callable

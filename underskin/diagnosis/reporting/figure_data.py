@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, path_fractions, recording_axes
+from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
 from underskin.diagnosis.inference.residuals import row_prediction
 from underskin.diagnosis.localisation import axis_values
+from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.kinds import KINDS
 from underskin.diagnosis.reporting.numbers import parameter_index
