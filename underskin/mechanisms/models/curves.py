@@ -88,34 +88,19 @@ class CurveModel(ABC):
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         """F (points, curves, samples) [N], which samples are in contact, and which are inside the tables.
 
-        `contact` (points, curves, 1) [m]; `held`: the contact to be used, where given.
+        `contact` (points, curves, 1) [m]; `contact_mask`: the contact to be used, where given.
         """
 
-    def forces(self, fit: Floats, contact_mask: Mask | None = None) -> Floats:
-        """F (points, rows) [N] at points (points, parameters); `held` (rows,): which samples are in contact, where
-        known."""
+    def forces(self, fit: Floats) -> Floats:
+        """F (points, rows) [N] at points (points, parameters)."""
         at_once = max(_AT_ONCE // self.displacement.size, 1)
-        arranged = self._arranged_mask(contact_mask)
-        parts = []
-        for first in range(0, len(fit), at_once):
-            part = fit[first : first + at_once]
-            part_mask = None if arranged is None else np.broadcast_to(arranged, (len(part), *arranged.shape))
-            parts.append(self._forces(part, part_mask)[0])
+        parts = [self._forces(fit[first : first + at_once])[0] for first in range(0, len(fit), at_once)]
         return np.concatenate(parts)[:, self.recording, self._sample]
 
-    def forces_and_slopes(self, fit: Floats, contact_mask: Mask | None = None) -> tuple[Floats, Floats]:
+    def forces_and_slopes(self, fit: Floats) -> tuple[Floats, Floats]:
         """F (points, rows) [N], and its derivatives by the fit coordinates (points, parameters, rows)."""
-        arranged = self._arranged_mask(contact_mask)
-        values, slopes, _ = zip(*(self._differentiated(point, arranged) for point in fit), strict=True)
+        values, slopes, _ = zip(*map(self._differentiated, fit), strict=True)
         return np.stack(values), np.stack(slopes)
-
-    def _arranged_mask(self, contact_mask: Mask | None) -> Mask | None:
-        """Rows (rows,) as curves (curves, samples)."""
-        if contact_mask is None:
-            return None
-        arranged = np.zeros(self.displacement.shape, dtype=bool)
-        arranged[self.recording, self._sample] = contact_mask
-        return arranged
 
     def predict(self, fit: Floats) -> Prediction:
         """All samples at one point of the fit coordinates (parameters,); raises InvalidInput for another length."""
@@ -127,12 +112,9 @@ class CurveModel(ABC):
         contact = 1e-3 * fit[:, self.contact_points, None]
         return self._force(self._curve(values, nuisances), contact, contact_mask)
 
-    def _differentiated(self, fit: Floats, in_contact: Mask | None = None) -> tuple[Floats, Floats, Mask]:
-        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside.
-
-        `in_contact` (curves, samples): which samples are in contact, where known.
-        """
-        middle, contact_mask, inside = self._forces(fit[None], None if in_contact is None else in_contact[None])
+    def _differentiated(self, fit: Floats) -> tuple[Floats, Floats, Mask]:
+        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside."""
+        middle, contact_mask, inside = self._forces(fit[None])
         points = np.tile(fit, (2 * len(self._moved), 1))
         for number, indices in enumerate(self._moved):
             points[2 * number, indices] += self._step[indices]
