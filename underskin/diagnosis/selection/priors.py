@@ -9,6 +9,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.mechanisms.laws.layered_contact import LayeredContact
+from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
 
 # "Nothing missing" includes all mechanisms that do not show, hence every other campaign.
 PRIORS = {"nothing_missing": 0.6, "one": 0.252, "two": 0.1, "three": 0.012, "four": 0.001, "none_of_these": 0.035}
@@ -27,10 +28,14 @@ def least_evidence(explanation: Explanation) -> float:
 
 def declared_laws(lines: Lines) -> frozenset[str]:
     """The mechanisms that follow from declared facts: no guesses, with equal prior odds inside every hypothesis."""
-    layered = lines.mechanisms.named.get(LayeredContact.name)
-    if layered is None or lines.kind not in layered.kinds or lines.campaign.skin.thickness_mm is None:
-        return frozenset()
-    return frozenset() if layered.parameters(lines.campaign, lines.kind) else frozenset({layered.name})
+    named, even = lines.mechanisms.named, set[str]()
+    layered = named.get(LayeredContact.name)
+    if layered is not None and lines.kind in layered.kinds and lines.campaign.skin.thickness_mm is not None:
+        if not layered.parameters(lines.campaign, lines.kind):
+            even.add(layered.name)
+    if lines.kind == "frf" and MovingContactEdge.name in named:
+        even.add(MovingContactEdge.name)
+    return frozenset(even)
 
 
 def guess_count(explanation: Explanation) -> int:
