@@ -1,4 +1,4 @@
-"""A rigid frictionless sphere pressed into the incompressible neo-Hookean layer: equilibrium at a given contact edge.
+"""A rigid frictionless sphere pressed into the incompressible layer: equilibrium at a given contact edge.
 
 The material point of the surface that is the contact's edge is prescribed, as a line of the mesh, and the sphere's
 indentation δ is an unknown; its equation is that the pressure vanishes at the edge, as it must where nothing adheres.
@@ -58,8 +58,8 @@ class _Tangent:
 class ContactLayer(NonlinearLayer):
     """A discretised layer with a contact on |r| < a of its surface; the mesh must have a line at r = a."""
 
-    def __init__(self, discretisation: Discretisation, a: float) -> None:
-        super().__init__(discretisation)
+    def __init__(self, discretisation: Discretisation, a: float, c2: float = 0.0) -> None:
+        super().__init__(discretisation, c2)
         d = discretisation
         columns = np.unique(d.basis.mesh.p[0])
         edges = columns[columns <= a * (1 + 1e-12)]

@@ -6,6 +6,7 @@ lead from the solved spheres to the table's nodes. They pass through x = 0, wher
 kept is the difference from the exact linear contact at the same force, sphere and layer, `tablegen.linear_contact`.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -77,7 +78,7 @@ class SphereSolution:
         return np.concatenate([ratios, self.correction])
 
 
-def solve_contact_column(a: float, cbrt_load: Floats, order: int) -> tuple[Floats, Floats, float]:
+def solve_contact_column(a: float, cbrt_load: Floats, order: int, c2: float = 0.0) -> tuple[Floats, Floats, float]:
     """Solve one column of the contact table.
 
     Parameters
@@ -88,11 +89,13 @@ def solve_contact_column(a: float, cbrt_load: Floats, order: int) -> tuple[Float
         x = L^(1/3), ascending from 0.
     order : int
         Order of the displacement elements.
+    c2 : float
+        Yeoh's second term over the first one; 0 is neo-Hookean.
 
     Returns
     -------
     alpha : ndarray, (x,)
-        a/h of the linear contact under the force.
+        a/h of the linear contact under the force; NaN from where it is beyond `linear_contact`'s range.
     values : ndarray, (x, quantities)
         As `SphereSolution.over_linear`.
     force_error : float
@@ -104,31 +107,34 @@ def solve_contact_column(a: float, cbrt_load: Floats, order: int) -> tuple[Float
         Names the point where Newton's method did not converge.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
-        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order))
+        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order, c2))
+    beyond = cbrt_load > spheres[-1].cbrt_load
     x = np.array([0.0, *(sphere.cbrt_load for sphere in spheres)])
     rows = [np.append(sphere.linear.alpha, sphere.over_linear()) for sphere in spheres]
     vanishing = np.concatenate([[a, 1.0, 1.0, 1.0], np.zeros(RADII.size)])
-    resampled = np.asarray(make_interp_spline(x, np.array([vanishing, *rows]), k=5)(cbrt_load))
+    resampled = np.asarray(make_interp_spline(x, np.array([vanishing, *rows]), k=min(5, len(rows)))(cbrt_load))
+    resampled[beyond] = np.nan
     return resampled[:, 0], resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
 
 
-def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[SphereSolution]:
+def press_spheres(a: float, radii: Floats, rho: Floats, order: int, c2: float = 0.0) -> list[SphereSolution]:
     """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
-    column = _Column(a, rho, order)
+    column = _Column(a, rho, order, c2)
     return [column.advance(float(radius)) for radius in radii]
 
 
-def _follow(a: float, targets: Floats, order: int) -> Iterator[SphereSolution]:
-    """Spheres whose x is near each target, and the last one's at or beyond it."""
-    column = _Column(a, np.zeros(0), order)
-    ratio = 1.0 + a  # of the force over Hertz's for a: a first guess
-    for target in targets:
-        sphere = column.advance(a / _strain(target, ratio))
-        ratio = sphere.cbrt_load**3 / (16 / 9 * (a / sphere.radius) ** 3)
-        yield sphere
-    while sphere.cbrt_load < targets[-1]:
-        sphere = column.advance(a / (1.02 * _strain(targets[-1], ratio)))
-        ratio = sphere.cbrt_load**3 / (16 / 9 * (a / sphere.radius) ** 3)
+def _follow(a: float, targets: Floats, order: int, c2: float) -> Iterator[SphereSolution]:
+    """Spheres whose x is near each target, and the last one's at or beyond it, as far as the linear contact is known."""
+    column = _Column(a, np.zeros(0), order, c2)
+    reached, ratio = 0.0, 1.0 + a  # of the force over Hertz's for a: a first guess
+    further = iter(targets)
+    while reached < targets[-1]:
+        target = next((target for target in further if target > reached), 1.02 * targets[-1])
+        try:
+            sphere = column.advance(a / _strain(target, ratio))
+        except BeyondLinearContactError:
+            return
+        reached, ratio = sphere.cbrt_load, sphere.cbrt_load**3 / (16 / 9 * (a / sphere.radius) ** 3)
         yield sphere
 
 
@@ -137,11 +143,15 @@ def _strain(cbrt_load: float, ratio: float) -> float:
     return float(cbrt_load * np.cbrt(9 / 16 / ratio))
 
 
+class BeyondLinearContactError(SolverError):
+    """The linear contact under the same force is wider than `tablegen.linear_contact` calculates it."""
+
+
 class _Column:
     """The layer pressed up to one contact edge; knows the last sphere."""
 
-    def __init__(self, a: float, rho: Floats, order: int) -> None:
-        self.layer = ContactLayer(discretise(contact_mesh(a), order), a)
+    def __init__(self, a: float, rho: Floats, order: int, c2: float) -> None:
+        self.layer = ContactLayer(discretise(contact_mesh(a), order), a, c2)
         self.base = BaseStress(self.layer.discretisation)
         self.linear = LinearContact(np.minimum(self.base.points, PROFILE_END), rho)
         self.a, self.rho = a, rho
@@ -179,6 +189,8 @@ class _Column:
         pressure = layer.pressure(now)
         total = 2 * np.pi * force * SHEAR_MODULUS
         linear = self.linear.sphere(total, radius)
+        if math.isnan(linear.alpha):
+            raise BeyondLinearContactError(f"contact edge {self.a:g} h, R = {radius:g} h: beyond the linear contact")
         # F = 2π force and σ = (2π/3) · mean stress/F, for a mean over the disc; 2π cancels.
         correction = base.smooth(stress / (3 * force) - self.linear.profile(linear.alpha))
         sigma, increment = np.zeros(0), np.zeros(0)

@@ -1,6 +1,6 @@
-"""The contact table: its axes, the sweep over contact edges, the measured errors, and the file.
+"""The contact table: its axes, the sweep over materials and contact edges, the measured errors, and the file.
 
-A column of the sweep is one material contact edge with spheres up to the largest load (`tablegen.contact_column`). At
+The layer is neo-Hookean, or of Yeoh's law with a second term c₂ over the first one (`SECOND_OVER_FIRST`). A column of the sweep is one material contact edge with spheres up to the largest load (`tablegen.contact_column`). At
 each x = L^(1/3) a spline over the columns in α, a/h of the linear contact, leads to the table's nodes. At x = 0 the
 layer is linear, and at α = 0 the base bears a point force's stress at any strain (Saint-Venant): the correction is 0.
 Every column is solved with elements of order 5 and of order 4; the table holds the former, their difference is the
@@ -56,6 +56,7 @@ SOURCES = (
 )
 _RATIOS = ("contact_radius", "indentation", "stiffness")
 
+SECOND_OVER_FIRST = np.array([1.0, 3.0, 7.0])  # evenly in ln(1 + c₂), over which the effect bends little
 # a/h before pressing; at 2.637 h elements of order 4 do not converge at the largest load
 DEFAULT_EDGES = np.delete(3.05 * np.linspace(0.03, 1, 22) ** 1.5, 19)
 DEFAULT_AXES = 3.0 * np.linspace(0, 1, 33) ** 1.5, np.cbrt(0.15) * np.linspace(0, 1, 13)
@@ -66,57 +67,70 @@ def make_contact_table(
     axes: tuple[Floats, Floats] = DEFAULT_AXES,
     edges: Floats = DEFAULT_EDGES,
     scheduler: str | None = None,
+    second_over_first: Floats = SECOND_OVER_FIRST,
 ) -> str:
     """Solve, measure and write the table at `path`; returns its hash.
 
-    Resumes from what an interrupted run left in `path`.parts. `axes`: a/h and L^(1/3), both from 0. Raises SolverError
-    that names the point when a solve fails; the table is then not written.
+    Resumes from what an interrupted run left in `path`.parts. `axes`: a/h and L^(1/3), both from 0;
+    `second_over_first`: Yeoh's c₂ of the layers beside the neo-Hookean one, ascending. Raises SolverError that names the point when a solve fails; the table is then not written.
     """
     sources = sources_hash(SOURCES)
     parts = path.with_name(path.name + ".parts")
+    materials = [0.0, *second_over_first.tolist()]
     pieces = {
-        f"order{order}-{number:02d}": partial(solve_piece, float(a), axes[1], order)
+        f"c2-{c2:g}-order{order}-{number:02d}": partial(solve_piece, float(a), axes[1], order, c2)
+        for c2 in materials
         for order in (ORDER, ORDER - 1)
         for number, a in enumerate(edges)
     }
     name = data_hash({"edges": edges, "alpha": axes[0], "x": axes[1]})
     done = run_pieces(pieces, parts / f"{sources[:16]}-{name[:8]}", scheduler, "tablegen contact")
     fine, coarse = (
-        _on_the_nodes(axes, [done[f"order{order}-{number:02d}"] for number in range(edges.size)])
+        np.stack(
+            [
+                _on_the_nodes(axes, [done[f"c2-{c2:g}-order{order}-{number:02d}"] for number in range(edges.size)])
+                for c2 in materials
+            ]
+        )
         for order in (ORDER, ORDER - 1)
     )
-    groups = {"frictionless": _group(axes, fine, np.abs(fine - coarse) + sum(left_out_errors(axes, fine)))}
+    errors = np.abs(fine - coarse) + np.stack([sum(left_out_errors(axes, values)) for values in fine])
+    groups = {
+        "frictionless": _group(axes, fine[0], errors[0]),
+        "yeoh": _yeoh_group(axes, second_over_first, fine, errors),
+    }
     about = {
         "quantity": "contact",
         "poisson_ratio": 0.5,
-        "material": "incompressible neo-Hookean layer bonded to a rigid base; rigid frictionless sphere",
+        "material": "incompressible layer, neo-Hookean or Yeoh's, bonded to a rigid base; rigid frictionless sphere",
         "mesh": f"Q{ORDER}/P{ORDER - 1}, rim at a + {RIM:g} h, graded to the contact's edge",
         "solver": "contact edge prescribed, indentation free; augmented Lagrangian for volume and contact, SuperLU",
         "force_balance_error": max(float(piece["force_error"]) for piece in done.values()),
         "tablegen_sources_sha256": sources,
         **{f"version_{name}": version(name) for name in ("underskin", "scikit-fem", "numpy", "scipy", "h5py")},
     }
-    digest = write_table(path, CONTACT_SCHEMA, groups, {"frictionless": "correction"}, about)
+    digest = write_table(path, CONTACT_SCHEMA, groups, dict.fromkeys(groups, "correction"), about)
     shutil.rmtree(parts)
     return digest
 
 
-def solve_piece(a: float, cbrt_load: Floats, order: int) -> Arrays:
+def solve_piece(a: float, cbrt_load: Floats, order: int, c2: float = 0.0) -> Arrays:
     """`solve_contact_column` as a dictionary of arrays, which can be sent to workers and stored."""
-    alpha, values, force_error = solve_contact_column(a, cbrt_load, order)
+    alpha, values, force_error = solve_contact_column(a, cbrt_load, order, c2)
     return {"alpha": alpha, "values": values, "force_error": np.array(force_error)}
 
 
 def _on_the_nodes(axes: tuple[Floats, Floats], columns: list[Arrays]) -> Floats:
-    """All quantities of the columns at the table's nodes: (α, x, quantities)."""
+    """All quantities of the columns at the table's nodes: (α, x, quantities); from those that reach the load."""
     alpha, cbrt_load = axes
     solved = np.stack([column["alpha"] for column in columns])
     values = np.stack([column["values"] for column in columns])
     nodes, count = [], len(_RATIOS)
     for number, x in enumerate(cbrt_load):
-        if not solved[-1, number] >= alpha[-1]:
+        reaching = np.isfinite(solved[:, number])
+        along, at = solved[reaching, number], values[reaching, number]
+        if not along[-1] >= alpha[-1]:
             raise ValueError(f"the contact edges do not reach all of a/h at x = {x:g}")
-        along, at = solved[:, number], values[:, number]
         ratios = make_interp_spline(along, at[:, :count], k=5)(alpha)  # at α = 0, the half space, a little beyond
         from_zero = np.concatenate([np.zeros((1, at.shape[1] - count)), at[:, count:]])
         correction = make_interp_spline(np.append(0.0, along), from_zero, k=5)(alpha)
@@ -139,4 +153,30 @@ def _group(axes: tuple[Floats, Floats], values: Floats, errors: Floats) -> dict[
     count, meaning = len(_RATIOS), "stress on the base less the linear contact's, in sigma's scale: -T3 2 pi h^2/(3 F)"
     group["correction"] = Dataset(values[..., count:], meaning, (*along, "r_over_h"))
     group["correction_error"] = Dataset(errors[..., count:], "absolute error of correction", (*along, "r_over_h"))
+    return group
+
+
+def _yeoh_group(
+    axes: tuple[Floats, Floats], second_over_first: Floats, values: Floats, errors: Floats
+) -> dict[str, Dataset]:
+    """What c₂ adds: `values` and `errors` are (1 + c₂, α, x, quantities), the neo-Hookean layer first."""
+    along = ("second_over_first", "a_over_h", "cbrt_load_parameter")
+    group = {
+        "a_over_h": Dataset(axes[0], "contact radius over thickness of the linear layer's contact, a/h"),
+        "cbrt_load_parameter": Dataset(axes[1], "cube root of L = F/(R^2 E)"),
+        "r_over_h": Dataset(RADII, "distance from the contact's axis over thickness, r/h"),
+        "second_over_first": Dataset(second_over_first, "c2 of Yeoh's energy (G/2)(K + c2 K^2), K = I1 - 3"),
+    }
+    count = len(_RATIOS)
+    for number, name in enumerate(_RATIOS):
+        ratio = values[1:, ..., number] / values[0, ..., number]
+        group[name] = Dataset(ratio, f"{name} over that of the neo-Hookean layer at the same force", along)
+        group[f"{name}_error"] = Dataset(
+            (errors[1:] / values[1:] + errors[0] / values[0])[..., number], f"relative error of {name}", along
+        )
+    meaning = "stress on the base less the neo-Hookean layer's, in sigma's scale: -T3 2 pi h^2/(3 F)"
+    group["correction"] = Dataset((values[1:] - values[0])[..., count:], meaning, (*along, "r_over_h"))
+    group["correction_error"] = Dataset(
+        (errors[1:] + errors[0])[..., count:], "absolute error of correction", (*along, "r_over_h")
+    )
     return group

@@ -1,6 +1,6 @@
-"""The incompressible neo-Hookean solid in axisymmetry, at every integration point at once.
+"""The incompressible neo-Hookean solid, and Yeoh's with a second term, in axisymmetry, at all integration points.
 
-Energy per undeformed volume W = (G/2)(I₁ − 3 − 2 ln J) − p (J − 1) with G = 1. The deformation gradient has the five
+Energy per undeformed volume W = (G/2)(K + c₂ K² − 2 ln J) − p (J − 1), K = I₁ − 3, with G = 1; neo-Hookean at c₂ = 0. The deformation gradient has the five
 components F = (F_rr, F_rz, F_zr, F_zz, F_θθ), the last axis of every array here; cof F = ∂J/∂F. Where J = 1 the term in
 ln J is only a shift of p by G, so that p = 0 at rest; but elements meet J = 1 on average only, and without that term
 modes that violate it inside an element lose their stiffness once the pressure exceeds about 1.5 G (found as a negative
@@ -29,13 +29,14 @@ def volume_ratio(f: Floats) -> Floats:
     return (rr * zz - rz * zr) * tt
 
 
-def stress(f: Floats, p: Floats) -> Floats:
-    """First Piola–Kirchhoff stress P = F − (p + 1/J) cof F, shape (…, 5)."""
-    return f - (p + 1 / volume_ratio(f))[..., None] * cofactor(f)
+def stress(f: Floats, p: Floats, c2: float = 0.0) -> Floats:
+    """First Piola–Kirchhoff stress P = (1 + 2 c₂ K) F − (p + 1/J) cof F, shape (…, 5)."""
+    stiffened = f if c2 == 0.0 else _stiffening(f, c2)[..., None] * f
+    return stiffened - (p + 1 / volume_ratio(f))[..., None] * cofactor(f)
 
 
-def tangent(f: Floats, p: Floats) -> Floats:
-    """∂P/∂F = 1 − (p + 1/J) ∂²J/∂F² + cof F ⊗ cof F / J², shape (…, 5, 5), symmetric."""
+def tangent(f: Floats, p: Floats, c2: float = 0.0) -> Floats:
+    """∂P/∂F = 1 + 2 c₂ K + 4 c₂ F ⊗ F − (p + 1/J) ∂²J/∂F² + cof F ⊗ cof F / J², shape (…, 5, 5), symmetric."""
     rr, rz, zr, zz, tt = np.moveaxis(f, -1, 0)
     second = np.zeros((*p.shape, 5, 5))
     for i, j, value in ((0, 3, tt), (1, 2, -tt), (0, 4, zz), (3, 4, rr), (1, 4, -zr), (2, 4, -rz)):
@@ -43,4 +44,12 @@ def tangent(f: Floats, p: Floats) -> Floats:
     volume, cof = volume_ratio(f), cofactor(f)
     shift = (p + 1 / volume)[..., None, None]
     normalised = cof / volume[..., None]
-    return np.eye(5) - shift * second + normalised[..., :, None] * normalised[..., None, :]
+    rest = normalised[..., :, None] * normalised[..., None, :] - shift * second
+    if c2 == 0.0:
+        return np.eye(5) + rest
+    return _stiffening(f, c2)[..., None, None] * np.eye(5) + 4 * c2 * f[..., :, None] * f[..., None, :] + rest
+
+
+def _stiffening(f: Floats, c2: float) -> Floats:
+    """1 + 2 c₂ (I₁ − 3), shape (…)."""
+    return np.asarray(1 + 2 * c2 * ((f**2).sum(axis=-1) - 3))

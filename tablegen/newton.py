@@ -33,10 +33,10 @@ class State:
 
 
 class NonlinearLayer:
-    """A discretised neo-Hookean layer, and its deformation under nodal loads."""
+    """A discretised layer, neo-Hookean or with Yeoh's second term `c2`, and its deformation under nodal loads."""
 
-    def __init__(self, discretisation: Discretisation) -> None:
-        self.discretisation = discretisation
+    def __init__(self, discretisation: Discretisation, c2: float = 0.0) -> None:
+        self.discretisation, self.c2 = discretisation, c2
         d = discretisation
         elements, points = d.weight.shape
         self._flat_gradient = d.gradient.reshape(elements, points * 5, -1)
@@ -51,7 +51,7 @@ class NonlinearLayer:
     def internal_force(self, state: State) -> Floats:
         """∫ P : ∇v for every displacement; on the held ones this is the reaction."""
         f, p = self._fields(state)
-        weighted = stress(f, p) * self.discretisation.weight[..., None]
+        weighted = stress(f, p, self.c2) * self.discretisation.weight[..., None]
         return self.discretisation.assemble_vector(self._times_gradient(weighted))
 
     def element_matrices(self, state: State) -> tuple[Floats, Floats]:
@@ -75,7 +75,7 @@ class NonlinearLayer:
         du, dp = self._increment(rest, load)
         f, p = self._fields(rest)
         gradient = self._fields(State(du, dp))[0] - IDENTITY
-        change = (tangent(f, p) @ gradient[..., None])[..., 0] - (dp @ self.discretisation.pressure.T)[
+        change = (tangent(f, p, self.c2) @ gradient[..., None])[..., 0] - (dp @ self.discretisation.pressure.T)[
             ..., None
         ] * IDENTITY
         return self.discretisation.assemble_vector(self._times_gradient(change * self.discretisation.weight[..., None]))
@@ -133,7 +133,7 @@ class NonlinearLayer:
 
     def _stiffness(self, f: Floats, p: Floats) -> Floats:
         d = self.discretisation
-        weighted = tangent(f, p) * d.weight[..., None, None]
+        weighted = tangent(f, p, self.c2) * d.weight[..., None, None]
         product = (weighted @ d.gradient).reshape(self._flat_gradient.shape)
         return np.swapaxes(self._flat_gradient, 1, 2) @ product
 
