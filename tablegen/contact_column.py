@@ -124,7 +124,7 @@ def press_spheres(a: float, radii: Floats, rho: Floats, order: int, c2: float = 
 
 
 def _follow(a: float, targets: Floats, order: int, c2: float) -> Iterator[SphereSolution]:
-    """Spheres whose x is near each target, and the last one's at or beyond it, as far as the linear contact is known."""
+    """Spheres whose x is near each target, the last one's at or beyond it, as far as the linear contact is known."""
     column = _Column(a, np.zeros(0), order, c2)
     reached, ratio = 0.0, 1.0 + a  # of the force over Hertz's for a: a first guess
     further = iter(targets)

@@ -1,9 +1,10 @@
 """The contact table: its axes, the sweep over materials and contact edges, the measured errors, and the file.
 
-The layer is neo-Hookean, or of Yeoh's law with a second term c₂ over the first one (`SECOND_OVER_FIRST`). A column of the sweep is one material contact edge with spheres up to the largest load (`tablegen.contact_column`). At
-each x = L^(1/3) a spline over the columns in α, a/h of the linear contact, leads to the table's nodes. At x = 0 the
-layer is linear, and at α = 0 the base bears a point force's stress at any strain (Saint-Venant): the correction is 0.
-Every column is solved with elements of order 5 and of order 4; the table holds the former, their difference is the
+The layer is neo-Hookean, or of Yeoh's law with a second term c₂ over the first one (`SECOND_OVER_FIRST`). A column of
+the sweep is one material contact edge with spheres up to the largest load (`tablegen.contact_column`). At each x =
+L^(1/3) a spline over the columns in α, a/h of the linear contact, leads to the table's nodes. At x = 0 the layer is
+linear, and at α = 0 the base bears a point force's stress at any strain (Saint-Venant): the correction is 0. Every
+column is solved with elements of order 5 and of order 4; the table holds the former, their difference is the
 discretisation error. The interpolation error is measured as in `tablegen.influence_table`, by leaving nodes out.
 """
 
@@ -56,7 +57,7 @@ SOURCES = (
 )
 _RATIOS = ("contact_radius", "indentation", "stiffness")
 
-SECOND_OVER_FIRST = np.array([1.0, 3.0, 7.0])  # evenly in ln(1 + c₂), over which the effect bends little
+SECOND_OVER_FIRST = np.array([0.0, 1.0, 3.0, 7.0])  # evenly in ln(1 + c₂), over which the effect bends little
 # a/h before pressing; at 2.637 h elements of order 4 do not converge at the largest load
 DEFAULT_EDGES = np.delete(3.05 * np.linspace(0.03, 1, 22) ** 1.5, 19)
 DEFAULT_AXES = 3.0 * np.linspace(0, 1, 33) ** 1.5, np.cbrt(0.15) * np.linspace(0, 1, 13)
@@ -72,11 +73,12 @@ def make_contact_table(
     """Solve, measure and write the table at `path`; returns its hash.
 
     Resumes from what an interrupted run left in `path`.parts. `axes`: a/h and L^(1/3), both from 0;
-    `second_over_first`: Yeoh's c₂ of the layers beside the neo-Hookean one, ascending. Raises SolverError that names the point when a solve fails; the table is then not written.
+    `second_over_first`: Yeoh's c₂ of the layers, from 0, the neo-Hookean one. Raises SolverError that names the point
+    when a solve fails; the table is then not written.
     """
     sources = sources_hash(SOURCES)
     parts = path.with_name(path.name + ".parts")
-    materials = [0.0, *second_over_first.tolist()]
+    materials = second_over_first.tolist()
     pieces = {
         f"c2-{c2:g}-order{order}-{number:02d}": partial(solve_piece, float(a), axes[1], order, c2)
         for c2 in materials
@@ -159,7 +161,7 @@ def _group(axes: tuple[Floats, Floats], values: Floats, errors: Floats) -> dict[
 def _yeoh_group(
     axes: tuple[Floats, Floats], second_over_first: Floats, values: Floats, errors: Floats
 ) -> dict[str, Dataset]:
-    """What c₂ adds: `values` and `errors` are (1 + c₂, α, x, quantities), the neo-Hookean layer first."""
+    """What c₂ adds: `values` and `errors` are (c₂, α, x, quantities), the neo-Hookean layer first."""
     along = ("second_over_first", "a_over_h", "cbrt_load_parameter")
     group = {
         "a_over_h": Dataset(axes[0], "contact radius over thickness of the linear layer's contact, a/h"),
@@ -167,16 +169,14 @@ def _yeoh_group(
         "r_over_h": Dataset(RADII, "distance from the contact's axis over thickness, r/h"),
         "second_over_first": Dataset(second_over_first, "c2 of Yeoh's energy (G/2)(K + c2 K^2), K = I1 - 3"),
     }
+    both = errors + errors[0]
+    both[0] = 0.0  # nothing is added
     count = len(_RATIOS)
     for number, name in enumerate(_RATIOS):
-        ratio = values[1:, ..., number] / values[0, ..., number]
+        ratio = values[..., number] / values[0, ..., number]
         group[name] = Dataset(ratio, f"{name} over that of the neo-Hookean layer at the same force", along)
-        group[f"{name}_error"] = Dataset(
-            (errors[1:] / values[1:] + errors[0] / values[0])[..., number], f"relative error of {name}", along
-        )
+        group[f"{name}_error"] = Dataset(both[..., number] / values[0, ..., number], f"absolute error of {name}", along)
     meaning = "stress on the base less the neo-Hookean layer's, in sigma's scale: -T3 2 pi h^2/(3 F)"
-    group["correction"] = Dataset((values[1:] - values[0])[..., count:], meaning, (*along, "r_over_h"))
-    group["correction_error"] = Dataset(
-        (errors[1:] + errors[0])[..., count:], "absolute error of correction", (*along, "r_over_h")
-    )
+    group["correction"] = Dataset((values - values[0])[..., count:], meaning, (*along, "r_over_h"))
+    group["correction_error"] = Dataset(both[..., count:], "absolute error of correction", (*along, "r_over_h"))
     return group

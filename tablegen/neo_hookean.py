@@ -1,11 +1,12 @@
 """The incompressible neo-Hookean solid, and Yeoh's with a second term, in axisymmetry, at all integration points.
 
-Energy per undeformed volume W = (G/2)(K + c₂ K² − 2 ln J) − p (J − 1), K = I₁ − 3, with G = 1; neo-Hookean at c₂ = 0. The deformation gradient has the five
-components F = (F_rr, F_rz, F_zr, F_zz, F_θθ), the last axis of every array here; cof F = ∂J/∂F. Where J = 1 the term in
-ln J is only a shift of p by G, so that p = 0 at rest; but elements meet J = 1 on average only, and without that term
-modes that violate it inside an element lose their stiffness once the pressure exceeds about 1.5 G (found as a negative
-eigenvalue in the element under the centre of the contact). Source: Holzapfel, Nonlinear Solid Mechanics (2000), ch. 6;
-Auricchio et al., Comput. Methods Appl. Mech. Engrg. 194 (2005) 1075, on that loss of stability.
+Energy per undeformed volume W = (G/2)(K + c₂ K² − 2 ln J) − p (J − 1), K = I₁ − 3, with G = 1; neo-Hookean
+at c₂ = 0. The deformation gradient has the five components F = (F_rr, F_rz, F_zr, F_zz, F_θθ), the last axis of every
+array here; cof F = ∂J/∂F. Where J = 1 the term in ln J is only a shift of p by G, so that p = 0 at rest; but elements
+meet J = 1 on average only, and without that term modes that violate it inside an element lose their stiffness once the
+pressure exceeds about 1.5 G (found as a negative eigenvalue in the element under the centre of the contact). Source:
+Holzapfel, Nonlinear Solid Mechanics (2000), ch. 6; Auricchio et al., Comput. Methods Appl. Mech. Engrg. 194 (2005)
+1075, on that loss of stability.
 """
 
 import numpy as np

@@ -24,21 +24,22 @@ def test_volume_cofactor_matrix() -> None:
         assert full(cofactor(f)) == pytest.approx(np.linalg.det(matrix) * np.linalg.inv(matrix).T, rel=1e-10, abs=1e-12)
 
 
-def energy(f: np.ndarray, p: np.ndarray) -> np.ndarray:
-    volume = volume_ratio(f)
-    return np.asarray((np.square(f).sum(axis=-1) - 3 - 2 * np.log(np.abs(volume))) / 2 - p * (volume - 1))
+def energy(f: np.ndarray, p: np.ndarray, c2: float) -> np.ndarray:
+    volume, k = volume_ratio(f), np.square(f).sum(axis=-1) - 3
+    return np.asarray((k + c2 * k**2 - 2 * np.log(np.abs(volume))) / 2 - p * (volume - 1))
 
 
-def test_stress_derivative_energy_tangent_stress() -> None:
+@pytest.mark.parametrize("c2", [0.0, 3.0])
+def test_stress_derivative_energy_tangent_stress(c2: float) -> None:
     """Stress is the derivative of the energy and tangent that of the stress."""
     step = 1e-6
     for i in range(5):
         moved = np.zeros(5)
         moved[i] = step
-        slope = (energy(F + moved, P) - energy(F - moved, P)) / (2 * step)
-        assert stress(F, P)[:, i] == pytest.approx(slope, rel=1e-5, abs=1e-6)
-        slopes = (stress(F + moved, P) - stress(F - moved, P)) / (2 * step)
-        assert tangent(F, P)[..., i] == pytest.approx(slopes, rel=1e-5, abs=1e-5)
+        slope = (energy(F + moved, P, c2) - energy(F - moved, P, c2)) / (2 * step)
+        assert stress(F, P, c2)[:, i] == pytest.approx(slope, rel=1e-5, abs=1e-6)
+        slopes = (stress(F + moved, P, c2) - stress(F - moved, P, c2)) / (2 * step)
+        assert tangent(F, P, c2)[..., i] == pytest.approx(slopes, rel=1e-5, abs=1e-5)
 
 
 def test_no_stress_rest_young_s_modulus_three() -> None:
@@ -50,13 +51,12 @@ def test_no_stress_rest_young_s_modulus_three() -> None:
     assert stress(f, p)[3] / strain == pytest.approx(3.0, rel=1e-5)
 
 
-def test_uniaxial_compression_follows_exact_law() -> None:
-    """Uniaxial compression follows the exact law.
-
-    Nominal stress λ − λ⁻² for stretch λ (G = 1).
-    """
+@pytest.mark.parametrize("c2", [0.0, 3.0])
+def test_uniaxial_compression_follows_exact_law(c2: float) -> None:
+    """Nominal stress (λ − λ⁻²) (1 + 2 c₂ K), K = λ² + 2/λ − 3, for stretch λ (G = 1)."""
     stretch = 0.7
+    stiffened = 1 + 2 * c2 * (stretch**2 + 2 / stretch - 3)
     f = np.array([stretch**-0.5, 0, 0, stretch, stretch**-0.5])
-    p = np.asarray(f[0] ** 2 - 1)
-    assert stress(f, p)[0] == pytest.approx(0.0, abs=1e-14)
-    assert stress(f, p)[3] == pytest.approx(stretch - stretch**-2, rel=1e-13)
+    p = np.asarray(stiffened * f[0] ** 2 - 1)
+    assert stress(f, p, c2)[0] == pytest.approx(0.0, abs=1e-14)
+    assert stress(f, p, c2)[3] == pytest.approx(stiffened * (stretch - stretch**-2), rel=1e-13)

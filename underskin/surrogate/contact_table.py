@@ -1,8 +1,9 @@
 """The correction by finite strain to the exact linear layer's contact with a rigid frictionless sphere.
 
-A sphere of radius R is pressed with the force F into the bonded incompressible neo-Hookean layer. Each group of the
-file is a state of the material over α = a/h of the linear layer's frictionless contact at the same F, R, E, h, and
-x = L^(1/3), L = F/(R² E). The correction is the solved stress on the base less that of the linear contact.
+A sphere of radius R is pressed with the force F into the bonded incompressible layer. All is over α = a/h of the
+linear layer's frictionless contact at the same F, R, E, h, and x = L^(1/3), L = F/(R² E). The correction of the
+neo-Hookean layer is the solved stress on the base less that of the linear contact; that of Yeoh's layers, of energy
+(G/2)(K + c₂ K²), K = I₁ − 3, the solved stress less the neo-Hookean layer's.
 """
 
 from collections.abc import Mapping
@@ -18,7 +19,7 @@ from underskin.surrogate.sigma_table import tables_folder
 from underskin.units import Floats
 
 CONTACT_TABLE = "contact.h5"
-_STATE = "frictionless"
+_STATE, _YEOH = "frictionless", "yeoh"
 
 
 class ContactTable(Table):
@@ -32,6 +33,8 @@ class ContactTable(Table):
         Bound on the absolute error of the correction, in σ's scale.
     contact_radius, indentation, stiffness : ndarray, (a, L^(1/3))
         Over those of the linear layer at the same force.
+    second_over_first : ndarray, (c2,)
+        c₂ of Yeoh's layers.
     """
 
     schema = CONTACT_SCHEMA
@@ -46,6 +49,8 @@ class ContactTable(Table):
         coefficients = np.linalg.lstsq(x ** np.array([1.0, 2.0, 3.0]), self.indentation[:, 1:].T - 1, rcond=None)[0]
         self._softening = CubicSpline(self.axes[0], coefficients.T)
         self._over_radius = make_interp_spline(self.axes[2], state["correction"], k=3, axis=2)
+        self.second_over_first = data[f"{_YEOH}/second_over_first"]
+        self._yeoh_over_radius = make_interp_spline(self.axes[2], data[f"{_YEOH}/correction"], k=3, axis=3)
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -68,6 +73,10 @@ class ContactTable(Table):
         In σ's scale: T3 = −(3F/2πh²) · (linear contact + correction).
         """
         return np.asarray(self._over_radius(r_over_h))
+
+    def yeoh_profile_over(self, r_over_h: Floats) -> Floats:
+        """What each c₂ adds at these distances (radii,), the same way: (c2, a, L^(1/3), radii)."""
+        return np.asarray(self._yeoh_over_radius(r_over_h))
 
     def softening_coefficients(self, a_over_h: Floats) -> Floats:
         """p0, p1 and p2 (…, 3) of δ/δ_linear − 1 = x (p0 + p1 x + p2 x²) at the same force, x = L^(1/3).

@@ -26,7 +26,7 @@ from underskin.diagnosis.reporting.numbers import (
     parameter_index,
 )
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, declared_laws
+from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, even_laws
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
 from underskin.findings.formatting import in_digits, listed
 from underskin.mechanisms.unlisted.laws import UnlistedLaw
@@ -119,7 +119,6 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
     parts = list(parts)
     if probability > HIDES:
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
-        declared = declared_laws(problem.lines)
         answers = [set(answer.explanation.names) for answer in search.answers if answer.explanation is not None]
         for name in problem.lines.mechanisms.named:
             if name in explanation.names or {name, *explanation.names} in answers:
@@ -127,8 +126,12 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
             hidden = with_hidden_mechanism(problem, explanation, name, "d33")
             if hidden is None:
                 continue
-            # A law that declared facts imply has even odds; of others no answer holds more than what does not show
-            unseen = 1.0 if name in declared else odds * min(1.0, float(np.exp(SHOWS) / hidden.share.sum()))
+            # A law that is no guess has even odds; of others no answer holds more than what does not show
+            unseen = (
+                1.0
+                if name in even_laws((name, *explanation.names), problem.lines)
+                else odds * min(1.0, float(np.exp(SHOWS) / hidden.share.sum()))
+            )
             parts.append(hidden.times(unseen))
     mixture = NormalMixture.joined(parts)
     mixture = mixture.times(1 / float(mixture.share.sum()))

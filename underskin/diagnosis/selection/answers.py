@@ -28,7 +28,7 @@ from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.noise import DISCREPANCY, USUAL
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.priors import (
-    declared_laws,
+    even_laws,
     guess_count,
     log_prior_of,
     log_prior_of_discrepancy,
@@ -253,11 +253,10 @@ class Search:
         if lines.kind != "indentation":
             return []
         shown = {frozenset(fitted.names): (fitted, weight) for fitted, weight in named}
-        declared = declared_laws(lines)
         companions = []
         for fitted in self.explanations:
             names = frozenset(fitted.names)
-            smaller = [names - {name} for name in names - declared if names - {name} in shown]
+            smaller = [names - {name} for name in names - even_laws(names, lines) if names - {name} in shown]
             gains = [fitted.log_evidence > self._log_evidence[less] for less in smaller]
             if names not in shown and smaller and all(gains):
                 weights = [

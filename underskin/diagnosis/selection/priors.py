@@ -4,6 +4,7 @@ All sets of one size of the mechanisms that the campaign supports are equally pr
 """
 
 import math
+from collections.abc import Collection
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import NONE_OF_THESE
@@ -17,8 +18,8 @@ LARGEST = 4  # mechanisms in a set; four only where several kinds of recordings 
 UNSEEN_ODDS = 1.5  # odds of one more mechanism than shows, for its effect on d33; on the virtual rig about 1.4
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _LEAST_ON_CURVES = 5.0  # the same on curves, whose neighbouring samples may share errors outside the noise model
-_DECLARED_PRIOR = 0.5  # of a law that follows from declared facts
-_LEAST_OF_DECLARED = 3.0  # nats that such a law must bring to be named
+_EVEN_PRIOR = 0.5  # of a law that is no guess
+_LEAST_OF_EVEN = 3.0  # nats that such a law must bring to be named
 
 
 def least_evidence(explanation: Explanation) -> float:
@@ -27,39 +28,48 @@ def least_evidence(explanation: Explanation) -> float:
 
 
 def declared_laws(lines: Lines) -> frozenset[str]:
-    """The mechanisms that follow from declared facts: no guesses, with equal prior odds inside every hypothesis."""
-    named, even = lines.mechanisms.named, set[str]()
-    layered = named.get(LayeredContact.name)
-    if layered is not None and lines.kind in layered.kinds and lines.campaign.skin.thickness_mm is not None:
-        if not layered.parameters(lines.campaign, lines.kind):
-            even.add(layered.name)
-    if lines.kind == "frf" and MovingContactEdge.name in named:
-        even.add(MovingContactEdge.name)
-    return frozenset(even)
+    """The mechanisms without a free parameter that follow from declared facts."""
+    layered = lines.mechanisms.named.get(LayeredContact.name)
+    if layered is None or lines.kind not in layered.kinds or lines.campaign.skin.thickness_mm is None:
+        return frozenset()
+    return frozenset() if layered.parameters(lines.campaign, lines.kind) else frozenset({layered.name})
+
+
+def even_laws(names: Collection[str], lines: Lines) -> frozenset[str]:
+    """The mechanisms that are no guesses in a set of these names, with equal prior odds: those that follow from
+    declared facts, and in contact with the layer itself an edge that moves with the load, as it does unless held."""
+    named, edge = lines.mechanisms.named, MovingContactEdge
+    moves = LayeredContact.name in names and lines.kind in edge.kinds and edge.name in named
+    return declared_laws(lines) | (frozenset({edge.name}) if moves else frozenset())
+
+
+def _even_and_guesses(explanation: Explanation) -> tuple[int, int]:
+    """How many mechanisms have equal odds in this set, and how many of the set are guesses."""
+    even = even_laws(explanation.names, explanation.best.hypothesis.lines)
+    return len(even), len(set(explanation.names) - even)
 
 
 def guess_count(explanation: Explanation) -> int:
-    """Number of mechanisms of a set that do not follow from declared facts."""
-    return len(set(explanation.names) - declared_laws(explanation.best.hypothesis.lines))
+    """Number of mechanisms of a set that are guesses."""
+    return _even_and_guesses(explanation)[1]
 
 
 def log_prior_of(explanation: Explanation, supported: int) -> float:
     """Log prior of a set among the `supported` mechanisms of the campaign."""
-    declared = declared_laws(explanation.best.hypothesis.lines)
-    return log_prior(guess_count(explanation), supported - len(declared)) + len(declared) * math.log(_DECLARED_PRIOR)
+    even, guesses = _even_and_guesses(explanation)
+    return log_prior(guesses, supported - even) + even * math.log(_EVEN_PRIOR)
 
 
 def log_prior_of_discrepancy(explanation: Explanation, supported: int, laws: int = 0) -> float:
     """Log prior of an undescribed discrepancy on top of a set, which holds `laws` unlisted laws."""
-    declared = declared_laws(explanation.best.hypothesis.lines)
-    size = guess_count(explanation) - laws
-    return log_prior_beneath(size, supported - len(declared)) + len(declared) * math.log(_DECLARED_PRIOR)
+    even, guesses = _even_and_guesses(explanation)
+    return log_prior_beneath(guesses - laws, supported - even) + even * math.log(_EVEN_PRIOR)
 
 
 def must_gain(explanation: Explanation, name: str) -> float:
     """Evidence that a mechanism of a set must bring to be named in it [nats]."""
-    if name in declared_laws(explanation.best.hypothesis.lines):
-        return _LEAST_OF_DECLARED
+    if name in even_laws(explanation.names, explanation.best.hypothesis.lines):
+        return _LEAST_OF_EVEN
     return least_evidence(explanation)
 
 

@@ -29,6 +29,17 @@ _COEFFICIENT = Parameter(
     shown=5.0,
     reason="1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more",
 )
+_OF_CONTACT = Parameter(
+    name="second_over_first",
+    unit="-",
+    low=0.0,
+    high=7.0,
+    prior=HeavyTailed(0.0, 1.0),
+    scale="linear",
+    limit=0.0,
+    shown=1.0,
+    reason="c2 of the silicones of docs/mechanisms.md is 0.1 and, below 40 %, up to 0.6; the table ends at 7",
+)
 _EXPONENT = Parameter(
     name="stiffening_exponent",
     unit="-",
@@ -104,12 +115,14 @@ class StrainStiffening(Mechanism):
     plain = """The elastomer's modulus changes with its strain, and mostly grows, so at high loads the force rises more,
     and a contact grows less, than a constant modulus would have it."""
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
-    together. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain;
-    compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the strain itself); under
-    a sphere f = (1 + q c J)^(1/q) at ε multiplies the modulus of the neo-Hookean contact."""
+    together; or Yeoh's law, (G/2)(K + c2 K²), K = I1 − 3, in the solved contact: σ plus what tables/contact.h5 has for
+    c2 over the contact at E0; or both. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3,
+    λ = 1 − strain; compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the
+    strain itself); under a sphere f = (1 + q c J)^(1/q) at ε multiplies the modulus of the neo-Hookean contact."""
     assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
-    strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a
-    compression is neo-Hookean, as the base model is, and so is a sphere's contact at c = 0."""
+    strain, as s takes it: the a in it is Hertz' also where the contact is the layer's or sticks; c2's stress on the
+    base is that of a frictionless sphere on the incompressible layer. With c2 = c3 = 0 a compression is neo-Hookean, as
+    the base model is, and so is a sphere's contact at c = 0."""
     source = """Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
     Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
     stage = Stage.MATERIAL
@@ -121,7 +134,7 @@ class StrainStiffening(Mechanism):
         self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
         """The stiffening coefficient, or for curves the law's constants."""
-        return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
+        return {"frf": (_COEFFICIENT, _OF_CONTACT), "indentation": _SPHERE, "compression": _YEOH}[kind]
 
     def act(self, state: Contacts | Curve, values: Values) -> None:
         """Stiffen each contact by its own strain; a curve takes the law."""
@@ -130,6 +143,7 @@ class StrainStiffening(Mechanism):
             excess = values["stiffening"] * strain
             ratio, slope = _radius_ratio(excess.value)
             state.modulus = state.modulus * (1.0 + excess * chain(ratio, (slope, excess)))
+            state.second_over_first = values["second_over_first"]
         elif "stiffening_form" in values:
             state.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:

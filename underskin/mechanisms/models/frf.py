@@ -181,7 +181,7 @@ class FrfModels:
             needs_layer = contacts.layered or self._models[numbers[0]].needs_stiffness
             for subset, part in _split_by_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
                 layer = layer_of(part) if needs_layer else as_in_the_table(part)
-                structure = part.layered, *(x is None for x in (part.slip, part.work_of_adhesion, part.relaxed)), layer
+                structure = part.layered, *(x is None for x in part.optional), layer
                 groups.setdefault(structure, []).append((points[subset], part))
         return [
             (np.concatenate([points for points, _ in group]), Contacts.stacked([part for _, part in group], lengths))

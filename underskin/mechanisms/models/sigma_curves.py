@@ -8,9 +8,10 @@ changes the shape of the pressure or the layer,
 
 with the Hankel integral of the linear layer (underskin/physics/hankel_transform.py). The finite-strain term is table(a,
 L, e) − table(a, 0, e) in contact with a half space, and the correction of the contact table (tables/contact.h5) in
-contact with the layer itself. The transform of the pressure is p̂ = s p̂_sphere + (1 − s) p̂_punch, s the sphere's
-share of the load; on the half space p̂_sphere is Hertz', 3 (sin x − x cos x)/x³, and p̂_punch sin x/x, x = k a/h; on
-the layer both come from its own contact (contact_curves).
+contact with the layer itself. A layer that stiffens by Yeoh's law adds what the same table has for its c₂, in contact
+with a half space too, where the table's α is that of Hertz. The transform of the pressure is p̂ = s p̂_sphere + (1 − s)
+p̂_punch, s the sphere's share of the load; on the half space p̂_sphere is Hertz', 3 (sin x − x cos x)/x³, and p̂_punch
+sin x/x, x = k a/h; on the layer both come from its own contact (contact_curves).
 
 A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond
 its a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to
@@ -90,6 +91,12 @@ class OffsetSigma:
         return self._splines(*table.contact_axes, table.profile_over(self._radii))
 
     @cached_property
+    def yeoh_strain(self) -> list[TensorSpline]:
+        """What each c₂ of the contact table but 0 adds."""
+        table = load_contact()
+        return [self._splines(*table.contact_axes, profile) for profile in table.yeoh_profile_over(self._radii)[1:]]
+
+    @cached_property
     def wave_numbers(self) -> tuple[Floats, Floats]:
         """k [1/h] at which `linear_at` takes transforms, and their weights.
 
@@ -161,6 +168,7 @@ class SigmaOfContacts:
         self.rho = sensor_radius / contacts.thickness
         self._variables = [pressed.a_over_h, pressed.cbrt_load, self.rho]
         self._spline = sigma.hertz
+        self._second_over_first = contacts.second_over_first
         self._linear: Floats | None = None
         if layer is not None or not as_in_the_table(contacts):
             self._linear, further = _transforms(sigma.wave_numbers[0], contacts, pressed, self.rho.value, layer)
@@ -172,7 +180,12 @@ class SigmaOfContacts:
     def at(self, contact: Indices, offset: Differentiated) -> Differentiated:
         """σ (…, points) at these offsets e/h from these contacts (points,)."""
         a, x, rho, *further = self._variables
-        sigma = self._spline.at(self._within(a), x, log(rho), offset, chosen=contact, end=self._sigma.end)
+        at = (self._within(a), x, log(rho), offset)
+        sigma = self._spline.at(*at, chosen=contact, end=self._sigma.end)
+        if self._second_over_first is not None:
+            splines = self._sigma.yeoh_strain
+            for spline, share in zip(splines, _shares_of_nodes(self._second_over_first), strict=True):
+                sigma = sigma + share * spline.at(*at, chosen=contact, end=self._sigma.end)
         if self._linear is None:
             return sigma
         points = sigma.value.shape[:-1]
@@ -188,6 +201,18 @@ class SigmaOfContacts:
             return a_over_h
         value = np.where(beyond > 1.0, end * (1.5 - 0.5 * beyond**-2), a_over_h.value)
         return chain(value, (beyond**-3, a_over_h))
+
+
+def _shares_of_nodes(second_over_first: Differentiated) -> list[Differentiated]:
+    """Lagrange's polynomials in ln(1 + c₂) of the contact table's nodes but c₂ = 0, where nothing is added."""
+    nodes = np.log1p(load_contact().second_over_first)
+    at, slope = np.log1p(second_over_first.value), 1 / (1 + second_over_first.value)
+    shares = []
+    for number in range(1, len(nodes)):
+        others = np.delete(nodes, number)
+        polynomial = np.poly1d(others, r=True) / np.prod(nodes[number] - others)
+        shares.append(chain(polynomial(at), (polynomial.deriv()(at) * slope, second_over_first)))
+    return shares
 
 
 def layer_of(contacts: Contacts) -> Layer:
