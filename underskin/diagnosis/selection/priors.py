@@ -14,7 +14,7 @@ from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
 
 # "Nothing missing" includes all mechanisms that do not show, hence every other campaign.
 PRIORS = {"nothing_missing": 0.6, "one": 0.252, "two": 0.1, "three": 0.012, "four": 0.001, "none_of_these": 0.035}
-LARGEST = 4  # mechanisms in a set; four only where several kinds of recordings require them
+LARGEST = 4  # mechanisms in a set; four only with laws that are no guesses, or required by several kinds
 UNSEEN_ODDS = 1.5  # odds of one more mechanism than shows, for its effect on d33; on the virtual rig about 1.4
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _LEAST_ON_CURVES = 5.0  # the same on curves, whose neighbouring samples may share errors outside the noise model

@@ -1,7 +1,9 @@
 """Which sets of mechanisms are fitted; `answers` makes their probabilities.
 
-Nothing and every single are fitted. Sets of two and three grow from the best, one mechanism at a time; in any case all
-pairs are fitted of curves, and of laws of declared values, material, contact and increment: two may cancel. A fit that
+Nothing and every single are fitted. Sets of two and three guesses grow from the best, one mechanism at a time; in any
+case all pairs are fitted of curves, and of laws of declared values, material, contact and increment: two may cancel.
+So may the laws that are no guesses, contact with the layer itself and its moving edge: every single is fitted beside
+both. A fit that
 begins at one mechanism's best parameters may end where the other one does not show, since two laws that bend a curve
 alike can share that in many ways. So where the best set of curves leaves more than noise, their pairs are fitted again
 from starts over the parameters of both.
@@ -24,9 +26,11 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.fit import LEVEL, SMOOTH, Fitter
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
-from underskin.diagnosis.selection.priors import LARGEST, least_evidence
+from underskin.diagnosis.selection.priors import LARGEST, even_laws, least_evidence
 from underskin.mechanisms.base import Kind, Stage, Unsupported
 from underskin.mechanisms.laws.adhesion import Adhesion
+from underskin.mechanisms.laws.layered_contact import LayeredContact
+from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
 from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
@@ -52,8 +56,9 @@ def search(
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
         singles = [replace(request, nuisances=sets.explanations[frozenset()].point) for request in singles]
     sets.explain(singles)
-    sets.explain([Request(sets.ordered(names), never_pruned=True) for names in required_sets if len(names) > 1])
-    for size in range(2, (LARGEST if required_sets else _LARGEST_OF_ONE_KIND) + 1):
+    together = [names for names in (*required_sets, sets.contact) if len(names) > 1]
+    sets.explain([Request(sets.ordered(names), never_pruned=True) for names in together])
+    for size in range(2, (LARGEST if required_sets or sets.contact else _LARGEST_OF_ONE_KIND) + 1):
         sets.grow(size)
     return sets.search
 
@@ -83,6 +88,12 @@ class _Sets:
     def names(self) -> list[str]:
         """The mechanisms that the recordings support."""
         return [name for name in self.problem.lines.mechanisms.named if name not in self.unsupported]
+
+    @property
+    def contact(self) -> frozenset[str]:
+        """Contact with the layer itself and its moving edge, where the recordings support both; else empty."""
+        laws = frozenset({LayeredContact.name, MovingContactEdge.name})
+        return laws if laws <= even_laws(laws, self.problem.lines) and laws <= {*self.names} else frozenset()
 
     @property
     def search(self) -> Search:
@@ -130,6 +141,12 @@ class _Sets:
         ]
         if size == 2:
             requests += self._pairs([name for name in self.names if mechanisms[name].stage in _PAIRED])
+        if size == 3 and self.contact:
+            requests += [
+                Request(self.ordered(self.contact | {name}), self.explanations[self.contact])
+                for name in self.names
+                if name not in self.contact
+            ]
         self.explain(requests)
 
     def _pairs(self, names: Sequence[str]) -> list[Request]:
@@ -148,6 +165,8 @@ class _Sets:
         smaller = [fitted for fitted in ranked if len(fitted.names) == size - 1]
         if size == 2:
             return [fitted for fitted in smaller[:_PARENTS] if weight(fitted) > weight(ranked[0]) - _PARENT_WITHIN]
+        if size > _LARGEST_OF_ONE_KIND and not self.required:  # guesses, beside the laws that are none
+            smaller = [fitted for fitted in smaller if self.contact <= frozenset(fitted.names)]
         best = next(fitted for fitted in ranked if len(fitted.names) < size)
         required = [fitted for fitted in smaller if frozenset(fitted.names) in self.required][:1]
         return [fitted for fitted in smaller if fitted is best or fitted in required]
