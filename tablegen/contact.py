@@ -20,6 +20,7 @@ from scipy.sparse.linalg import SuperLU
 
 from tablegen.discretisation import Discretisation, Indices
 from tablegen.faces import shapes_along
+from tablegen.neo_hookean import NEO_HOOKEAN, Material
 from tablegen.newton import NonlinearLayer, State, factorise
 from underskin.errors import SolverError
 from underskin.units import Floats
@@ -27,7 +28,6 @@ from underskin.units import Floats
 _NEAR = 0.12  # of the contact radius, where the pressure at the edge is read
 _FITTED = 4
 _PENALTY = 1e3  # of the stiffness of an element's surface, G over its width
-_AUGMENTATION = 1e4  # of the shear modulus
 _SOLVES_PER_FACTORISATION = 4
 _TOLERANCE = 1e-7  # of the force, and of the gap; rounding's floor is 1e-8 under a force of 1e-9 G h²
 _MOST_ITERATIONS = 15
@@ -58,8 +58,8 @@ class _Tangent:
 class ContactLayer(NonlinearLayer):
     """A discretised layer with a contact on |r| < a of its surface; the mesh must have a line at r = a."""
 
-    def __init__(self, discretisation: Discretisation, a: float, c2: float = 0.0) -> None:
-        super().__init__(discretisation, c2)
+    def __init__(self, discretisation: Discretisation, a: float, material: Material = NEO_HOOKEAN) -> None:
+        super().__init__(discretisation, material)
         d = discretisation
         columns = np.unique(d.basis.mesh.p[0])
         edges = columns[columns <= a * (1 + 1e-12)]
@@ -124,7 +124,7 @@ class ContactLayer(NonlinearLayer):
     def _step(self, now: PressedState, radius: float, residual: Floats, gap: Floats) -> PressedState:
         """One Newton increment: that at fixed δ, and as much of the one per unit of δ as frees the edge of pressure."""
         tangent = self._tangent(now, radius)
-        volume = self._constraint(self._fields(now.state)[0])
+        volume = self._volume_defect(now.state)
         fixed, per_depth = self._solve(tangent, residual, volume, gap), self._per_depth(now, radius, tangent)
         rest = float(np.sum(self._edge_pressure * (now.multiplier + fixed[2])))
         depth = -rest / float(np.sum(self._edge_pressure * per_depth[2]))
@@ -134,7 +134,7 @@ class ContactLayer(NonlinearLayer):
 
     def _tangent(self, now: PressedState, radius: float) -> _Tangent:
         stiffness, constraint = self.element_matrices(now.state)
-        scaled = _AUGMENTATION * self._inverse_mass @ constraint
+        scaled = self._scaled(constraint)
         matrices = stiffness + np.swapaxes(constraint, 1, 2) @ scaled
         touch, _ = self._touch_gradient(now, radius)
         matrices[self._elements] += self._curvature(now, radius) + np.swapaxes(touch, 1, 2) @ self._scale @ touch
@@ -159,7 +159,8 @@ class ContactLayer(NonlinearLayer):
             du += step
             volume = volume + np.einsum("eln,en->el", tangent.constraint, step[d.numbers])
             gap = gap + np.einsum("eln,en->el", tangent.touch, step[d.numbers[self._elements]])
-            dp -= _AUGMENTATION * np.einsum("elm,em->el", self._inverse_mass, volume)
+            dp -= self._augmentation * np.einsum("elm,em->el", self._inverse_mass, volume)
+            volume = volume * (1 - self._augmentation * self._compliance)
             dm -= np.einsum("elm,em->el", self._scale, gap)
             residual = np.zeros(d.size)  # balanced by the first solve
         return du, dp, dm

@@ -20,7 +20,7 @@ from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tablegen.linear_contact import LinearContact, LinearSphere
 from tablegen.linear_layer import transmission
-from tablegen.neo_hookean import SHEAR_MODULUS, YOUNGS_MODULUS
+from tablegen.neo_hookean import NEO_HOOKEAN, SHEAR_MODULUS, Material
 from tablegen.newton import State
 from underskin.errors import SolverError
 from underskin.physics import hertz
@@ -50,6 +50,7 @@ class SphereSolution:
         Lowest over highest pressure in the contact.
     """
 
+    material: Material
     radius: float
     force: float
     contact_radius: float
@@ -64,8 +65,9 @@ class SphereSolution:
 
     @property
     def cbrt_load(self) -> float:
-        """L^(1/3)."""
-        return float(np.cbrt(hertz.load_parameter(self.force, self.radius, YOUNGS_MODULUS)))
+        """L^(1/3), with L (0.75/(1 − ν²))² in place of L, as of an incompressible layer."""
+        load = hertz.load_parameter(self.force, self.radius, self.material.youngs_modulus)
+        return float(np.cbrt(load * (0.75 / (1 - self.material.poisson_ratio**2)) ** 2))
 
     def over_linear(self) -> Floats:
         """Contact radius, indentation and stiffness over those of the linear contact, then the correction."""
@@ -78,7 +80,9 @@ class SphereSolution:
         return np.concatenate([ratios, self.correction])
 
 
-def solve_contact_column(a: float, cbrt_load: Floats, order: int, c2: float = 0.0) -> tuple[Floats, Floats, float]:
+def solve_contact_column(
+    a: float, cbrt_load: Floats, order: int, material: Material = NEO_HOOKEAN
+) -> tuple[Floats, Floats, float]:
     """Solve one column of the contact table.
 
     Parameters
@@ -89,8 +93,8 @@ def solve_contact_column(a: float, cbrt_load: Floats, order: int, c2: float = 0.
         x = L^(1/3), ascending from 0.
     order : int
         Order of the displacement elements.
-    c2 : float
-        Yeoh's second term over the first one; 0 is neo-Hookean.
+    material : Material
+        Of the layer; default: incompressible and neo-Hookean.
 
     Returns
     -------
@@ -107,7 +111,7 @@ def solve_contact_column(a: float, cbrt_load: Floats, order: int, c2: float = 0.
         Names the point where Newton's method did not converge.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
-        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order, c2))
+        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order, material))
     beyond = cbrt_load > spheres[-1].cbrt_load
     x = np.array([0.0, *(sphere.cbrt_load for sphere in spheres)])
     rows = [np.append(sphere.linear.alpha, sphere.over_linear()) for sphere in spheres]
@@ -117,15 +121,17 @@ def solve_contact_column(a: float, cbrt_load: Floats, order: int, c2: float = 0.
     return resampled[:, 0], resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
 
 
-def press_spheres(a: float, radii: Floats, rho: Floats, order: int, c2: float = 0.0) -> list[SphereSolution]:
+def press_spheres(
+    a: float, radii: Floats, rho: Floats, order: int, material: Material = NEO_HOOKEAN
+) -> list[SphereSolution]:
     """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
-    column = _Column(a, rho, order, c2)
+    column = _Column(a, rho, order, material)
     return [column.advance(float(radius)) for radius in radii]
 
 
-def _follow(a: float, targets: Floats, order: int, c2: float) -> Iterator[SphereSolution]:
+def _follow(a: float, targets: Floats, order: int, material: Material) -> Iterator[SphereSolution]:
     """Spheres whose x is near each target, the last one's at or beyond it, as far as the linear contact is known."""
-    column = _Column(a, np.zeros(0), order, c2)
+    column = _Column(a, np.zeros(0), order, material)
     reached, ratio = 0.0, 1.0 + a  # of the force over Hertz's for a: a first guess
     further = iter(targets)
     while reached < targets[-1]:
@@ -150,11 +156,11 @@ class BeyondLinearContactError(SolverError):
 class _Column:
     """The layer pressed up to one contact edge; knows the last sphere."""
 
-    def __init__(self, a: float, rho: Floats, order: int, c2: float) -> None:
-        self.layer = ContactLayer(discretise(contact_mesh(a), order), a, c2)
+    def __init__(self, a: float, rho: Floats, order: int, material: Material) -> None:
+        self.layer = ContactLayer(discretise(contact_mesh(a), order), a, material)
         self.base = BaseStress(self.layer.discretisation)
-        self.linear = LinearContact(np.minimum(self.base.points, PROFILE_END), rho)
-        self.a, self.rho = a, rho
+        self.linear = LinearContact(np.minimum(self.base.points, PROFILE_END), rho, material.poisson_ratio)
+        self.a, self.rho, self.material = a, rho, material
         self.now, self.strain = self.layer.untouched(), 0.0
 
     def advance(self, radius: float) -> SphereSolution:
@@ -198,6 +204,7 @@ class _Column:
             sigma = self.linear.sigma(linear.alpha) + disc_averages(correction, self.rho)
             increment = self._increment(gained / (3 * stiffness), contact_radius)
         return SphereSolution(
+            material=self.material,
             radius=radius,
             force=total,
             contact_radius=contact_radius,

@@ -1,11 +1,12 @@
 """The contact table: its axes, the sweep over materials and contact edges, the measured errors, and the file.
 
-The layer is neo-Hookean, or of Yeoh's law with a second term c₂ over the first one (`SECOND_OVER_FIRST`). A column of
-the sweep is one material contact edge with spheres up to the largest load (`tablegen.contact_column`). At each x =
-L^(1/3) a spline over the columns in α, a/h of the linear contact, leads to the table's nodes. At x = 0 the layer is
-linear, and at α = 0 the base bears a point force's stress at any strain (Saint-Venant): the correction is 0. Every
-column is solved with elements of order 5 and of order 4; the table holds the former, their difference is the
-discretisation error. The interpolation error is measured as in `tablegen.influence_table`, by leaving nodes out.
+The layer is neo-Hookean and incompressible, or of Yeoh's law with a second term c₂ over the first one
+(`SECOND_OVER_FIRST`), or compressible (`POISSON_RATIOS`). A column of the sweep is one material contact edge with
+spheres up to the largest load (`tablegen.contact_column`). At each x = L^(1/3) a spline over the columns in α, a/h of
+the linear contact, leads to the table's nodes. At x = 0 the layer is linear, and at α = 0 the base bears a point
+force's stress at any strain (Saint-Venant): the correction is 0. Every column is solved with elements of order 5 and of
+order 4; the table holds the former, their difference is the discretisation error. The interpolation error is measured
+as in `tablegen.influence_table`, by leaving nodes out.
 """
 
 import shutil
@@ -33,6 +34,7 @@ from tablegen import (
 from tablegen.contact_column import RADII, solve_contact_column
 from tablegen.contact_mesh import RIM
 from tablegen.left_out_nodes import left_out_errors
+from tablegen.neo_hookean import NEO_HOOKEAN, Material
 from tablegen.sweep import Arrays, run_pieces, sources_hash
 from underskin.physics import hankel_transform, hertz
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA, Dataset, data_hash, write_table
@@ -58,6 +60,7 @@ SOURCES = (
 _RATIOS = ("contact_radius", "indentation", "stiffness")
 
 SECOND_OVER_FIRST = np.array([0.0, 1.0, 3.0, 7.0])  # evenly in ln(1 + c₂), over which the effect bends little
+POISSON_RATIOS = np.array([0.3, 0.37, 0.44, 0.5])
 # a/h before pressing; at 2.637 h elements of order 4 do not converge at the largest load
 DEFAULT_EDGES = np.delete(3.05 * np.linspace(0.03, 1, 22) ** 1.5, 19)
 DEFAULT_AXES = 3.0 * np.linspace(0, 1, 33) ** 1.5, np.cbrt(0.15) * np.linspace(0, 1, 13)
@@ -68,43 +71,44 @@ def make_contact_table(
     axes: tuple[Floats, Floats] = DEFAULT_AXES,
     edges: Floats = DEFAULT_EDGES,
     scheduler: str | None = None,
-    second_over_first: Floats = SECOND_OVER_FIRST,
 ) -> str:
     """Solve, measure and write the table at `path`; returns its hash.
 
-    Resumes from what an interrupted run left in `path`.parts. `axes`: a/h and L^(1/3), both from 0;
-    `second_over_first`: Yeoh's c₂ of the layers, from 0, the neo-Hookean one. Raises SolverError that names the point
-    when a solve fails; the table is then not written.
+    Resumes from what an interrupted run left in `path`.parts. `axes`: a/h and L^(1/3), both from 0. Raises SolverError
+    that names the point when a solve fails; the table is then not written.
     """
     sources = sources_hash(SOURCES)
     parts = path.with_name(path.name + ".parts")
-    materials = second_over_first.tolist()
+    yeoh = [Material(second_over_first=c2) for c2 in SECOND_OVER_FIRST.tolist()]
+    compressible = [Material(poisson_ratio=nu) for nu in POISSON_RATIOS.tolist()]
     pieces = {
-        f"c2-{c2:g}-order{order}-{number:02d}": partial(solve_piece, float(a), axes[1], order, c2)
-        for c2 in materials
+        _piece(material, order, number): partial(solve_piece, float(a), axes[1], order, material)
+        for material in dict.fromkeys([*yeoh, *compressible])
         for order in (ORDER, ORDER - 1)
         for number, a in enumerate(edges)
     }
     name = data_hash({"edges": edges, "alpha": axes[0], "x": axes[1]})
     done = run_pieces(pieces, parts / f"{sources[:16]}-{name[:8]}", scheduler, "tablegen contact")
-    fine, coarse = (
-        np.stack(
-            [
-                _on_the_nodes(axes, [done[f"c2-{c2:g}-order{order}-{number:02d}"] for number in range(edges.size)])
-                for c2 in materials
-            ]
+
+    def solved(material: Material) -> tuple[Floats, Floats]:
+        """All quantities at the nodes (α, x, quantities), and their errors."""
+        fine, coarse = (
+            _on_the_nodes(axes, [done[_piece(material, order, number)] for number in range(edges.size)])
+            for order in (ORDER, ORDER - 1)
         )
-        for order in (ORDER, ORDER - 1)
-    )
-    errors = np.abs(fine - coarse) + np.stack([sum(left_out_errors(axes, values)) for values in fine])
+        return fine, np.abs(fine - coarse) + sum(left_out_errors(axes, fine))
+
+    second = Dataset(SECOND_OVER_FIRST, "c2 of Yeoh's energy (G/2)(K + c2 K^2), K = I1 - 3")
+    ratio = Dataset(POISSON_RATIOS, "Poisson's ratio")
     groups = {
-        "frictionless": _group(axes, fine[0], errors[0]),
-        "yeoh": _yeoh_group(axes, second_over_first, fine, errors),
+        "frictionless": _group(axes, *solved(NEO_HOOKEAN)),
+        "yeoh": _further_group(axes, "second_over_first", second, [solved(material) for material in yeoh], 0),
+        "compressible": _further_group(axes, "poisson_ratio", ratio, [solved(one) for one in compressible], -1),
     }
     about = {
         "quantity": "contact",
         "poisson_ratio": 0.5,
-        "material": "incompressible layer, neo-Hookean or Yeoh's, bonded to a rigid base; rigid frictionless sphere",
+        "material": "layer bonded to a rigid base, neo-Hookean, Yeoh's or compressible; rigid frictionless sphere",
         "mesh": f"Q{ORDER}/P{ORDER - 1}, rim at a + {RIM:g} h, graded to the contact's edge",
         "solver": "contact edge prescribed, indentation free; augmented Lagrangian for volume and contact, SuperLU",
         "force_balance_error": max(float(piece["force_error"]) for piece in done.values()),
@@ -116,9 +120,13 @@ def make_contact_table(
     return digest
 
 
-def solve_piece(a: float, cbrt_load: Floats, order: int, c2: float = 0.0) -> Arrays:
+def _piece(material: Material, order: int, number: int) -> str:
+    return f"c2-{material.second_over_first:g}-nu-{material.poisson_ratio:g}-order{order}-{number:02d}"
+
+
+def solve_piece(a: float, cbrt_load: Floats, order: int, material: Material = NEO_HOOKEAN) -> Arrays:
     """`solve_contact_column` as a dictionary of arrays, which can be sent to workers and stored."""
-    alpha, values, force_error = solve_contact_column(a, cbrt_load, order, c2)
+    alpha, values, force_error = solve_contact_column(a, cbrt_load, order, material)
     return {"alpha": alpha, "values": values, "force_error": np.array(force_error)}
 
 
@@ -158,25 +166,29 @@ def _group(axes: tuple[Floats, Floats], values: Floats, errors: Floats) -> dict[
     return group
 
 
-def _yeoh_group(
-    axes: tuple[Floats, Floats], second_over_first: Floats, values: Floats, errors: Floats
+def _further_group(
+    axes: tuple[Floats, Floats], name: str, axis: Dataset, solved: list[tuple[Floats, Floats]], reference: int
 ) -> dict[str, Dataset]:
-    """What c₂ adds: `values` and `errors` are (c₂, α, x, quantities), the neo-Hookean layer first."""
-    along = ("second_over_first", "a_over_h", "cbrt_load_parameter")
+    """What a property of the layer adds, over the `axis` of this name; `reference` is the neo-Hookean layer in it."""
+    along = (name, "a_over_h", "cbrt_load_parameter")
     group = {
         "a_over_h": Dataset(axes[0], "contact radius over thickness of the linear layer's contact, a/h"),
-        "cbrt_load_parameter": Dataset(axes[1], "cube root of L = F/(R^2 E)"),
+        "cbrt_load_parameter": Dataset(axes[1], "cube root of L = F/(R^2 E), times (0.75/(1 - nu^2))^(2/3)"),
         "r_over_h": Dataset(RADII, "distance from the contact's axis over thickness, r/h"),
-        "second_over_first": Dataset(second_over_first, "c2 of Yeoh's energy (G/2)(K + c2 K^2), K = I1 - 3"),
+        name: axis,
     }
-    both = errors + errors[0]
-    both[0] = 0.0  # nothing is added
+    values, errors = (np.stack(arrays) for arrays in zip(*solved, strict=True))
+    errors = errors + errors[reference]
+    errors[reference] = 0.0  # nothing is added
     count = len(_RATIOS)
-    for number, name in enumerate(_RATIOS):
-        ratio = values[..., number] / values[0, ..., number]
-        group[name] = Dataset(ratio, f"{name} over that of the neo-Hookean layer at the same force", along)
-        group[f"{name}_error"] = Dataset(both[..., number] / values[0, ..., number], f"absolute error of {name}", along)
-    meaning = "stress on the base less the neo-Hookean layer's, in sigma's scale: -T3 2 pi h^2/(3 F)"
-    group["correction"] = Dataset((values - values[0])[..., count:], meaning, (*along, "r_over_h"))
-    group["correction_error"] = Dataset(both[..., count:], "absolute error of correction", (*along, "r_over_h"))
+    ratios = values[..., :count] / values[reference, ..., :count]
+    for number, quantity in enumerate(_RATIOS):
+        meaning = f"{quantity} over that of the linear layer, over the same of the neo-Hookean incompressible layer"
+        group[quantity] = Dataset(ratios[..., number], meaning, along)
+        group[f"{quantity}_error"] = Dataset(
+            errors[..., number] / values[reference, ..., number], f"absolute error of {quantity}", along
+        )
+    meaning = "stress on the base less the linear contact's, less the same of the neo-Hookean incompressible layer"
+    group["correction"] = Dataset((values - values[reference])[..., count:], meaning, (*along, "r_over_h"))
+    group["correction_error"] = Dataset(errors[..., count:], "absolute error of correction", (*along, "r_over_h"))
     return group

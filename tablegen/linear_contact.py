@@ -1,6 +1,6 @@
-"""The exact linear contact of a frictionless sphere with the bonded incompressible layer: radius, depth, base stress.
+"""The exact linear contact of a frictionless sphere with the bonded layer: radius, depth, stress on the base.
 
-Lengths in thicknesses, forces in G h², E' = E/(1 − ν²) = 4 G. The pressure is that of
+Lengths in thicknesses, forces in G h², E' = E/(1 − ν²) = 2 G/(1 − ν). The pressure is that of
 `underskin.physics.contact_curves` under the same force, and the stress on the base its transform times the layer's
 transmission:
 s(r) = (1/3) ∫₀^∞ p̂(k; α) M(k) J0(kr) k dk.
@@ -15,9 +15,8 @@ from tablegen import linear_layer
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
+from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.units import Floats
-
-_PLANE_STRAIN = 4.0  # E'/G at ν = ½
 
 
 @dataclass(frozen=True)
@@ -32,21 +31,23 @@ class LinearSphere:
 class LinearContact:
     """Contacts with one layer, and their stress at fixed distances `r` from the axis and on centred discs `rho`."""
 
-    def __init__(self, r: Floats, rho: Floats) -> None:
+    def __init__(self, r: Floats, rho: Floats, poisson_ratio: float = INCOMPRESSIBLE) -> None:
+        layer, self._plane_strain = Layer(poisson_ratio), 2 / (1 - poisson_ratio)
         farthest = LARGEST_A_OVER_H + max(float(r.max(initial=0.0)), float(rho.max(initial=0.0)))
         k, weight = wave_numbers(farthest)
-        self._curves = CurveGrid(k).curves(Layer())
-        passed = self._curves.sphere_transform.value * (weight * k / 3 * linear_layer.transmission(k))
+        self._curves = CurveGrid(k).curves(layer)
+        transmission = linear_layer.transmission(k) if poisson_ratio == INCOMPRESSIBLE else layer.transmission(k).value
+        passed = self._curves.sphere_transform.value * (weight * k / 3 * transmission)
         interval = self._curves.interval
         self._profile = interval.coefficients(passed @ j0(np.multiply.outer(k, r)))
         self._sigma = interval.coefficients(passed @ disc_average(np.multiply.outer(k, rho)))
 
     def sphere(self, force: float, radius: float) -> LinearSphere:
         """The contact of a sphere of `radius` under `force`; NaN beyond a/h = 4."""
-        load = np.array([force * radius / _PLANE_STRAIN])
+        load = np.array([force * radius / self._plane_strain])
         rows = self._curves.at_load(load, np.zeros(1))
         alpha = float(rows.alpha.value[0])
-        stiffness = 2 * _PLANE_STRAIN * alpha * float(rows.stiffness.value[0])
+        stiffness = 2 * self._plane_strain * alpha * float(rows.stiffness.value[0])
         return LinearSphere(alpha, float(rows.depth.value[0]) / radius, stiffness)
 
     def profile(self, alpha: float) -> Floats:

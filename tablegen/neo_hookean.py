@@ -1,21 +1,43 @@
-"""The incompressible neo-Hookean solid, and Yeoh's with a second term, in axisymmetry, at all integration points.
+"""The neo-Hookean solid, and Yeoh's with a second term, in axisymmetry, at all integration points.
 
-Energy per undeformed volume W = (G/2)(K + c₂ K² − 2 ln J) − p (J − 1), K = I₁ − 3, with G = 1; neo-Hookean
-at c₂ = 0. The deformation gradient has the five components F = (F_rr, F_rz, F_zr, F_zz, F_θθ), the last axis of every
-array here; cof F = ∂J/∂F. Where J = 1 the term in ln J is only a shift of p by G, so that p = 0 at rest; but elements
-meet J = 1 on average only, and without that term modes that violate it inside an element lose their stiffness once the
-pressure exceeds about 1.5 G (found as a negative eigenvalue in the element under the centre of the contact). Source:
-Holzapfel, Nonlinear Solid Mechanics (2000), ch. 6; Auricchio et al., Comput. Methods Appl. Mech. Engrg. 194 (2005)
-1075, on that loss of stability.
+Energy per undeformed volume W = (G/2)(K + c₂ K² − 2 ln J) − p (J − 1), K = I₁ − 3, with G = 1; neo-Hookean at c₂ = 0.
+An incompressible solid has J = 1, another one p = −λ (J − 1). The deformation gradient has the five components F =
+(F_rr, F_rz, F_zr, F_zz, F_θθ), the last axis of every array here; cof F = ∂J/∂F. Where J = 1 the term in ln J is only
+a shift of p by G, so that p = 0 at rest; but elements meet J = 1 on average only, and without that term modes that
+violate it inside an element lose their stiffness once the pressure exceeds about 1.5 G (found as a negative
+eigenvalue in the element under the centre of the contact). Source: Holzapfel, Nonlinear Solid Mechanics (2000), ch.
+6; Auricchio et al., Comput. Methods Appl. Mech. Engrg. 194 (2005) 1075, on that loss of stability.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from underskin.units import Floats
 
+
+@dataclass(frozen=True)
+class Material:
+    """c₂ and ν; the shear modulus is 1."""
+
+    second_over_first: float = 0.0
+    poisson_ratio: float = 0.5
+
+    @property
+    def youngs_modulus(self) -> float:
+        """E over G."""
+        return 2 * (1 + self.poisson_ratio)
+
+    @property
+    def compliance(self) -> float:
+        """1/λ, times G; 0 of an incompressible solid."""
+        return (1 - 2 * self.poisson_ratio) / (2 * self.poisson_ratio)
+
+
+NEO_HOOKEAN = Material()
 IDENTITY = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
 SHEAR_MODULUS = 1.0
-YOUNGS_MODULUS = 3.0
+YOUNGS_MODULUS = NEO_HOOKEAN.youngs_modulus
 
 
 def cofactor(f: Floats) -> Floats:

@@ -4,6 +4,7 @@ Unknowns u and, in each element, p: ∫ P : ∇v = f(v) and ∫ ψ (J − 1) = 0
 direct solver pivot and fill; an augmented Lagrangian avoids it. The increment of the pressure is written
 dp = −κ M⁻¹ (c + C du), element by element, which leaves a symmetric matrix K + κ Cᵀ M⁻¹ C in the displacements alone.
 Each further solve with the same factors makes the constraint better by about κ; the result does not depend on κ.
+A compressible layer has ∫ ψ (J − 1 + p/λ) = 0, and κ = λ eliminates its pressures exactly.
 Source: Fortin & Glowinski, Augmented Lagrangian Methods (1983).
 """
 
@@ -14,7 +15,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from tablegen.discretisation import Discretisation
-from tablegen.neo_hookean import IDENTITY, cofactor, stress, tangent, volume_ratio
+from tablegen.neo_hookean import IDENTITY, NEO_HOOKEAN, Material, cofactor, stress, tangent, volume_ratio
 from underskin.errors import SolverError
 from underskin.units import Floats
 
@@ -33,10 +34,12 @@ class State:
 
 
 class NonlinearLayer:
-    """A discretised layer, neo-Hookean or with Yeoh's second term `c2`, and its deformation under nodal loads."""
+    """A discretised layer of a material, and its deformation under nodal loads."""
 
-    def __init__(self, discretisation: Discretisation, c2: float = 0.0) -> None:
-        self.discretisation, self.c2 = discretisation, c2
+    def __init__(self, discretisation: Discretisation, material: Material = NEO_HOOKEAN) -> None:
+        self.discretisation, self.c2, self._compliance = discretisation, material.second_over_first, material.compliance
+        # A compressible layer's pressures are eliminated exactly
+        self._augmentation = 1 / material.compliance if material.compliance else _AUGMENTATION
         d = discretisation
         elements, points = d.weight.shape
         self._flat_gradient = d.gradient.reshape(elements, points * 5, -1)
@@ -65,8 +68,8 @@ class NonlinearLayer:
         return self.discretisation.assemble_matrix(stiffness + np.swapaxes(c, 1, 2) @ self._scaled(c))
 
     def volume_change(self, state: State) -> float:
-        """The largest coefficient of J − 1, projected on the pressures of each element."""
-        constraint = self._constraint(self._fields(state)[0])
+        """The largest coefficient of J − 1 + p/λ, projected on the pressures of each element."""
+        constraint = self._volume_defect(state)
         return float(np.abs(np.einsum("elm,em->el", self._inverse_mass, constraint)).max())
 
     def linear_force(self, load: Floats) -> Floats:
@@ -108,21 +111,21 @@ class NonlinearLayer:
         residual = load - self.internal_force(state)
         du = np.zeros(d.size)
         dp = np.zeros_like(state.pressure)
-        defect = self._constraint(self._fields(state)[0])
+        defect = self._volume_defect(state)
         for _ in range(_SOLVES_PER_FACTORISATION):
             push = d.assemble_vector(np.einsum("eln,el->en", scaled, defect))
             step = np.zeros(d.size)
             step[d.free] = factors.solve((residual - push)[d.free])
             du += step
             change = np.einsum("eln,en->el", c, step[d.numbers])
-            dp -= _AUGMENTATION * np.einsum("elm,em->el", self._inverse_mass, defect + change)
-            defect = defect + change
+            dp -= self._augmentation * np.einsum("elm,em->el", self._inverse_mass, defect + change)
+            defect = (defect + change) * (1 - self._augmentation * self._compliance)
             residual = np.zeros(d.size)  # the momentum balance holds after the first solve
         return du, dp
 
     def _scaled(self, c: Floats) -> Floats:
         """κ M⁻¹ C."""
-        return _AUGMENTATION * self._inverse_mass @ c
+        return self._augmentation * self._inverse_mass @ c
 
     def _fields(self, state: State) -> tuple[Floats, Floats]:
         """F (elements, points, 5) and p (elements, points)."""
@@ -137,9 +140,10 @@ class NonlinearLayer:
         product = (weighted @ d.gradient).reshape(self._flat_gradient.shape)
         return np.swapaxes(self._flat_gradient, 1, 2) @ product
 
-    def _constraint(self, f: Floats) -> Floats:
-        d = self.discretisation
-        return (d.weight * (volume_ratio(f) - 1)) @ d.pressure
+    def _volume_defect(self, state: State) -> Floats:
+        """∫ ψ (J − 1 + p/λ), (elements, m)."""
+        d, (f, p) = self.discretisation, self._fields(state)
+        return (d.weight * (volume_ratio(f) - 1 + self._compliance * p)) @ d.pressure
 
     def _constraint_gradient(self, f: Floats) -> Floats:
         d = self.discretisation
