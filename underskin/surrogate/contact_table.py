@@ -1,9 +1,9 @@
 """The correction by finite strain to the exact linear layer's contact with a rigid frictionless sphere.
 
-A sphere of radius R is pressed with the force F into the bonded incompressible layer. All is over α = a/h of the
-linear layer's frictionless contact at the same F, R, E, h, and x = L^(1/3), L = F/(R² E). The correction of the
-neo-Hookean layer is the solved stress on the base less that of the linear contact; that of Yeoh's layers, of energy
-(G/2)(K + c₂ K²), K = I₁ − 3, the solved stress less the neo-Hookean layer's.
+A sphere of radius R is pressed with the force F into the bonded layer. All is over α = a/h of the linear layer's
+frictionless contact at the same F, R, E, ν, h, and x = L^(1/3), L = F/(R² E) · (0.75/(1 − ν²))². The correction of the
+incompressible neo-Hookean layer is the solved stress on the base less that of the linear contact. Over c₂ of Yeoh's
+energy, (G/2)(K + c₂ K²), K = I₁ − 3, and over ν the table holds what is added to that correction.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,8 @@ from underskin.surrogate.sigma_table import tables_folder
 from underskin.units import Floats
 
 CONTACT_TABLE = "contact.h5"
-_STATE, _YEOH = "frictionless", "yeoh"
+_STATE = "frictionless"
+_FURTHER = {"second_over_first": "yeoh", "poisson_ratio": "compressible"}  # the group of each further property
 
 
 class ContactTable(Table):
@@ -33,8 +34,6 @@ class ContactTable(Table):
         Bound on the absolute error of the correction, in σ's scale.
     contact_radius, indentation, stiffness : ndarray, (a, L^(1/3))
         Over those of the linear layer at the same force.
-    second_over_first : ndarray, (c2,)
-        c₂ of Yeoh's layers.
     """
 
     schema = CONTACT_SCHEMA
@@ -49,8 +48,13 @@ class ContactTable(Table):
         coefficients = np.linalg.lstsq(x ** np.array([1.0, 2.0, 3.0]), self.indentation[:, 1:].T - 1, rcond=None)[0]
         self._softening = CubicSpline(self.axes[0], coefficients.T)
         self._over_radius = make_interp_spline(self.axes[2], state["correction"], k=3, axis=2)
-        self.second_over_first = data[f"{_YEOH}/second_over_first"]
-        self._yeoh_over_radius = make_interp_spline(self.axes[2], data[f"{_YEOH}/correction"], k=3, axis=3)
+        self._further = {
+            name: (
+                data[f"{group}/{name}"],
+                make_interp_spline(self.axes[2], data[f"{group}/correction"], k=3, axis=3),
+            )
+            for name, group in _FURTHER.items()
+        }
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -74,9 +78,11 @@ class ContactTable(Table):
         """
         return np.asarray(self._over_radius(r_over_h))
 
-    def yeoh_profile_over(self, r_over_h: Floats) -> Floats:
-        """What each c₂ adds at these distances (radii,), the same way: (c2, a, L^(1/3), radii)."""
-        return np.asarray(self._yeoh_over_radius(r_over_h))
+    def further_profiles_over(self, name: str, r_over_h: Floats) -> tuple[Floats, Floats]:
+        """The nodes of a further property, `second_over_first` or `poisson_ratio`, and what is added at each of them at
+        these distances (radii,): (nodes, a, L^(1/3), radii)."""
+        nodes, over_radius = self._further[name]
+        return nodes, np.asarray(over_radius(r_over_h))
 
     def softening_coefficients(self, a_over_h: Floats) -> Floats:
         """p0, p1 and p2 (…, 3) of δ/δ_linear − 1 = x (p0 + p1 x + p2 x²) at the same force, x = L^(1/3).

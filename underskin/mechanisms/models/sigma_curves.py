@@ -8,10 +8,11 @@ changes the shape of the pressure or the layer,
 
 with the Hankel integral of the linear layer (underskin/physics/hankel_transform.py). The finite-strain term is table(a,
 L, e) − table(a, 0, e) in contact with a half space, and the correction of the contact table (tables/contact.h5) in
-contact with the layer itself. A layer that stiffens by Yeoh's law adds what the same table has for its c₂, in contact
-with a half space too, where the table's α is that of Hertz. The transform of the pressure is p̂ = s p̂_sphere + (1 − s)
-p̂_punch, s the sphere's share of the load; on the half space p̂_sphere is Hertz', 3 (sin x − x cos x)/x³, and p̂_punch
-sin x/x, x = k a/h; on the layer both come from its own contact (contact_curves).
+contact with the layer itself. To the latter a compressible layer adds what the same table has for its ν. A layer that
+stiffens by Yeoh's law adds what it has for its c₂, in contact with a half space too, with the α of Hertz. The transform
+of the pressure is p̂ = s p̂_sphere + (1 − s) p̂_punch, s the sphere's share of the load; on the half space p̂_sphere is
+Hertz', 3 (sin x − x cos x)/x³, and p̂_punch sin x/x, x = k a/h; on the layer both come from its own contact
+(contact_curves).
 
 A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond
 its a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to
@@ -20,6 +21,7 @@ a/h = 4.2); beyond the profile's end, r/h = 8, the stress is 0 (below 1e-6 of it
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -91,10 +93,24 @@ class OffsetSigma:
         return self._splines(*table.contact_axes, table.profile_over(self._radii))
 
     @cached_property
-    def yeoh_strain(self) -> list[TensorSpline]:
-        """What each c₂ of the contact table but 0 adds."""
+    def yeoh_strain(self) -> _Further:
+        """What c₂ of the contact table adds; in ln(1 + c₂) its effect bends little."""
+        nodes, splines = self._further("second_over_first")
+        return _Further(np.log1p(nodes), splines)
+
+    @cached_property
+    def compressible_strain(self) -> _Further:
+        """What ν adds in contact with the linear layer."""
+        return _Further(*self._further("poisson_ratio"))
+
+    def _further(self, name: str) -> tuple[Floats, dict[int, TensorSpline]]:
         table = load_contact()
-        return [self._splines(*table.contact_axes, profile) for profile in table.yeoh_profile_over(self._radii)[1:]]
+        nodes, profiles = table.further_profiles_over(name, self._radii)
+        return nodes, {
+            number: self._splines(*table.contact_axes, profile)
+            for number, profile in enumerate(profiles)
+            if profile.any()
+        }
 
     @cached_property
     def wave_numbers(self) -> tuple[Floats, Floats]:
@@ -149,6 +165,22 @@ def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_o
     return OffsetSigma(table, rt_over_h, stretch, largest_offset)
 
 
+@dataclass(frozen=True)
+class _Further:
+    """What a further property of the layer adds to σ: splines at nodes of a variable, by their numbers, between them
+    Lagrange's polynomials; at one node nothing is added."""
+
+    nodes: Floats
+    splines: dict[int, TensorSpline]
+
+    def shares(self, variable: Differentiated) -> Iterator[tuple[TensorSpline, Differentiated]]:
+        """The splines that add something, each with its share."""
+        for number, spline in self.splines.items():
+            others = np.delete(self.nodes, number)
+            polynomial = np.poly1d(others, r=True) / np.prod(self.nodes[number] - others)
+            yield spline, chain(polynomial(variable.value), (polynomial.deriv()(variable.value), variable))
+
+
 class SigmaOfContacts:
     """σ of all contacts at any offset from them.
 
@@ -168,7 +200,11 @@ class SigmaOfContacts:
         self.rho = sensor_radius / contacts.thickness
         self._variables = [pressed.a_over_h, pressed.cbrt_load, self.rho]
         self._spline = sigma.hertz
-        self._second_over_first = contacts.second_over_first
+        self._further: list[tuple[_Further, Differentiated]] = []
+        if contacts.second_over_first is not None:
+            self._further.append((sigma.yeoh_strain, log(1.0 + contacts.second_over_first)))
+        if layer is not None and not incompressible(contacts):
+            self._further.append((sigma.compressible_strain, contacts.poisson_ratio))
         self._linear: Floats | None = None
         if layer is not None or not as_in_the_table(contacts):
             self._linear, further = _transforms(sigma.wave_numbers[0], contacts, pressed, self.rho.value, layer)
@@ -182,9 +218,8 @@ class SigmaOfContacts:
         a, x, rho, *further = self._variables
         at = (self._within(a), x, log(rho), offset)
         sigma = self._spline.at(*at, chosen=contact, end=self._sigma.end)
-        if self._second_over_first is not None:
-            splines = self._sigma.yeoh_strain
-            for spline, share in zip(splines, _shares_of_nodes(self._second_over_first), strict=True):
+        for further, variable in self._further:
+            for spline, share in further.shares(variable):
                 sigma = sigma + share * spline.at(*at, chosen=contact, end=self._sigma.end)
         if self._linear is None:
             return sigma
@@ -203,29 +238,21 @@ class SigmaOfContacts:
         return chain(value, (beyond**-3, a_over_h))
 
 
-def _shares_of_nodes(second_over_first: Differentiated) -> list[Differentiated]:
-    """Lagrange's polynomials in ln(1 + c₂) of the contact table's nodes but c₂ = 0, where nothing is added."""
-    nodes = np.log1p(load_contact().second_over_first)
-    at, slope = np.log1p(second_over_first.value), 1 / (1 + second_over_first.value)
-    shares = []
-    for number in range(1, len(nodes)):
-        others = np.delete(nodes, number)
-        polynomial = np.poly1d(others, r=True) / np.prod(nodes[number] - others)
-        shares.append(chain(polynomial(at), (polynomial.deriv()(at) * slope, second_over_first)))
-    return shares
-
-
 def layer_of(contacts: Contacts) -> Layer:
     """The linear layer of the contacts."""
     slip = 0.0 if contacts.slip is None else float(contacts.slip.value.flat[0])
     return Layer(float(contacts.poisson_ratio.value.flat[0]), slip)
 
 
+def incompressible(contacts: Contacts) -> bool:
+    """Whether ν is 0.5 and no parameter."""
+    nu = contacts.poisson_ratio
+    return bool((nu.value == INCOMPRESSIBLE).all() and not nu.slopes.any())
+
+
 def as_in_the_table(contacts: Contacts) -> bool:
     """Whether contacts are those of the table: spheres without adhesion, on a bonded incompressible layer."""
-    nu = contacts.poisson_ratio
-    incompressible = (nu.value == INCOMPRESSIBLE).all() and not nu.slopes.any()
-    return contacts.work_of_adhesion is None and contacts.slip is None and bool(incompressible)
+    return contacts.work_of_adhesion is None and contacts.slip is None and incompressible(contacts)
 
 
 def _transforms(
