@@ -93,17 +93,17 @@ class OffsetSigma:
         return self._splines(*table.contact_axes, table.profile_over(self._radii))
 
     @cached_property
-    def yeoh_strain(self) -> _Further:
+    def yeoh_strain(self) -> _Added:
         """What c₂ of the contact table adds; in ln(1 + c₂) its effect bends little."""
-        nodes, splines = self._further("second_over_first")
-        return _Further(np.log1p(nodes), splines)
+        nodes, splines = self._added("second_over_first")
+        return _Added(np.log1p(nodes), splines)
 
     @cached_property
-    def compressible_strain(self) -> _Further:
+    def compressible_strain(self) -> _Added:
         """What ν adds in contact with the linear layer."""
-        return _Further(*self._further("poisson_ratio"))
+        return _Added(*self._added("poisson_ratio"))
 
-    def _further(self, name: str) -> tuple[Floats, dict[int, TensorSpline]]:
+    def _added(self, name: str) -> tuple[Floats, dict[int, TensorSpline]]:
         table = load_contact()
         nodes, profiles = table.further_profiles_over(name, self._radii)
         return nodes, {
@@ -166,8 +166,8 @@ def _cached_sigma(table: SigmaTable, rt_over_h: float, stretch: float, largest_o
 
 
 @dataclass(frozen=True)
-class _Further:
-    """What a further property of the layer adds to σ: splines at nodes of a variable, by their numbers, between them
+class _Added:
+    """What a property of the layer adds to σ: splines at nodes of a variable, by their numbers, between them
     Lagrange's polynomials; at one node nothing is added."""
 
     nodes: Floats
@@ -200,11 +200,11 @@ class SigmaOfContacts:
         self.rho = sensor_radius / contacts.thickness
         self._variables = [pressed.a_over_h, pressed.cbrt_load, self.rho]
         self._spline = sigma.hertz
-        self._further: list[tuple[_Further, Differentiated]] = []
+        self._added: list[tuple[_Added, Differentiated]] = []
         if contacts.second_over_first is not None:
-            self._further.append((sigma.yeoh_strain, log(1.0 + contacts.second_over_first)))
+            self._added.append((sigma.yeoh_strain, log(1.0 + contacts.second_over_first)))
         if layer is not None and not incompressible(contacts):
-            self._further.append((sigma.compressible_strain, contacts.poisson_ratio))
+            self._added.append((sigma.compressible_strain, contacts.poisson_ratio))
         self._linear: Floats | None = None
         if layer is not None or not as_in_the_table(contacts):
             self._linear, further = _transforms(sigma.wave_numbers[0], contacts, pressed, self.rho.value, layer)
@@ -218,8 +218,8 @@ class SigmaOfContacts:
         a, x, rho, *further = self._variables
         at = (self._within(a), x, log(rho), offset)
         sigma = self._spline.at(*at, chosen=contact, end=self._sigma.end)
-        for further, variable in self._further:
-            for spline, share in further.shares(variable):
+        for added, variable in self._added:
+            for spline, share in added.shares(variable):
                 sigma = sigma + share * spline.at(*at, chosen=contact, end=self._sigma.end)
         if self._linear is None:
             return sigma
