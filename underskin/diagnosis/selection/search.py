@@ -143,7 +143,7 @@ class _Sets:
             requests += self._pairs([name for name in self.names if mechanisms[name].stage in _PAIRED])
         if size == 3 and self.contact:
             requests += [
-                Request(self.ordered(self.contact | {name}), self.explanations[self.contact])
+                Request(self.ordered(self.contact | {name}), never_pruned=mechanisms[name].stage in _PAIRED)
                 for name in self.names
                 if name not in self.contact
             ]
