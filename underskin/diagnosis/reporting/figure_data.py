@@ -20,7 +20,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
 from underskin.diagnosis.inference.residuals import row_prediction
-from underskin.diagnosis.localisation import axis_values
+from underskin.diagnosis.localisation import MOST_LINES, axis_values
 from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.kinds import KINDS
@@ -168,9 +168,8 @@ def _thinned(way: Floats, corners: list[int]) -> Indices:
 
 
 MOST_RECORDINGS = 120
-_FEWEST_LINES, _MOST_LINES = 40, 160  # drawn of a recording
+_FEWEST_LINES = 40  # drawn of a recording
 _MOST_FRF_POINTS = 6000  # drawn of all recordings
-_PC_PER_C = 1e12
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,8 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
     misfits = [[_misfit_percent(lines.value[span], rows[span]) for span in lines.spans] for rows in predicted]
     deviation = _frf_deviation(problem, after, predicted[1])
     chosen = _worst([recording.sensor for recording in recordings], misfits[1])
-    most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, _MOST_LINES))
+    unit = KINDS["frf"].per_si
+    most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, MOST_LINES))
     shown = []
     for index in chosen:
         recording, span = recordings[index], lines.spans[index]
@@ -216,10 +216,10 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
                 preload_n=recording.preload_n,
                 count=span.stop - span.start,
                 frequency_hz=lines.frequency[rows],
-                measured=_PC_PER_C * lines.value[rows],
-                before=_PC_PER_C * predicted[0][rows],
-                after=_PC_PER_C * predicted[1][rows],
-                deviation=_PC_PER_C * deviation[:, rows],
+                measured=unit * lines.value[rows],
+                before=unit * predicted[0][rows],
+                after=unit * predicted[1][rows],
+                deviation=unit * deviation[:, rows],
                 misfit_before=misfits[0][index],
                 misfit_after=misfits[1][index],
             )
