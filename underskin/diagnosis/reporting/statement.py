@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
+from underskin.diagnosis.data.names import EXPLAINED, MOST_NAMED, NAMED, NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.entries import shape_clause
 from underskin.diagnosis.reporting.facts import Facts
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
-from underskin.diagnosis.reporting.numbers import NAMED, SDS_OF_95
+from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer, remainder
+from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
 from underskin.findings.codes import FindingCode
 from underskin.findings.english import lacking
@@ -36,12 +37,10 @@ from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.readers.calendar_times import time_zone
 from underskin.units import Floats
 
-_FAR_ABOVE = 2.0  # times the noise: a held-out error that the first sentence mentions
 _INSUFFICIENT = "The recordings cannot tell anything: "
 _TO_CORRECT = "Nothing can be told before a correction: "
 _CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
 _SMALL = 5.0  # % of the response
-_STATED = 3  # mechanisms whose strengths are given
 
 
 def statement(facts: Facts) -> str:
@@ -203,7 +202,7 @@ def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
     """Name, value and interval of the first parameter of each of a few mechanisms: "contact resonance has a tip mass of
     6.02 g (5.9 to 6.1)"."""
     strengths = []
-    for mechanism in mechanisms[:_STATED]:
+    for mechanism in mechanisms[:MOST_NAMED]:
         for parameter in mechanism["parameters"][:1]:
             value, low, high = (in_digits(parameter[key], 3) for key in numbers.ENDS)
             unit = "" if parameter["unit"] == "-" else f" {parameter['unit']}"
@@ -217,7 +216,7 @@ def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
 def _reserve(fit: Mapping[str, Any]) -> str:
     """A reserve where held-out recordings are predicted far worse than the noise."""
     missed, floor = fit["after"]["heldout_rmse_percent"], fit["noise_floor_percent"]
-    if missed is None or floor is None or missed <= _FAR_ABOVE * floor:
+    if missed is None or floor is None or missed <= FAR_ABOVE * floor:
         return ""
     return f"but what was held out is missed by {in_digits(missed, 2)} %, where noise gives {in_digits(floor, 2)} %"
 
