@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, NAMED
+from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, NAMED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits, candidates, inferred, wider
 from underskin.diagnosis.selection.answers import Answer, Search
@@ -27,7 +27,6 @@ from underskin.units import Floats, Mask
 
 SEED = 20180206
 _SIMULATIONS = 2000
-_ENOUGH = 0.95
 _LEAST_GAIN = 0.01  # in the probability of deciding, by a further recording
 _RIVALS = 4
 _PROMISING = 0.3  # probability of deciding below which no recordings are proposed
@@ -227,7 +226,7 @@ def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: RigL
     chosen: list[int] = []
     best = outlook.deciding([])
     steps: list[tuple[int, ...]] = list(itertools.combinations_with_replacement(promising, 2))
-    while len(chosen) < limits.recordings and best < _ENOUGH:
+    while len(chosen) < limits.recordings and best < CERTAIN:
         mounted = {candidates[index].indenter_radius_mm for index in chosen}
         rated = []
         for step in steps:

@@ -12,10 +12,9 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 
-from underskin.diagnosis.data.names import EXPLAINED, MOST_NAMED, NAMED
+from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, MOST_NAMED, NAMED
 from underskin.diagnosis.inference.evidence import levels_covariance, profile_end
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import parameter_slices
@@ -27,12 +26,14 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion.many_sensors import ROBUST
+from underskin.inversion.mixed_model import mixture_quantile
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Floats
 
 SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard deviations
 ENDS = ("value", "low", "high")
+QUANTILES_OF_95 = (0.5, 0.025, 0.975)  # for these
 
 
 def rounded(value: float, digits: int = 4) -> float | None:
@@ -56,19 +57,9 @@ def in_sentence(parameter: Mapping[str, Any]) -> str:
     return f"{value} {parameter['unit']} (95 %: {low} to {high})"
 
 
-def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Floats) -> float:
-    """A quantile of a mixture of normal distributions (parts,), whose `shares` sum to 1."""
-
-    def beyond(at: float) -> float:
-        return float(shares @ ndtr((at - means) / deviations) - level)
-
-    far = 8 * deviations.max()
-    return float(brentq(beyond, means.min() - far, means.max() + far))
-
-
 def of_logarithms(shares: Floats, means: Floats, deviations: Floats) -> dict[str, float | None]:
     """The median and the 95 % interval of a quantity whose logarithm is a mixture of normal distributions (parts,)."""
-    return with_ends(*(np.exp(mixture_quantile(level, shares, means, deviations)) for level in (0.5, 0.025, 0.975)))
+    return with_ends(*(np.exp(mixture_quantile(shares, means, deviations, level)) for level in QUANTILES_OF_95))
 
 
 def with_hidden(
@@ -210,7 +201,6 @@ HIDES = 0.03  # probability of an answer below which mechanisms hidden under it 
 _TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
 _LEAST_NAMED = 3  # groups, however improbable
 _ALIKE = 0.5  # of the noise: answers that differ by less have the same predictions
-_ENOUGH_ALIKE = 0.95
 
 
 def law_shares(search: Search) -> list[tuple[Explanation, float]]:
@@ -288,7 +278,7 @@ def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict
             total += answer.probability
             furthest = max(furthest, percent)
             rivals.append(list(answer.names))
-    if total < _ENOUGH_ALIKE or not rivals:
+    if total < CERTAIN or not rivals:
         return None
     return {"probability": round(total, 3), "rivals": rivals, "differ_percent": rounded(furthest, 2)}
 

@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, MOST_NAMED, NAMED, NOTHING_MISSING, SIMPLEST, in_words
+from underskin.diagnosis.data.names import (
+    EXPLAINED,
+    MOST_NAMED,
+    MOST_QUOTED,
+    NAMED,
+    NOTHING_MISSING,
+    SIMPLEST,
+    in_words,
+)
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.entries import shape_clause
 from underskin.diagnosis.reporting.facts import Facts
@@ -293,7 +301,6 @@ _RESERVES = (
     *(FindingCode.TIP_SHAPE, FindingCode.THICKNESS_UNKNOWN, FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER),
     *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.UNUSUAL_SCATTER),
 )
-_MOST = 2  # findings that are quoted; the others are counted
 
 
 def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCode]) -> list[str]:
@@ -301,10 +308,10 @@ def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCo
         (finding for finding in findings if finding["code"] in decisive),
         key=lambda finding: decisive.index(FindingCode(finding["code"])),
     )
-    further = Counter(finding["code"].replace("_", " ") for finding in chosen[_MOST:])
+    further = Counter(finding["code"].replace("_", " ") for finding in chosen[MOST_QUOTED:])
     counted = [f"{count} of {code}" for code, count in further.items()]
     more = [f"further findings: {', '.join(counted)}"] if counted else []
-    return [*map(_quoted, chosen[:_MOST]), *more]
+    return [*map(_quoted, chosen[:MOST_QUOTED]), *more]
 
 
 def _quoted(finding: Mapping[str, str]) -> str:

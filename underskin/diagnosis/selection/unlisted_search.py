@@ -324,7 +324,6 @@ def _turning_sample(displacement: Floats) -> int:
     return int(np.flatnonzero(displacement >= displacement.max() - _HOLD * np.ptp(displacement))[-1])
 
 
-_BASE_SETS = 1  # most probable sets of mechanisms on top of which laws are tried, besides the null hypothesis
 _MOST_FITTED = 8  # laws
 _MARGIN_SHARE = 0.35  # of the best law's gain: laws whose scores are within that of the best one are fitted too
 _PAIRED_LAWS = 2  # laws that are fitted with every mechanism; on curves laws that are fitted without mechanisms
@@ -400,18 +399,13 @@ def _screening(problem: FittingProblem, null: Explanation, best: Explanation) ->
 
 
 def _base_explanations(search: Search, null: Explanation, ranked: Sequence[Explanation]) -> list[Explanation]:
-    """The explanations on top of which laws are tried."""
-    chosen = {null.names: null}
-    named = [explanation for explanation in ranked if explanation.names][:_BASE_SETS]
+    """The explanations on top of which laws are tried: the null hypothesis, the most probable set of mechanisms, and
+    this one less each of them."""
+    best = next((explanation for explanation in ranked if explanation.names), null)
     by_names = {frozenset(explanation.names): explanation for explanation in search.explanations}
-    for explanation in named:
-        chosen[explanation.names] = explanation
-    for explanation in named[:1]:
-        for name in explanation.names:
-            smaller = by_names.get(frozenset(explanation.names) - {name})
-            if smaller is not None:
-                chosen[smaller.names] = smaller
-    return list(chosen.values())
+    smaller = [by_names.get(frozenset(best.names) - {name}) for name in best.names]
+    chosen = [null, best, *(explanation for explanation in smaller if explanation is not None)]
+    return list({explanation.names: explanation for explanation in chosen}.values())
 
 
 def _best_of_combinations(scores: Sequence[Score]) -> list[Score]:

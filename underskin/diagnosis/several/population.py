@@ -26,8 +26,9 @@ from underskin.diagnosis.inference.fit import Scatter
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import curvature_of_prior, parameter_slices
 from underskin.diagnosis.noise import Plateau
-from underskin.diagnosis.reporting.numbers import mixture_quantile
+from underskin.diagnosis.reporting.numbers import QUANTILES_OF_95
 from underskin.diagnosis.several.histories import CampaignFits
+from underskin.inversion.mixed_model import mixture_quantile
 from underskin.mechanisms.models import composition
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.registry import CATALOGUE
@@ -84,7 +85,7 @@ QUANTITIES = (
     Quantity(D33, "d33", "pC/N", 1.5, 1.5, 0.4, Spread(0.03, 2.0)),
 )
 DEPARTURES = tuple(quantity.departure for quantity in QUANTITIES)
-ERRORS = DEPARTURES[:2]
+ERRORS = tuple(departure for departure in DEPARTURES if departure != D33)
 FAR_SDS = 2.0  # deviations from the batch beyond which a regular fit is no approximation, and other values are tried
 
 
@@ -213,11 +214,8 @@ class _Fleet:
                     centres.append(np.array([at[nodes] for at, _ in by_skin]))  # (skins, spreads, quantities)
                     deviations.append(np.array([sd[nodes] for _, sd in by_skin]))
         weight = np.concatenate(weights) / sum(part.sum() for part in weights)
-        skins = list(zip(np.concatenate(centres, axis=1), np.concatenate(deviations, axis=1), strict=True))
-        of_skins = [
-            [[mixture_quantile(level, weight, *column) for column in zip(at.T, sd.T, strict=True)] for at, sd in skins]
-            for level in (0.5, 0.025, 0.975)
-        ]
+        centre, deviation = (np.concatenate(parts, axis=1).swapaxes(1, 2) for parts in (centres, deviations))
+        of_skins = [mixture_quantile(weight, centre, deviation, level) for level in QUANTILES_OF_95]
         joint = {
             tuple(skin_states[state].departure for skin_states, state in zip(self.skins, states, strict=True)): of_set
             for states, of_set in zip(log_weights, share.sum(axis=(1, 2)).tolist(), strict=True)
