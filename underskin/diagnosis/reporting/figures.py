@@ -18,7 +18,6 @@ from underskin.diagnosis.data.names import SIMPLEST, quantity_in_words
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.reporting.facts import DiagnosisResult, Facts
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned, shown_curves, shown_frfs
-from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.page_styles import BOUND, LINE_COLOURS
 from underskin.diagnosis.reporting.recording_figures import (
     AFTER,
@@ -36,6 +35,7 @@ from underskin.diagnosis.reporting.recording_figures import (
 )
 from underskin.findings.formatting import capital, in_percent
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Complexes, Floats, readable_unit
 

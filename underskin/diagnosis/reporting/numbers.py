@@ -12,7 +12,6 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, MOST_NAMED, NAMED
 from underskin.diagnosis.inference.evidence import levels_covariance, profile_end
@@ -26,12 +25,11 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion.many_sensors import ROBUST
-from underskin.inversion.mixed_model import mixture_quantile
+from underskin.inversion.mixed_model import SDS_OF_95, mixture_quantile
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Floats
 
-SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard deviations
 ENDS = ("value", "low", "high")
 QUANTILES_OF_95 = (0.5, 0.025, 0.975)  # for these
 

@@ -21,7 +21,7 @@ from plotly.subplots import make_subplots
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.reporting.figure_data import SMALLEST, Mark, ShownCurve, ShownFrf
 from underskin.diagnosis.reporting.kinds import KindTraits
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, multiple_of, spans
+from underskin.diagnosis.reporting.numbers import multiple_of, spans
 from underskin.diagnosis.reporting.page_styles import (
     LEAST_PHASE,
     PAPER,
@@ -32,6 +32,7 @@ from underskin.diagnosis.reporting.page_styles import (
     is_logarithmic,
     with_minus,
 )
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.parameter import Parameter
 from underskin.units import Floats, readable_unit
 

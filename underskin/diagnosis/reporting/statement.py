@@ -24,7 +24,6 @@ from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.entries import shape_clause
 from underskin.diagnosis.reporting.facts import Facts
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
-from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
@@ -33,6 +32,7 @@ from underskin.findings.codes import FindingCode
 from underskin.findings.english import lacking
 from underskin.findings.formatting import clause, in_digits, in_percent, of_clauses, small
 from underskin.findings.lacking import Lack, Lacking
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.registry import CATALOGUE

@@ -14,7 +14,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, MOST_NAMED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.reporting.d33 import StatedD33
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
+from underskin.diagnosis.reporting.numbers import rounded
 from underskin.diagnosis.reporting.report import ALTERNATIVES, LEAST_PROBABILITY, SCHEMA, Reported
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
 from underskin.diagnosis.several.population import D33, REGULAR, STATED, Populations
@@ -31,6 +31,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_percent, listed, of_clauses
 from underskin.inversion.array_course import FEWEST_DATES
 from underskin.inversion.array_history import TWO_DATES, array_change_in_words
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.units import Floats
 
 _LEAST_LISTED = 0.1  # probability of a listed quantity in which a skin may depart
