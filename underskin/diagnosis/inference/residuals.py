@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import qmc
 
+from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import (
     FLAT,
     level_integrals,
@@ -49,8 +50,12 @@ class Residuals:
 
 def row_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
     """The explanation's prediction on all rows."""
-    value: Array = explanation.best.prediction.value
-    return value if len(value) == len(problem.lines.value) else value[problem.lines.recording]
+    return on_rows(problem.lines, explanation.best.prediction.value)
+
+
+def on_rows(lines: Lines, column: Array) -> Array:
+    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
+    return column if len(column) == len(lines.value) else column[lines.recording]
 
 
 def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[Array, Floats]:

@@ -19,7 +19,7 @@ from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recor
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
-from underskin.diagnosis.inference.residuals import row_prediction
+from underskin.diagnosis.inference.residuals import on_rows, row_prediction
 from underskin.diagnosis.localisation import MOST_LINES, axis_values
 from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
@@ -240,15 +240,10 @@ def _frf_deviation(problem: FittingProblem, explanation: Explanation, predicted:
     pick-up, gain and position of the recording."""
     lines, best = problem.lines, explanation.best
     levels = best.levels
-    of_line = (levels.level * lines.deviation) ** 2 + _of_rows(lines, best.pickup_variance)
+    of_line = (levels.level * lines.deviation) ** 2 + on_rows(lines, best.pickup_variance)
     position_variance = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
     relative = levels.gain**2 + position_variance + 0.5 * levels.position**4 * problem.curvature.square
     return np.sqrt(of_line + relative[lines.recording] * np.array([predicted.real, predicted.imag]) ** 2)
-
-
-def _of_rows(lines: Lines, column: Floats) -> Floats:
-    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
-    return column if len(column) == len(lines.value) else column[lines.recording]
 
 
 def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
@@ -422,7 +417,7 @@ class Thinned:
             explanation.best.hypothesis.lines.recording
         ]
         variance += levels.position**2 * squared_slopes * np.abs(prediction.value) ** 2
-        return _of_rows(self.lines, variance + explanation.best.pickup_variance)
+        return on_rows(self.lines, variance + explanation.best.pickup_variance)
 
     def _mean(self, column: Floats) -> Floats:
         return np.bincount(self._point, self._weight * column) / self._total
