@@ -15,7 +15,6 @@ import numpy as np
 
 from underskin.units import Floats
 
-INFORMATIVE = 0.8  # of a prior's standard deviation: a posterior that is wider is not informative
 _INFORMS = 0.2  # of a prior's precision: the least that informative recordings add
 
 

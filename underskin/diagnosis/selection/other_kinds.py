@@ -20,7 +20,7 @@ from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.dataset import Lines, curve_lines
 from underskin.diagnosis.inference.evidence import LEAST_EIGENVALUE, NEGLIGIBLE_NATS, TRADING_CORRELATION, parts
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.gaussian import INFORMATIVE, Gaussian, moments
+from underskin.diagnosis.inference.gaussian import Gaussian, moments
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence, log_prior
 from underskin.mechanisms.base import Kind, Mechanism, Unsupported, Values
@@ -282,6 +282,7 @@ def _unit_slope(parameter: Parameter, fit: Floats, index: int, count: int) -> Fl
     return slopes
 
 
+_INFORMATIVE = 0.8  # of a prior's standard deviation: a posterior that is wider is not informative
 _MOST_SETS = 3  # of a kind of curves
 
 # A prior as a normal one: mean, variance, whether it is flat (then the variance is that of a normal one of the same
@@ -488,7 +489,7 @@ def _likelihood(posterior: CurvePosterior, matrix: Floats, offset: Floats, prior
     centre, variance, flat, log_height_ratio = (np.array(column) for column in zip(*priors, strict=True))
     flat = flat.astype(bool)
     widest = np.where(flat, variance * (2 * np.pi / 12), variance)  # between bounds: a uniform distribution's
-    informative = matrix.any(axis=1) & (np.diag(posterior.covariance) < INFORMATIVE**2 * widest)
+    informative = matrix.any(axis=1) & (np.diag(posterior.covariance) < _INFORMATIVE**2 * widest)
     if not informative.any():
         return Gaussian(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), posterior.log_weight)
     posterior_precision = _inverse(posterior.covariance[np.ix_(informative, informative)])

@@ -35,6 +35,7 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats
 
+_NEGLIGIBLE = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals
 _P_ANY_DEPARTS = 0.5  # prior probability that any skin of a fleet departs
 _MOST_SETS = 200  # with equally many departing skins
 STATED = 0.5  # least probability of a stated departure, and of a stated error of the values declared for all skins
@@ -205,7 +206,7 @@ class _Fleet:
         weights, mean, spread, centres, deviations = [], [], [], [], []
         for states, of_batches in zip(log_weights, share, strict=True):
             for batch, of_spreads in zip(self.batches, of_batches, strict=True):
-                nodes = np.flatnonzero(of_spreads > np.exp(-NEGLIGIBLE_NATS))
+                nodes = np.flatnonzero(of_spreads > _NEGLIGIBLE)
                 if len(nodes):
                     weights.append(of_spreads[nodes])
                     spread.append(self.spreads[nodes])
