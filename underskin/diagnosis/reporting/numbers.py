@@ -57,7 +57,7 @@ def in_sentence(parameter: Mapping[str, Any]) -> str:
 
 def of_logarithms(shares: Floats, means: Floats, deviations: Floats) -> dict[str, float | None]:
     """The median and the 95 % interval of a quantity whose logarithm is a mixture of normal distributions (parts,)."""
-    return with_ends(*(np.exp(mixture_quantile(shares, means, deviations, level)) for level in QUANTILES_OF_95))
+    return with_ends(*(float(np.exp(mixture_quantile(shares, means, deviations, level))) for level in QUANTILES_OF_95))
 
 
 def with_hidden(
