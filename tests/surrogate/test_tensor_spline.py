@@ -2,6 +2,8 @@
 
 import itertools
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -69,3 +71,24 @@ def test_table_answers_point_answers_column() -> None:
         if found is not None:
             assert found[0] == pytest.approx(columns.sigma[row], rel=1e-13)
             assert found[1] == columns.rel_error[row]
+
+
+_ONE_BY_ONE = """
+import sys
+import numpy as np
+from underskin import load_table
+table = load_table()
+points = [np.random.default_rng(4).uniform(*axis[[0, -1]], 200) for axis in table.axes]
+points = [np.append(values, axis[[0, 1, -2, -1]]) for values, axis in zip(points, table.axes)]
+rows = list(zip(points[0], points[1], points[2] ** 3)) + [(99.0, 0.1, 0.1)]
+one_by_one = [table.sigma(*row) for row in rows]
+assert "numba" not in sys.modules, "a single value loads compiled code"
+compiled = table.sigma(*np.transpose(rows))
+np.testing.assert_array_equal([answer.sigma for answer in one_by_one], compiled.sigma)
+np.testing.assert_array_equal([answer.rel_error for answer in one_by_one], compiled.rel_error)
+"""
+
+
+def test_a_single_value_is_the_batch_s_bit_for_bit() -> None:
+    """Without compiled code, at nodes and ends of the table too."""
+    subprocess.run([sys.executable, "-c", _ONE_BY_ONE], check=True)

@@ -30,17 +30,17 @@ from underskin.diagnosis.inference.residuals import Residuals, residuals, row_pr
 from underskin.units import Array, Floats, Indices, Mask
 
 _ONE_SIGN = 0.8
-_MOST_LINES = 160  # distinct frequencies, beyond which they are binned
+MOST_LINES = 160  # distinct frequencies, beyond which they are binned
 _DRAWS, _SEED = 1000, 20180207
 
 
 def frequency_bins(frequency: Floats) -> tuple[Indices, Floats]:
     """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
     distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
-    if len(distinct) <= _MOST_LINES:
+    if len(distinct) <= MOST_LINES:
         return line, distinct
-    edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), _MOST_LINES + 1)
-    line = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, _MOST_LINES - 1)
+    edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), MOST_LINES + 1)
+    line = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, MOST_LINES - 1)
     used, line = np.unique(line, return_inverse=True)
     return line, np.sqrt(edges[used] * edges[used + 1])
 

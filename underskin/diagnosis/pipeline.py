@@ -25,6 +25,7 @@ from underskin.diagnosis.slips.inspection import inspect
 from underskin.diagnosis.slips.physical_limits import without_extremes
 from underskin.diagnosis.slips.unusable_curves import without_unusable
 from underskin.diagnosis.validation.cross_validation import (
+    FAR_ABOVE,
     above_noise,
     held_out,
     largest_floor_percent,
@@ -52,7 +53,6 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first one present gives the verdict
 _LEAST_RECORDINGS = 3  # FRFs: of two, d33 absorbs what is common, and the scatter of gain the difference
-_UNUSUAL_SCATTER = 2.0  # times the gain scatter of a poor rig
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -249,7 +249,7 @@ def _locate(
 def _scatter_findings(problem: FittingProblem, stated: Explanation) -> list[Finding]:
     """Of FRFs: a gain that scatters between recordings by far more than that of usual rigs."""
     gain, usual = stated.best.levels.gain, GAIN_RANGE[1]
-    if problem.kind != "frf" or gain <= _UNUSUAL_SCATTER * usual:
+    if problem.kind != "frf" or gain <= FAR_ABOVE * usual:
         return []
     return [Finding(Reason.UNUSUAL_SCATTER, "", "frf", {"percent": 100 * gain, "usual": 100 * usual})]
 

@@ -9,7 +9,8 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from underskin.diagnosis.reporting.page_styles import PAPER
-from underskin.figures.style import COLOURS, INK, MARKERS, SDS_OF_95, as_columns, label, styled
+from underskin.figures.style import COLOURS, INK, MARKERS, as_columns, label, styled
+from underskin.inversion.mixed_model import SDS_OF_95
 
 _HOVER_INTERVAL = "%{text}<br>d33 %{y:.5g} pC/N<br>%{customdata[0]:.5g} to %{customdata[1]:.5g} (95 %)<extra></extra>"
 

@@ -12,8 +12,9 @@ from plotly.colors import sample_colorscale
 
 from underskin.diagnosis.reporting.page_styles import with_minus
 from underskin.figures.array_discs import AROUND, SHARE, radius_of, ring, smallest_distance
-from underskin.figures.style import COLOURS, INK, SDS_OF_95, as_columns, label, styled
+from underskin.figures.style import COLOURS, INK, as_columns, label, styled
 from underskin.inversion.array_course import differ_from_others, differ_from_zero, threshold
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.units import Floats, Mask
 
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id

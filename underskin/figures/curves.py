@@ -7,7 +7,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, as_columns, label, line_style, styled
+from underskin.figures.style import COLOURS, MARKERS, as_columns, label, line_style, styled
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.units import Floats, readable_unit
 
 _MOST_SAMPLES = 400  # of one curve

@@ -16,7 +16,6 @@ from underskin.units import Floats
 COLOURS = LINE_COLOURS[:7]
 MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
 INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
-SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations, of every error bar
 _LONGEST_LABEL = 60
 _MARKS = 8  # at most, along a line whose colour is not unique
 _AXIS = {

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, chdtri, ndtr, ndtri
 
-from underskin.inversion.mixed_model import mixture_quantile
+from underskin.inversion.mixed_model import LEVEL, mixture_quantile
 from underskin.units import Floats, Mask
 
 BY_CHANCE = 0.05  # family-wise false-alarm probability
@@ -62,7 +62,6 @@ _NO_GAIN, _GAIN_SCALE = 0.25, 0.0125
 _NO_WALK, _WALK_SCALE = 0.6, 0.05
 _NODES = np.concatenate([[0.0], np.geomspace(1e-3, 0.5, 12)])
 _LEAST_DEVIATION = 1e-6  # relative: values without noise
-_LEVEL = 0.95
 _POLISHES = 60
 
 
@@ -159,7 +158,7 @@ def _summary(weights: Floats, mean: Floats, spread: Floats) -> Floats:
     """Mean, standard deviation, interval and p-value (5, series) of mixtures of normals (series, nodes)."""
     centre = (weights * mean).sum(axis=1)
     variance = (weights * (spread**2 + (mean - centre[:, None]) ** 2)).sum(axis=1)
-    low, high = (mixture_quantile(weights, mean, spread, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
+    low, high = (mixture_quantile(weights, mean, spread, q) for q in ((1 - LEVEL) / 2, (1 + LEVEL) / 2))
     below = (weights * ndtr(-mean / spread)).sum(axis=1)
     return np.array([centre, np.sqrt(variance), low, high, 2 * np.minimum(below, 1 - below)])
 

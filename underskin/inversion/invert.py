@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtrc, ndtri, stdtr
+from scipy.special import chdtrc, stdtr
 
 from underskin.errors import InvalidInput
 from underskin.findings import english
@@ -27,7 +27,8 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.findings.sentences import ImplausibleD33
 from underskin.inversion import mixed_model
-from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
+from underskin.inversion.many_sensors import ROBUST
+from underskin.inversion.mixed_model import SDS_OF_95, Estimate, LevelRows, MixedModel
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter
 from underskin.prediction import plausibility, pressed_skin
@@ -126,7 +127,7 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
     array = _typical(size, line)
     alive = is_alive(value, line)
     sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
-    spread = max(1.4826 * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
+    spread = max(ROBUST * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
     flags: dict[int, Flag] = {}
     for index in np.flatnonzero(np.isfinite(value)).tolist():
         outlying = alive.sum() > 3 and abs(size[index] - array) > _OUTLYING * spread
@@ -219,7 +220,7 @@ def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, po
     array = typical_size(d33)
     relative = _over_usual(sensor, d33, array)
     residual = relative - _common(sensor, condition, relative, float(np.median(relative)))
-    scatter = 1.4826 * float(np.median(np.abs(residual)))
+    scatter = ROBUST * float(np.median(np.abs(residual)))
     expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
     far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
     for index in np.unique(sensor[far]):
@@ -293,7 +294,6 @@ def _preloads(recorded: Sequence[FrfRecording]) -> list[Finding]:
 
 _LEAST_CHARGE = 1e-24  # least FRF of a measurement [C/N]
 _MOST_REASONS = 3  # quoted where no recording can be used
-_SDS_OF_95 = float(ndtri(0.975))
 
 
 class NoD33(InvalidInput):
@@ -365,7 +365,7 @@ class Inversion:
         if relative is None:
             return None
         off = abs(relative.value) * self.declared_percent / 100
-        half = _SDS_OF_95 * off
+        half = SDS_OF_95 * off
         low = relative.value - np.hypot(relative.value - relative.low, half)
         high = relative.value + np.hypot(relative.high - relative.value, half)
         return Estimate(relative.value, np.hypot(relative.uncertainty, off), low, high)

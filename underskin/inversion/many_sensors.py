@@ -8,7 +8,7 @@ from underskin.units import Floats
 
 MOST_NAMED = 12  # sensors that a figure draws and names one by one
 _MIDDLE = (0.05, 0.95)  # quantiles of the range
-_ROBUST = 1.4826  # standard deviation over median absolute deviation of a normal distribution
+ROBUST = 1.4826  # standard deviation over median absolute deviation of a normal distribution
 _APART = 4.5  # standard deviations about the median; by chance exceeded in 4 % of arrays of 13, 0.6 % of 60
 
 
@@ -31,7 +31,7 @@ def many_sensors(values: Floats, uncertainties: Floats) -> ManySensors:
     """
     median = float(np.median(values))
     distance = np.abs(values - median)
-    deviation = np.maximum(_ROBUST * np.median(distance), uncertainties)
+    deviation = np.maximum(ROBUST * np.median(distance), uncertainties)
     outliers = np.flatnonzero(distance > _APART * deviation)
     low, high = np.quantile(values, _MIDDLE)
     return ManySensors(

@@ -26,8 +26,8 @@ SPREADS = np.concatenate([[0.0], np.geomspace(2e-3, 1.5, 36)])
 POSITIONS = np.array([0.0, POSITION_RANGE[0], 0.1e-3, 0.15e-3, 0.2e-3, 0.25e-3, POSITION_RANGE[1]])  # [m]
 _GAIN_FACTOR = 2.0  # of the log-normal prior about USUAL_GAIN
 _NO_SPREAD, _SPREAD_SCALE = 0.6, 0.05
-_LEVEL = 0.95
-_HALF_WIDTH = float(ndtri((1 + _LEVEL) / 2))  # of its interval, in standard deviations of a normal distribution
+LEVEL = 0.95  # of intervals
+SDS_OF_95 = float(ndtri((1 + LEVEL) / 2))  # half the width of an interval, in sd of a normal distribution
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Estimate:
     def wider(self, relative: float) -> "Estimate":
         """The estimate with a further standard uncertainty, relative to the value."""
         further = relative * np.abs(self.value)
-        low, high = (np.hypot(side, _HALF_WIDTH * further) for side in (self.value - self.low, self.high - self.value))
+        low, high = (np.hypot(side, SDS_OF_95 * further) for side in (self.value - self.low, self.high - self.value))
         return Estimate(self.value, np.hypot(self.uncertainty, further), self.value - low, self.value + high)
 
     def d33_rows(self) -> list[list[float]]:
@@ -121,7 +121,7 @@ class ScatterPosterior:
             # An uncertain variance: the Student t whose variance has the same mean and spread.
             freedom = 4 + 2 * variance**2 / np.maximum(unsure, 1e-12 * variance**2)
             scale = np.sqrt(variance * (freedom - 2) / freedom + between)
-        half_width = stdtrit(freedom, (1 + _LEVEL) / 2) * scale
+        half_width = stdtrit(freedom, (1 + LEVEL) / 2) * scale
         return Estimate(value, np.sqrt(variance + between), value - half_width, value + half_width)
 
 
@@ -199,8 +199,8 @@ def _mixture(weights: Floats, means: Floats, deviations: Floats) -> Estimate:
     """Mean and central interval of a mixture of normals; its uncertainty is that of a normal with this interval."""
     relevant = weights > 1e-7 * weights.max()
     weight, mean, deviation = weights[relevant] / weights[relevant].sum(), means[relevant], deviations[relevant]
-    low, high = (mixture_quantile(weight, mean, deviation, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
-    uncertainty = (high - low) / (2 * _HALF_WIDTH)
+    low, high = (mixture_quantile(weight, mean, deviation, q) for q in ((1 - LEVEL) / 2, (1 + LEVEL) / 2))
+    uncertainty = (high - low) / (2 * SDS_OF_95)
     return Estimate(np.array(weight @ mean), np.array(uncertainty), low, high)
 
 
@@ -217,7 +217,7 @@ def mixture_quantile(weights: Floats, means: Floats, deviations: Floats, probabi
 def _scale_estimate(weights: Floats, nodes: Floats) -> Estimate:
     """Mean, deviation and central interval of a scatter over its nodes."""
     value = float(weights @ nodes)
-    low, high = np.interp([(1 - _LEVEL) / 2, (1 + _LEVEL) / 2], np.cumsum(weights) - weights / 2, nodes)
+    low, high = np.interp([(1 - LEVEL) / 2, (1 + LEVEL) / 2], np.cumsum(weights) - weights / 2, nodes)
     return Estimate(np.array(value), np.sqrt(weights @ (nodes - value) ** 2), np.asarray(low), np.asarray(high))
 
 

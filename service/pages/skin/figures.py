@@ -53,7 +53,7 @@ def _last(of_sensor: SensorHistory | None) -> dict[str, Any]:
     """The last value of a sensor that the latest campaign did not measure."""
     if of_sensor is None or not of_sensor.points:
         return {"reasons": "", "absent": "never measured with FRFs"}
-    from underskin.figures.style import SDS_OF_95  # with plotting code, which is slow to import
+    from underskin.inversion.mixed_model import SDS_OF_95  # with numerical code, which is slow to import
 
     point = of_sensor.points[-1]
     half = SDS_OF_95 * point.d33_uncertainty_pc_per_n

@@ -5,6 +5,11 @@ from collections.abc import Mapping, Sequence
 from underskin.mechanisms.base import Kind
 
 EXPLAINED = 0.8  # least probability of an answer that is stated without alternatives
+NAMED = 0.02  # least probability of a rival, or of a group of mechanisms, that is named
+RIVAL_SHARE = 0.1  # of the leader's probability: a rival with more cannot be told from it
+CERTAIN = 0.95  # probability from which on more recordings, or more rivals, change no conclusion
+MOST_QUOTED = 2  # with their numbers, in a sentence
+MOST_NAMED = 3  # of a kind, such as mechanisms, sensors or changes, in a sentence
 NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 SIMPLEST: Mapping[Kind, str] = {  # the name of the model without mechanisms, for each kind of recording
     "frf": "the paper's model",

@@ -35,8 +35,9 @@ _POLISHING_STEPS, _POLISHING_STEPS_OF_CURVES, _POLISHING_GAIN = 4, 12, 0.05
 _LEAST_COVARIANCE_CURVATURE = 0.3  # in the logarithms of noise levels: their priors are not wider
 _REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
 _LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
-_LEAST_EIGENVALUE = 1e-11  # of the correlations' information
-_FLAT = 1e-3  # standard deviations of the quadratic, at least, within a parameter's bounds: keeps H invertible
+NEGLIGIBLE_NATS = 12.0  # of log evidence behind the best: odds of 1 to 160,000, which no other set makes up for
+LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
+FLAT = 1e-3  # standard deviations of a quadratic, at least, within a parameter's bounds: keeps H invertible
 
 
 @dataclass(frozen=True)
@@ -162,9 +163,9 @@ def _definite(information: Floats) -> Floats:
     """The information with positive eigenvalues, which rounding may have made negative where it is nearly singular."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    if values[0] > _LEAST_EIGENVALUE:
+    if values[0] > LEAST_EIGENVALUE:
         return information
-    return np.asarray((vectors * np.maximum(values, _LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
+    return np.asarray((vectors * np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
 
 
 def level_integrals(fitter: Fitter, at: Evaluated) -> Floats:
@@ -192,7 +193,7 @@ def _equations(fitter: Fitter, at: Evaluated) -> tuple[Floats, Floats]:
     information, ascent = fitter.posterior_equations(at)
     owner = at.points.owner
     span, diagonal = (fitter.high - fitter.low)[owner], np.arange(fitter.low.shape[1])
-    information[:, diagonal, diagonal] += np.where(span > 0, _FLAT / np.where(span > 0, span, 1.0), 0.0) ** 2
+    information[:, diagonal, diagonal] += np.where(span > 0, FLAT / np.where(span > 0, span, 1.0), 0.0) ** 2
     return information, -ascent
 
 
@@ -283,7 +284,7 @@ def _held_points(held: Fitter, fit: Evidence, index: int, values: Floats) -> Poi
 
 
 _UNDETERMINED = 0.3  # standard deviation over the range, at least; a uniform distribution has 0.29
-_TRADING_CORRELATION = 0.9  # above which two parameters trade against each other
+TRADING_CORRELATION = 0.9  # above which two parameters trade against each other
 _CELLS = 5  # of the range, each with the parameter held at its middle
 
 
@@ -361,7 +362,7 @@ def _trading_index(evidence: Evidence, index: int) -> int | None:
             and isinstance(parameter.prior, Uniform)
             and parameter.scale == "linear"
         )
-        if between and correlations[row] > _TRADING_CORRELATION and deviations[row] > _UNDETERMINED * (high - low):
+        if between and correlations[row] > TRADING_CORRELATION and deviations[row] > _UNDETERMINED * (high - low):
             return other
     return None
 

@@ -17,7 +17,7 @@ from scipy.ndimage import minimum_filter
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence, laplace_at
-from underskin.diagnosis.inference.fit import POSITION, Fitter
+from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import (
     Curvature,
@@ -273,12 +273,12 @@ def with_scatter(hypotheses: Sequence[Hypothesis], points: Mapping[int, Points])
 
 def hardly_scatters(evidence: Evidence) -> bool:
     """Whether the position scatter is below the usual one: the added mechanism may explain the parent's scatter."""
-    return float(evidence.point.covariance[POSITION]) < POSITION_PRIOR.middle
+    return float(evidence.point.covariance[Scatter.POSITION]) < POSITION_PRIOR.middle
 
 
 def without_scatter(points: Points) -> Points:
     """The points of a hypothesis with position scatter, without that parameter."""
-    return replace(points, covariance=np.delete(points.covariance, POSITION, axis=1))
+    return replace(points, covariance=np.delete(points.covariance, Scatter.POSITION, axis=1))
 
 
 def groups(
@@ -295,7 +295,7 @@ _SCATTER_CERTAINTY = (
     0.999  # probability of position scatter, or of none, beyond which children are fitted as the parent
 )
 _LEAST_GAIN = 1.0  # in log posterior density over the parent
-_PRUNE_NATS = 30.0  # of log posterior density behind the best: the evidence is more than 10 nats behind
+PRUNE_NATS = 30.0  # of log posterior density behind the best: the evidence is more than 10 nats behind
 _LEAST_SCATTER = 3e-3  # relative effect of position scatter on a recording, below which it is not fitted
 
 
@@ -423,7 +423,7 @@ class FittingProblem:
         """The sets' explanations.
 
         None where the log posterior density gains less than `_LEAST_GAIN` over the parent's: the added mechanism is not
-        supported; and where a set is pruned, `_PRUNE_NATS` behind the others or the `best` cost so far. Evidences are
+        supported; and where a set is pruned, `PRUNE_NATS` behind the others or the `best` cost so far. Evidences are
         Laplace approximations. Raises Unsupported.
         """
         plain_hypotheses, scattered_hypotheses = (
@@ -534,7 +534,7 @@ def _fitted(
         never_pruned = [
             requests[number].never_pruned or len(requests[number].names) <= unpruned_size for number in members
         ]
-        margins = np.where(never_pruned, np.inf, _PRUNE_NATS)[points.owner]
+        margins = np.where(never_pruned, np.inf, PRUNE_NATS)[points.owner]
 
         def target(
             at: Evaluated, costs_to_beat: Floats = costs_to_beat, margins: Floats = margins, best: float = best

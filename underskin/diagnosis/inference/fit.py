@@ -8,6 +8,7 @@ the likelihood of fixed predictions, which need no model evaluation.
 from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import replace
+from enum import IntEnum
 from functools import cached_property
 from typing import Self
 
@@ -27,32 +28,38 @@ from underskin.diagnosis.inference.hypothesis import (
 )
 from underskin.diagnosis.inference.least_squares import LeastSquares, between_samples
 from underskin.diagnosis.inference.products import FrfProducts, Products, joined
-from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, SeveralLevels
+from underskin.diagnosis.noise import DISCREPANCY, GAIN_PRIOR, POSITION_PRIOR, START_GAIN, USUAL, SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModels
 from underskin.units import Floats, Indices, Mask
 
-GAIN, LEVEL, POSITION = 0, 1, 2  # indices of the covariance parameters, the last if there is positioning scatter
-SMOOTH = 2  # index of the smooth error of curves, which have no positioning scatter
 _FREE_SPREAD = 0.02  # above this sd of b, e^b is linearised at the most probable b, not at 0
-_NUMBERS_AT_ONCE = 500_000
-_PREDICTED_AT_ONCE = 1_000_000
+_NUMBERS_AT_ONCE = 1_000_000
 _GAIN_ROUNDS, _GAIN_CHANGE = 6, 3e-3  # most rounds, and the change that ends them
 _LARGEST_SENSOR_LOG_GAIN = 2.0  # bound of b
-_LARGEST_D33_STEP = 1.0  # of log d33
+_LARGEST_STEP = 1.0  # of a fit coordinate; of wider ranges a share
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 _SETTLING = 20
-_SMOOTH_STARTS = (np.log(1e-3), np.log(3e-2))  # of curves: close fit, and loose
+_SMOOTH_STARTS = (USUAL.low, DISCREPANCY.low)  # of curves: close fit, and loose
 _CURVE_SETTLING = 8
 _PROMISED, _MARGIN = 10.0, 2.0  # times the gain by the gradient, and nats beyond it, that a fit may still gain
 _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's slopes
-_LARGEST_MEAN_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _LEAST_CURVATURE = 1e-10
 _MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
 CostToBeat = Callable[[Evaluated], Floats]  # costs (points,) that points must get below
+
+
+class Scatter(IntEnum):
+    """Indices of the covariance parameters; those of mechanisms come after them. FRFs may have a positioning scatter,
+    curves have a smooth error in its place."""
+
+    GAIN = 0
+    LEVEL = 1
+    POSITION = 2
+    SMOOTH = 2
 
 
 class Fitter:
@@ -135,7 +142,7 @@ class Fitter:
     def _at_once(self, points: Points, variables: int) -> list[slice]:
         """Slices of points small enough that arrays with derivatives by so many variables stay small."""
         largest = max(hypothesis.frf_model.numbers(variables) for hypothesis in self.hypotheses)
-        count = max(_PREDICTED_AT_ONCE // largest, 1)
+        count = max(_NUMBERS_AT_ONCE // largest, 1)
         return [slice(first, first + count) for first in range(0, len(points), count)]
 
     @cached_property
@@ -192,12 +199,12 @@ class Fitter:
         values_by_name = {parameter.name: values[..., column, :] for column, parameter in enumerate(self.covariance)}
         pickup = self.hypotheses[0].model.pickup
         return SeveralLevels(
-            gain=values[..., GAIN, :],
-            level=values[..., LEVEL, :],
-            position=values[..., POSITION, :] if self.has_position_scatter else np.zeros(shape),
+            gain=values[..., Scatter.GAIN, :],
+            level=values[..., Scatter.LEVEL, :],
+            position=values[..., Scatter.POSITION, :] if self.has_position_scatter else np.zeros(shape),
             spread=np.full(shape, SENSOR_SPREAD) if self._spread is None else values[..., self._spread, :],
             pickup=None if pickup is None else pickup.deviation(values_by_name),
-            smooth=values[..., SMOOTH, :] if self.lines.curves else np.zeros(shape),
+            smooth=values[..., Scatter.SMOOTH, :] if self.lines.curves else np.zeros(shape),
         )
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
@@ -469,9 +476,7 @@ class Fitter:
         """With the most probable d33 at these noise levels; needs no further prediction."""
         information, gradient = self.posterior_equations(at)
         number, index = np.arange(len(at)), self._d33[at.points.owner]
-        step = np.clip(
-            gradient[number, index] / information[number, index, index], -_LARGEST_D33_STEP, _LARGEST_D33_STEP
-        )
+        step = np.clip(gradient[number, index] / information[number, index, index], -_LARGEST_STEP, _LARGEST_STEP)
         return self.update_noise_levels(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
 
     @cached_property
@@ -652,7 +657,7 @@ class Fitter:
             matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
             matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + least, 1.0)
             step = np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
-            scale = np.abs(step) / np.maximum(_LARGEST_MEAN_STEP, 0.3 * (high - low))
+            scale = np.abs(step) / np.maximum(_LARGEST_STEP, 0.3 * (high - low))
             step /= np.maximum(1.0, scale.max(axis=1))[:, None]
             leaving = free & (((fit <= low) & (step < 0)) | ((fit >= high) & (step > 0)))
             if not leaving.any():
@@ -681,7 +686,7 @@ def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
 def _smooth_range(fitter: Fitter) -> tuple[float, float]:
     """Range of starting values of the log smooth error of curves."""
     smooth = fitter.hypotheses[0].smooth
-    return smooth.low, max(smooth.high, float(np.log(3e-2)))
+    return smooth.low, max(smooth.high, DISCREPANCY.low)
 
 
 def _log_size(slopes: Floats) -> Floats:

@@ -14,19 +14,17 @@ from scipy.optimize import least_squares
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
-from underskin.diagnosis.noise import START_GAIN, USUAL_DRIFT
+from underskin.diagnosis.noise import START_GAIN, TYPICAL, USUAL_DRIFT
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.campaign import curves_of
 from underskin.units import Floats
 
-_ERROR = 3e-3  # of the largest force: the unit of the residuals
 _TOLERANCE, _OF_STARTS = 1e-4, 1e-3  # of the sum of squares, and the same for starting points
 _EVALUATIONS = 40  # at most
 _STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far wider than a snap-in is deep
 _PASSED = 4  # most samples, either way, that a contact point is moved past
 _OFF_SAMPLE = 1e-6  # of the gap between two samples: a contact point at a sample is past it
-_INSIDE = 1e-9  # of a parameter's range, off its bounds
-_SAME = 1e-9  # of the range of displacement: smaller differences are rounding
+_ROUNDING = 1e-9  # of a range: smaller differences are rounding, and a start is so far off its bounds
 
 
 class LeastSquares:
@@ -41,7 +39,7 @@ class LeastSquares:
         self._recording = lines.recording
         self._spans = lines.spans
         largest = np.array([np.abs(lines.value[span]).max() for span in lines.spans])
-        self._unit = _ERROR * np.maximum(largest, 1e-300)[lines.recording]
+        self._unit = TYPICAL * np.maximum(largest, 1e-300)[lines.recording]
         self._cell_projections = []
         for span in lines.spans:
             columns = lines.smooth.columns[span] / self._unit[span, None]
@@ -90,7 +88,7 @@ class LeastSquares:
         """Fit coordinates and gains from a start, and half the sum of squares there."""
         count = len(low)
         gains = np.full(len(start) - count, 0.5)
-        margin = _INSIDE * (high - low)
+        margin = _ROUNDING * (high - low)
         initial = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
         bounds = np.append(low, -gains), np.append(high, gains)
         unit = np.append(_units(self._model, self._precision), np.ones(len(gains)))
@@ -125,7 +123,7 @@ class LeastSquares:
 def _distinct(travel: Floats) -> Floats:
     """The distinct displacements in order, to within rounding."""
     values = np.unique(travel)
-    return values[np.append(True, np.diff(values) > _SAME * np.ptp(values))]
+    return values[np.append(True, np.diff(values) > _ROUNDING * np.ptp(values))]
 
 
 def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, float]:
@@ -158,7 +156,7 @@ def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, 
 
     unit = float(np.sqrt((about_zero(measured) ** 2).sum()))
     low, high = np.array([parameter.bounds for parameter in model.parameters]).T
-    margin = _INSIDE * (high - low)
+    margin = _ROUNDING * (high - low)
     initial = np.clip(start, low + margin, high - margin)
     precision = np.sqrt([curvature_of_prior(parameter)[0] for parameter in model.parameters])
     best, cost = _solved(residuals, jacobian, initial, (low, high), _units(model, precision), _TOLERANCE)

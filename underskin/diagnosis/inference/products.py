@@ -64,41 +64,16 @@ class PickupRows:
     def __init__(self, lines: Lines, pickup: Pickup, design: FrfDesign) -> None:
         """`design` gives the distinct line of each row."""
         rows = pickup.rows
-        self._precision = lines.deviation[rows] ** -2.0
-        self._value = contiguous(lines.value[rows])
-        self._recordings = lines.recordings
-        self._recording = lines.recording[rows]
-        self._alike = np.arange(len(rows)) if pickup.alike is None else pickup.alike
+        self.recordings = lines.recordings
+        alike = np.arange(len(rows)) if pickup.alike is None else pickup.alike
+        self._columns = alike, lines.deviation[rows] ** -2.0, lines.recording[rows], contiguous(lines.value[rows])
         self.lines, line = np.unique(design.line[rows], return_inverse=True)
         self.line: Indices = line.reshape(-1)
         self.row_numbers: Indices = np.arange(len(rows))
 
-    def without_pickup(self, sums: Sums, line: Indices, u: Array, pickup: Floats, level: Floats) -> Sums:
-        """The sums corrected for pick-up of these distinct deviations (points, sets, distinct), at the directions u
-        (points, lines) of the rows on these lines (rows,)."""
-        from underskin.diagnosis.kernels import subtract_pickup
-
-        shape = *level.shape[:2], self._recordings
-        uu, uy, yy = (np.broadcast_to(x, shape).copy() for x in (sums.uu, sums.uy, sums.yy))
-        log_determinant = np.zeros(shape[:2])
-        square = np.ascontiguousarray(np.swapaxes((pickup / level) ** 2, 1, 2))
-        row_arrays = self._alike, self._precision, self._recording, self._value, line
-        subtract_pickup(square, *row_arrays, contiguous(u.astype(complex, copy=False)), uu, uy, yy, log_determinant)
-        return Sums(uu, uy, yy, log_determinant[..., None])
-
-    def slopes_without_pickup(
-        self, sums: SlopeSums, line: Indices, u: Array, v: Array, pickup: Floats, level: Floats
-    ) -> SlopeSums:
-        """The sums with derivatives v (points, parameters, lines), corrected likewise; deviations are (points,
-        distinct), levels (points,)."""
-        from underskin.diagnosis.kernels import subtract_pickup_slopes
-
-        square = contiguous((pickup / level[:, None]) ** 2)
-        row_arrays = self._alike, self._precision, self._recording, self._value, line
-        directions = (contiguous(x.astype(complex, copy=False)) for x in (u, v))
-        uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
-        subtract_pickup_slopes(square, *row_arrays, *directions, uv, vy, vv)
-        return SlopeSums(uv, vy, vv)
+    def columns(self, line: Indices) -> tuple[Array, ...]:
+        """What the compiled functions take of each row, with the index of its line (rows,)."""
+        return *self._columns, line
 
 
 @cached_while_alive  # a diagnosis evaluates dozens of models of one design
@@ -456,17 +431,32 @@ class PickupProducts:
 
     def without_pickup(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums corrected for pick-up."""
+        from underskin.diagnosis.kernels import subtract_pickup
+
         assert levels.pickup is not None
-        return self.rows.without_pickup(sums, self.line, self.u, levels.pickup, levels.level)
+        shape = *levels.level.shape[:2], self.rows.recordings
+        uu, uy, yy = (np.broadcast_to(x, shape).copy() for x in (sums.uu, sums.uy, sums.yy))
+        log_determinant = np.zeros(shape[:2])
+        square = np.ascontiguousarray(np.swapaxes((levels.pickup / levels.level) ** 2, 1, 2))
+        subtract_pickup(square, *self.rows.columns(self.line), _complex(self.u), uu, uy, yy, log_determinant)
+        return Sums(uu, uy, yy, log_determinant[..., None])
 
     def slopes_without_pickup(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives corrected for pick-up, at the first of the sets of noise levels."""
+        from underskin.diagnosis.kernels import subtract_pickup_slopes
+
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        return self.rows.slopes_without_pickup(
-            sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0]
-        )
+        square = contiguous((levels.pickup[:, 0] / levels.level[:, 0, 0][:, None]) ** 2)
+        uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
+        rows = self.rows.columns(self.line)
+        subtract_pickup_slopes(square, *rows, _complex(self.u), _complex(self.v), uv, vy, vv)
+        return SlopeSums(uv, vy, vv)
+
+
+def _complex(values: Array) -> Array:
+    return contiguous(values.astype(complex, copy=False))
 
 
 def _products_of_factor(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:

@@ -16,7 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import qmc
 
+from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import (
+    FLAT,
     level_integrals,
     marginalise_sensor_spread,
     mean_integrals,
@@ -48,8 +50,12 @@ class Residuals:
 
 def row_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
     """The explanation's prediction on all rows."""
-    value: Array = explanation.best.prediction.value
-    return value if len(value) == len(problem.lines.value) else value[problem.lines.recording]
+    return on_rows(problem.lines, explanation.best.prediction.value)
+
+
+def on_rows(lines: Lines, column: Array) -> Array:
+    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
+    return column if len(column) == len(lines.value) else column[lines.recording]
 
 
 def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[Array, Floats]:
@@ -81,9 +87,6 @@ def residuals(problem: FittingProblem, explanation: Explanation, gain: float, po
     return Residuals(along / size - 1, np.sqrt(gain**2 + position_variance + 1 / size), line, weight)
 
 
-_FLAT = 1e-3  # of a parameter's bounds: weakest prior, for parameters without effect
-
-
 def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
     """The force (samples,), its derivatives by the parameters (parameters, samples) and by the travel (samples,)."""
     model, fit = explanation.best.hypothesis.model, explanation.point.fit
@@ -94,7 +97,7 @@ def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
 
 def precision_of(hypothesis: Hypothesis) -> Floats:
     """Precisions of the parameters' priors (parameters,)."""
-    return np.asarray(hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
+    return np.asarray(hypothesis.priors[0] + (FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
 
 
 def information(explanation: Explanation, rows: Floats, noise: Explanation | None = None) -> Floats:
@@ -125,7 +128,7 @@ def information_beyond(full: Floats, indices: Indices, precision: Floats) -> Flo
 _NODES = {0: 1, 1: 12, 2: 24}  # by number of parameters
 _MOST_NODES = 48
 _MOST = 600.0  # nats of the largest share: exp(710) overflows
-_NEGLIGIBLE_NATS = 6.0  # nats behind the fit without the mechanism beyond which a node is negligible
+MAY_MATTER_NATS = 6.0  # behind the best: 0.2 % of its probability, so that what is farther behind changes no sum
 
 
 def with_hidden_mechanism(
@@ -190,14 +193,14 @@ def _evenly(parameters: int) -> Floats:
 
 
 def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
-    """The nodes within `_NEGLIGIBLE_NATS` of the explanation, with all that is not held fitted."""
+    """The nodes within `MAY_MATTER_NATS` of the explanation, with all that is not held fitted."""
     point, cost = explanation.point, explanation.best.cost
     covariance, sensor_log_gain = (
         np.tile(values, (len(fit), 1)) for values in (point.covariance, point.sensor_log_gain)
     )
     initial = held.evaluate(Points(np.zeros(len(fit), dtype=np.intp), fit, covariance, sensor_log_gain))
-    fitted = held.descend(initial, 1, lambda at: np.full(len(at), cost + _NEGLIGIBLE_NATS))
-    return fitted[np.flatnonzero(fitted.cost < cost + _NEGLIGIBLE_NATS)]
+    fitted = held.descend(initial, 1, lambda at: np.full(len(at), cost + MAY_MATTER_NATS))
+    return fitted[np.flatnonzero(fitted.cost < cost + MAY_MATTER_NATS)]
 
 
 def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:

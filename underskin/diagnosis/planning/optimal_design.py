@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED
+from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, NAMED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits, candidates, inferred, wider
 from underskin.diagnosis.selection.answers import Answer, Search
@@ -27,9 +27,7 @@ from underskin.units import Floats, Mask
 
 SEED = 20180206
 _SIMULATIONS = 2000
-_ENOUGH = 0.95
 _LEAST_GAIN = 0.01  # in the probability of deciding, by a further recording
-_SURVIVES = 0.02
 _RIVALS = 4
 _PROMISING = 0.3  # probability of deciding below which no recordings are proposed
 WRONG_MODULUS = "modulus_error"
@@ -60,7 +58,7 @@ class NextRecordings:
 
 def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextRecordings | None:
     """The recordings to make, their cost, and the probability that they decide; None if all is decided."""
-    surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
+    surviving = [answer for answer in search.answers if answer.probability > NAMED][:_RIVALS]
     if len(surviving) < 2:
         return None
     outside = False
@@ -228,7 +226,7 @@ def _choose(outlook: _Outlook, candidates: Sequence[FrfConditions], limits: RigL
     chosen: list[int] = []
     best = outlook.deciding([])
     steps: list[tuple[int, ...]] = list(itertools.combinations_with_replacement(promising, 2))
-    while len(chosen) < limits.recordings and best < _ENOUGH:
+    while len(chosen) < limits.recordings and best < CERTAIN:
         mounted = {candidates[index].indenter_radius_mm for index in chosen}
         rated = []
         for step in steps:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.data.names import MOST_QUOTED, in_words
 from underskin.diagnosis.inference.evidence import marginalise_sensor_spread
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.gaussian import NormalMixture
@@ -34,7 +34,6 @@ from underskin.units import Floats
 
 _LEVELS = 9  # quantiles over the rows
 _FACTORS = ("gain", "frequency_response")
-_MOST_NAMED = 2  # mechanisms that would not show, named with a value to quote
 SEVERAL_ANSWERS = "several answers remain"
 BY_NUISANCES = ("d33", "noise")  # confounders of mechanisms that d33, E, h or the noise hide
 
@@ -184,7 +183,7 @@ class StatedD33:
         value, low, high = (f"{self.number[key]:.3g}" for key in ("value", "low", "high"))
         least, most = (f"{self.number['relative'][key]:.3g}" for key in ("low", "high"))
         named = " or ".join(
-            f"{in_words([shift.mechanism])} ({_percent(shift)})" for shift in self._largest_first[:_MOST_NAMED]
+            f"{in_words([shift.mechanism])} ({_percent(shift)})" for shift in self._largest_first[:MOST_QUOTED]
         )
         hides = f", provided that no {named} hides" if named else ""
         return (
@@ -206,7 +205,7 @@ class StatedD33:
         assert self.number is not None
         low, high = (f"{self.number[key]:.3g}" for key in ("low", "high"))
         lies = f"it lies from {low} to {high} {self.number['unit']}{self._over_declared()}"
-        deciding = [f"{in_words([shift.mechanism])} by {_percent(shift)}" for shift in self.deciding[:_MOST_NAMED]]
+        deciding = [f"{in_words([shift.mechanism])} by {_percent(shift)}" for shift in self.deciding[:MOST_QUOTED]]
         if deciding:
             return f"{lies}, but what would not show here would change it, {listed(deciding)}"
         over = " over the answers that remain" if SEVERAL_ANSWERS in self.why_not else ""
@@ -218,7 +217,7 @@ class StatedD33:
         """Reasons against quoting d33; empty where it is to be quoted."""
         if self.number is None:
             return list(self.why_not) or ["no answer explains its recordings"]
-        hidden = in_words([shift.mechanism for shift in self.deciding[:_MOST_NAMED]])
+        hidden = in_words([shift.mechanism for shift in self.deciding[:MOST_QUOTED]])
         return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
 
     def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:

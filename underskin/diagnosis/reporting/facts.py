@@ -386,7 +386,7 @@ class Facts:
         ids = [recording.id for recording in lines.campaign.recordings]
         beyond = [Finding(Reason.OUT_OF_TABLES_FITTED, ids[index], "preload_n", answer) for index in outside]
         level = best.levels.level
-        is_noisy = not lines.curves and level >= cross_validation.NOISY
+        is_noisy = not lines.curves and level >= cross_validation.FAR_ABOVE
         noisy = [Finding(Reason.LINE_NOISE_LEVEL, "", "frf_re_pc_per_n", {"level": level})] if is_noisy else []
         return [*self.bounds.values(), *beyond, *noisy]
 

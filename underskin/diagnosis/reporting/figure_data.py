@@ -19,8 +19,8 @@ from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recor
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
-from underskin.diagnosis.inference.residuals import row_prediction
-from underskin.diagnosis.localisation import axis_values
+from underskin.diagnosis.inference.residuals import on_rows, row_prediction
+from underskin.diagnosis.localisation import MOST_LINES, axis_values
 from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.kinds import KINDS
@@ -168,9 +168,8 @@ def _thinned(way: Floats, corners: list[int]) -> Indices:
 
 
 MOST_RECORDINGS = 120
-_FEWEST_LINES, _MOST_LINES = 40, 160  # drawn of a recording
+_FEWEST_LINES = 40  # drawn of a recording
 _MOST_FRF_POINTS = 6000  # drawn of all recordings
-_PC_PER_C = 1e12
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,8 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
     misfits = [[_misfit_percent(lines.value[span], rows[span]) for span in lines.spans] for rows in predicted]
     deviation = _frf_deviation(problem, after, predicted[1])
     chosen = _worst([recording.sensor for recording in recordings], misfits[1])
-    most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, _MOST_LINES))
+    unit = KINDS["frf"].per_si
+    most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, MOST_LINES))
     shown = []
     for index in chosen:
         recording, span = recordings[index], lines.spans[index]
@@ -216,10 +216,10 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
                 preload_n=recording.preload_n,
                 count=span.stop - span.start,
                 frequency_hz=lines.frequency[rows],
-                measured=_PC_PER_C * lines.value[rows],
-                before=_PC_PER_C * predicted[0][rows],
-                after=_PC_PER_C * predicted[1][rows],
-                deviation=_PC_PER_C * deviation[:, rows],
+                measured=unit * lines.value[rows],
+                before=unit * predicted[0][rows],
+                after=unit * predicted[1][rows],
+                deviation=unit * deviation[:, rows],
                 misfit_before=misfits[0][index],
                 misfit_after=misfits[1][index],
             )
@@ -240,15 +240,10 @@ def _frf_deviation(problem: FittingProblem, explanation: Explanation, predicted:
     pick-up, gain and position of the recording."""
     lines, best = problem.lines, explanation.best
     levels = best.levels
-    of_line = (levels.level * lines.deviation) ** 2 + _of_rows(lines, best.pickup_variance)
+    of_line = (levels.level * lines.deviation) ** 2 + on_rows(lines, best.pickup_variance)
     position_variance = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
     relative = levels.gain**2 + position_variance + 0.5 * levels.position**4 * problem.curvature.square
     return np.sqrt(of_line + relative[lines.recording] * np.array([predicted.real, predicted.imag]) ** 2)
-
-
-def _of_rows(lines: Lines, column: Floats) -> Floats:
-    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
-    return column if len(column) == len(lines.value) else column[lines.recording]
 
 
 def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
@@ -422,7 +417,7 @@ class Thinned:
             explanation.best.hypothesis.lines.recording
         ]
         variance += levels.position**2 * squared_slopes * np.abs(prediction.value) ** 2
-        return _of_rows(self.lines, variance + explanation.best.pickup_variance)
+        return on_rows(self.lines, variance + explanation.best.pickup_variance)
 
     def _mean(self, column: Floats) -> Floats:
         return np.bincount(self._point, self._weight * column) / self._total

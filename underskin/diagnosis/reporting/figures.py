@@ -18,14 +18,16 @@ from underskin.diagnosis.data.names import SIMPLEST, quantity_in_words
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.reporting.facts import DiagnosisResult, Facts
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned, shown_curves, shown_frfs
-from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.page_styles import BOUND, LINE_COLOURS
 from underskin.diagnosis.reporting.recording_figures import (
     AFTER,
     BAND,
+    BAND_POINTS,
     BEFORE,
     BELOW,
+    MARGIN,
     MEASURED,
+    SMALL_TITLE,
     curve_figure,
     frf_figure,
     parameter_intervals,
@@ -33,17 +35,16 @@ from underskin.diagnosis.reporting.recording_figures import (
 )
 from underskin.findings.formatting import capital, in_percent
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Complexes, Floats, readable_unit
 
 _GREY = "#BBBBBB"
 _MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, up to which numbers are shown
 _CELL = 10  # pixels, size of these numbers: 7.5 points on paper
-_TITLE, _TITLE_SIZE, _TITLE_LINE = 18, 12, 16  # of a panel: characters per line; pixels of a letter and of a line
+_TITLE, _TITLE_LINE = 18, 16  # of a panel: characters per line; pixels of a line
 _ABOVE_NOISE = 2.0  # least end of a map's colour scale, over the 95 % interval of the noise
-_BAND = 60  # points along a band
 _LABEL = 24  # characters per line of a label
-_EDGE = 0.04  # of the range shown: margin at the ends of an axis
 
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
@@ -201,16 +202,20 @@ def before_and_after(facts: Facts, before: Points, after: Points, part: _Part) -
         before, after = before.times(per_n), after.times(per_n)
     both = np.concatenate([column for points in (before, after) for column in (points.predicted, points.measured)])
     shown_part = part.of(both)
-    room = _EDGE * float(np.ptp(shown_part))
+    room = MARGIN * float(np.ptp(shown_part))
     axis_range = [float(shown_part.min()) - room, float(shown_part.max()) + room]
     ids = [escape(recording.id) for recording in facts.problem.lines.campaign.recordings]
     for panel, (points, colour, marker) in enumerate(
         ((before, BEFORE, "square-open"), (after, AFTER, "circle")), start=1
     ):
         predicted, measured = map(part.of, (points.predicted, points.measured))
-        along = np.linspace(predicted.min(), predicted.max(), _BAND)
+        along = np.linspace(predicted.min(), predicted.max(), BAND_POINTS)
         # If all predictions were equal the band would have no width along the abscissa.
-        along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
+        along = (
+            along
+            if np.ptp(along) > 0
+            else along + np.linspace(-1, 1, BAND_POINTS) * (np.abs(along).max() or 1.0) * 0.05
+        )
         # The noise of the stated explanation in both: the base model counts its misfit as noise.
         half = SDS_OF_95 * np.hypot(after.gain * along, float(np.median(after.deviation)))
         figure.add_scatter(
@@ -240,9 +245,9 @@ def before_and_after(facts: Facts, before: Points, after: Points, part: _Part) -
             row=1,
             col=panel,
         )
-    figure.update_xaxes(title=f"predicted [{unit}]", title_font_size=_TITLE_SIZE, range=axis_range)
+    figure.update_xaxes(title=f"predicted [{unit}]", title_font_size=SMALL_TITLE, range=axis_range)
     figure.update_yaxes(
-        title=f"measured {facts.traits.response}{part.words} [{unit}]", title_font_size=_TITLE_SIZE, col=1
+        title=f"measured {facts.traits.response}{part.words} [{unit}]", title_font_size=SMALL_TITLE, col=1
     )
     for panel in (1, 2):
         figure.update_yaxes(range=axis_range, scaleanchor=f"x{panel}", constrain="domain", row=1, col=panel)
@@ -253,7 +258,7 @@ def before_and_after(facts: Facts, before: Points, after: Points, part: _Part) -
         margin={"t": 90 + further, "b": 100},
         legend=BELOW,
     )
-    figure.update_annotations(font_size=_TITLE_SIZE)
+    figure.update_annotations(font_size=SMALL_TITLE)
     return styled(figure)
 
 

@@ -12,25 +12,26 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
 
-from underskin.diagnosis.data.names import EXPLAINED
+from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, MOST_NAMED, NAMED
 from underskin.diagnosis.inference.evidence import levels_covariance, profile_end
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.inference.residuals import residuals, row_prediction, with_hidden_mechanism
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import declared_laws
+from underskin.diagnosis.slips.levels import LEAST_LEVELS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
+from underskin.inversion.many_sensors import ROBUST
+from underskin.inversion.mixed_model import SDS_OF_95, mixture_quantile
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Floats
 
-SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard deviations
 ENDS = ("value", "low", "high")
+QUANTILES_OF_95 = (0.5, 0.025, 0.975)  # for these
 
 
 def rounded(value: float, digits: int = 4) -> float | None:
@@ -54,19 +55,9 @@ def in_sentence(parameter: Mapping[str, Any]) -> str:
     return f"{value} {parameter['unit']} (95 %: {low} to {high})"
 
 
-def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Floats) -> float:
-    """A quantile of a mixture of normal distributions (parts,), whose `shares` sum to 1."""
-
-    def beyond(at: float) -> float:
-        return float(shares @ ndtr((at - means) / deviations) - level)
-
-    far = 8 * deviations.max()
-    return float(brentq(beyond, means.min() - far, means.max() + far))
-
-
 def of_logarithms(shares: Floats, means: Floats, deviations: Floats) -> dict[str, float | None]:
     """The median and the 95 % interval of a quantity whose logarithm is a mixture of normal distributions (parts,)."""
-    return with_ends(*(np.exp(mixture_quantile(level, shares, means, deviations)) for level in (0.5, 0.025, 0.975)))
+    return with_ends(*(float(np.exp(mixture_quantile(shares, means, deviations, level))) for level in QUANTILES_OF_95))
 
 
 def with_hidden(
@@ -206,9 +197,8 @@ def at_bounds(explanation: Explanation) -> dict[str, Finding]:
 COUNTS = 0.003  # probability below which an answer is left out of averages
 HIDES = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
 _TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
-NAMED, _LEAST_NAMED = 0.02, 3  # probability from which a rival or a group is named, and least number of groups
+_LEAST_NAMED = 3  # groups, however improbable
 _ALIKE = 0.5  # of the noise: answers that differ by less have the same predictions
-_ENOUGH_ALIKE = 0.95
 
 
 def law_shares(search: Search) -> list[tuple[Explanation, float]]:
@@ -286,7 +276,7 @@ def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict
             total += answer.probability
             furthest = max(furthest, percent)
             rivals.append(list(answer.names))
-    if total < _ENOUGH_ALIKE or not rivals:
+    if total < CERTAIN or not rivals:
         return None
     return {"probability": round(total, 3), "rivals": rivals, "differ_percent": rounded(furthest, 2)}
 
@@ -347,11 +337,8 @@ def _effect_percent(problem: FittingProblem, shown: Explanation, name: str) -> f
 
 
 _SPREAD = "sensor_spread"
-_LEAST_SENSORS = 4
 _LEAST = 0.1  # of d33: sensors of one skin differ by some percent
 _OUTLIER_SDS = 3.0  # standard deviations, both of the sensors (from the median absolute deviation) and of its own d33
-_ROBUST = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
-_MOST = 3  # sensors named
 
 
 def outlying_sensors(problem: FittingProblem, shown: Explanation) -> str:
@@ -361,16 +348,16 @@ def outlying_sensors(problem: FittingProblem, shown: Explanation) -> str:
     levels = shown.best.levels
     of_recordings = residuals(problem, shown, levels.gain, levels.position)
     indices, sensor = np.unique(problem.lines.sensor, return_inverse=True)
-    if len(indices) < _LEAST_SENSORS:
+    if len(indices) < LEAST_LEVELS:
         return ""
     weight = of_recordings.gain_deviation**-2
     total = np.bincount(sensor, weight)
     value = 1 + np.bincount(sensor, weight * of_recordings.gain) / total
     median = float(np.median(value))
     off, deviation = value / median - 1, total**-0.5 / median
-    spread = _ROBUST * float(np.median(np.abs(off)))
+    spread = ROBUST * float(np.median(np.abs(off)))
     far = np.abs(off) > np.maximum(_LEAST, _OUTLIER_SDS * np.maximum(spread, deviation))
-    rows = np.flatnonzero(far)[np.argsort(-np.abs(off[far]), kind="stable")][:_MOST].tolist()
+    rows = np.flatnonzero(far)[np.argsort(-np.abs(off[far]), kind="stable")][:MOST_NAMED].tolist()
     names = [problem.lines.campaign.skin.sensors[index].id for index in indices.tolist()]
     return ", ".join(_clause(names[row], off[row], deviation[row]) for row in rows)
 

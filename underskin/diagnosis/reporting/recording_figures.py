@@ -21,7 +21,7 @@ from plotly.subplots import make_subplots
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.reporting.figure_data import SMALLEST, Mark, ShownCurve, ShownFrf
 from underskin.diagnosis.reporting.kinds import KindTraits
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, multiple_of, spans
+from underskin.diagnosis.reporting.numbers import multiple_of, spans
 from underskin.diagnosis.reporting.page_styles import (
     LEAST_PHASE,
     PAPER,
@@ -32,6 +32,7 @@ from underskin.diagnosis.reporting.page_styles import (
     is_logarithmic,
     with_minus,
 )
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.parameter import Parameter
 from underskin.units import Floats, readable_unit
 
@@ -41,6 +42,9 @@ _TEMPLATE = go.layout.Template(pio.templates["plotly_white"]).update(
 _STYLE = {"template": _TEMPLATE, "font": {"size": 14, "color": "#222222"}}
 MEASURED, BEFORE, AFTER, BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.15)"
 BELOW = {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"}  # a legend below the figure
+SMALL_TITLE = 12  # pixels: of a panel, so that those of two do not touch
+BAND_POINTS = 60  # along an edge of a band
+MARGIN = 0.05  # of the range shown, at either end of an axis
 PlotlyTrace = dict[str, Any]
 
 
@@ -83,10 +87,8 @@ def _with_menu(figure: go.Figure, labels: Sequence[str], args: Sequence[Any]) ->
 
 _MOST_CURVES = 12
 _LOADED = 0.02  # of the largest force, from which a curve is in the initial view
-_CURVE_ROOM = 0.4, 0.05  # of the initial view: additional range in the air, if recorded, and margin
-_ALONG = 40  # points along an edge of the band
+_AIR = 0.4  # of the initial view: additional range in the air, if recorded
 _CURVE_HEIGHT, _PANEL = 460, 150  # pixels
-_PANEL_TITLE = 12  # smaller than others, so that those of two panels do not touch
 
 
 def curve_figure(curves: Sequence[ShownCurve], traits: KindTraits, before: str, after: str) -> go.Figure:
@@ -149,7 +151,7 @@ class _Curve:
             self.traces.append(self._trace(f"residual {model.role}", curve.displacement_mm, residual, most, look))
             which = "residual" if len(models) == 1 else f"residual<br>{model.role}"
             self.layout[f"yaxis{row}.title.text"] = f"{which} [{readable_unit('force_n', most)[0]}]"
-            self.layout[f"yaxis{row}.title.font.size"] = _PANEL_TITLE
+            self.layout[f"yaxis{row}.title.font.size"] = SMALL_TITLE
         self.traces += [self._mark(name, mark, largest, marker) for name, mark, marker in self._marks()]
         last = len(models) + 1
         self.layout[f"xaxis{last}.title.text"] = f"{traits.along} from the contact point [{self._length}]"
@@ -167,7 +169,7 @@ class _Curve:
         traces = []
         for name, way in (("in", slice(None, turn + 1)), ("back", slice(turn, None))):
             order = np.argsort(curve.displacement_mm[way])  # an area is filled in one direction
-            order = order[np.unique(np.linspace(0, len(order) - 1, _ALONG).astype(int))]
+            order = order[np.unique(np.linspace(0, len(order) - 1, BAND_POINTS).astype(int))]
             displacement, high = curve.displacement_mm[way][order], half[way][order]
             filled = {**edge, "fill": "tonexty", "fillcolor": BAND}
             filled["showlegend"] = row == 2 and name == "in"
@@ -218,14 +220,13 @@ class _Curve:
         marks = [mark.displacement_mm for _, mark, _ in self._marks()]
         depths = self._depth(np.concatenate([curve.displacement_mm[loaded], marks]))
         low, high = float(depths.min()), float(depths.max())
-        air, edge = (share * (high - low) for share in _CURVE_ROOM)
+        air, edge = _AIR * (high - low), MARGIN * (high - low)
         return [max(low - air, float(self._depth(curve.sample_mm).min()) - edge), high + edge]
 
 
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
 _LONG_TITLE = 11  # pixels: fits the height of a panel in a narrow window
-_ROOM = 0.08  # margin at either end of an axis
 _IN_VIEW = 10.0  # times the noise's band: initial range of residuals
 _FEW = 3  # lines up to which a model has markers
 _NONE = 1e-9  # pC/N: least scale of a residual
@@ -368,7 +369,7 @@ def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
     sizes = np.concatenate([columns[name] for name in names])
     wide = is_logarithmic(sizes, float(np.median(columns["measured"])))
     low, high = (np.log10([sizes.min(), sizes.max()]) if wide else (0.0, sizes.max())) if sizes.max() > 0 else (0, 1)
-    room = _ROOM * (high - low)
+    room = MARGIN * (high - low)
     view: dict[str, Any] = {
         "yaxis.type": "log" if wide else "linear",
         "yaxis.dtick": decade_ticks(sizes) if wide else None,
@@ -376,11 +377,11 @@ def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
     }
     phases = [columns["measured phase" if name == "measured" else f"{name} phase"] for name in names]
     low, high = min(-LEAST_PHASE, *map(np.min, phases)), max(LEAST_PHASE, *map(np.max, phases))
-    view["yaxis2.range"] = [float(low - _ROOM * (high - low)), float(high + _ROOM * (high - low))]
+    view["yaxis2.range"] = [float(low - MARGIN * (high - low)), float(high + MARGIN * (high - low))]
     for axis, part in ((3, "real"), (4, "imaginary")):
         band = float(columns[f"noise {part} high"].max())
         largest = [float(np.abs(columns[f"residual {name} {part}"]).max()) for name in names[1:]]
-        reach = max(band, largest[-1], min(max(largest), _IN_VIEW * band)) * (1 + _ROOM)
+        reach = max(band, largest[-1], min(max(largest), _IN_VIEW * band)) * (1 + MARGIN)
         view[f"yaxis{axis}.range"] = [-reach, reach]
     return view
 
@@ -401,7 +402,6 @@ def _percent(value: float) -> str:
 
 _MARGIN = 1.0  # of an interval, on either side of it
 _ROW, _SPACING = 140, 0.73  # height of a parameter's row [pixels], and the share of it for labels
-_TITLE = 13  # pixels
 
 
 def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, Any]]) -> go.Figure:
@@ -420,7 +420,7 @@ def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, An
         for name, parameter, prior, scale in rows
     ]
     figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_SPACING / len(rows))
-    figure.update_annotations(font_size=_TITLE)
+    figure.update_annotations(font_size=SMALL_TITLE)
     for panel, (_, parameter, *_) in enumerate(rows, start=1):
         low, high = parameter["low"], parameter["high"]
         figure.add_scatter(

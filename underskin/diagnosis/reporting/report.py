@@ -17,8 +17,8 @@ from underskin.diagnosis.reporting.unlisted_law import confirming
 from underskin.diagnosis.selection.answers import Search
 
 SCHEMA = "report/1"
-_ALTERNATIVES = 6
-_LEAST_PROBABILITY = 0.005
+ALTERNATIVES = 6
+LEAST_PROBABILITY = 0.005  # of an alternative, or a mechanism, that is listed
 _EMPTY: Mapping[str, Any] = {  # the report of recordings that say too little, and the order of all reports
     "schema": SCHEMA,
     "campaign": "",
@@ -113,8 +113,8 @@ def next_experiment(diagnosis: DiagnosisResult) -> dict[str, Any]:
 def _alternatives(search: Search) -> list[dict[str, Any]]:
     leader, *others = search.answers
     alternatives: list[dict[str, Any]] = []
-    for answer in others[:_ALTERNATIVES]:
-        if answer.probability < _LEAST_PROBABILITY and len(alternatives) > 1:
+    for answer in others[:ALTERNATIVES]:
+        if answer.probability < LEAST_PROBABILITY and len(alternatives) > 1:
             break
         why_not = entries.why_not(answer, leader)
         document = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}

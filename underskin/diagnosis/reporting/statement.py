@@ -11,19 +11,28 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
+from underskin.diagnosis.data.names import (
+    EXPLAINED,
+    MOST_NAMED,
+    MOST_QUOTED,
+    NAMED,
+    NOTHING_MISSING,
+    SIMPLEST,
+    in_words,
+)
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.entries import shape_clause
 from underskin.diagnosis.reporting.facts import Facts
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
-from underskin.diagnosis.reporting.numbers import NAMED, SDS_OF_95
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer, remainder
+from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
 from underskin.findings.codes import FindingCode
 from underskin.findings.english import lacking
 from underskin.findings.formatting import clause, in_digits, in_percent, of_clauses, small
 from underskin.findings.lacking import Lack, Lacking
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.registry import CATALOGUE
@@ -36,12 +45,10 @@ from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.readers.calendar_times import time_zone
 from underskin.units import Floats
 
-_FAR_ABOVE = 2.0  # times the noise: a held-out error that the first sentence mentions
 _INSUFFICIENT = "The recordings cannot tell anything: "
 _TO_CORRECT = "Nothing can be told before a correction: "
 _CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
 _SMALL = 5.0  # % of the response
-_STATED = 3  # mechanisms whose strengths are given
 
 
 def statement(facts: Facts) -> str:
@@ -203,7 +210,7 @@ def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
     """Name, value and interval of the first parameter of each of a few mechanisms: "contact resonance has a tip mass of
     6.02 g (5.9 to 6.1)"."""
     strengths = []
-    for mechanism in mechanisms[:_STATED]:
+    for mechanism in mechanisms[:MOST_NAMED]:
         for parameter in mechanism["parameters"][:1]:
             value, low, high = (in_digits(parameter[key], 3) for key in numbers.ENDS)
             unit = "" if parameter["unit"] == "-" else f" {parameter['unit']}"
@@ -217,7 +224,7 @@ def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
 def _reserve(fit: Mapping[str, Any]) -> str:
     """A reserve where held-out recordings are predicted far worse than the noise."""
     missed, floor = fit["after"]["heldout_rmse_percent"], fit["noise_floor_percent"]
-    if missed is None or floor is None or missed <= _FAR_ABOVE * floor:
+    if missed is None or floor is None or missed <= FAR_ABOVE * floor:
         return ""
     return f"but what was held out is missed by {in_digits(missed, 2)} %, where noise gives {in_digits(floor, 2)} %"
 
@@ -294,7 +301,6 @@ _RESERVES = (
     *(FindingCode.TIP_SHAPE, FindingCode.THICKNESS_UNKNOWN, FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER),
     *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.UNUSUAL_SCATTER),
 )
-_MOST = 2  # findings that are quoted; the others are counted
 
 
 def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCode]) -> list[str]:
@@ -302,10 +308,10 @@ def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCo
         (finding for finding in findings if finding["code"] in decisive),
         key=lambda finding: decisive.index(FindingCode(finding["code"])),
     )
-    further = Counter(finding["code"].replace("_", " ") for finding in chosen[_MOST:])
+    further = Counter(finding["code"].replace("_", " ") for finding in chosen[MOST_QUOTED:])
     counted = [f"{count} of {code}" for code, count in further.items()]
     more = [f"further findings: {', '.join(counted)}"] if counted else []
-    return [*map(_quoted, chosen[:_MOST]), *more]
+    return [*map(_quoted, chosen[:MOST_QUOTED]), *more]
 
 
 def _quoted(finding: Mapping[str, str]) -> str:

@@ -15,16 +15,17 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.noise import (
     GAIN_PRIOR,
     POSITION_PRIOR,
+    START_GAIN,
 )
 from underskin.mechanisms.models.frf import FAINT
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.units import Array, Floats, Indices, Mask
 
 _GAINS = np.geomspace(0.005, 0.5, 17)  # fine enough for 65 recordings, which determine the scatter to 9 %
-_USUAL_GAIN_NODE = 6  # index of a usual scatter among these
+_USUAL_GAIN_NODE = int(np.abs(np.log(_GAINS) - np.log(START_GAIN)).argmin())
 _NEGLIGIBLE = 60.0  # nats behind the best node, from which on a node cannot matter for a law of few features
-_USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], with a law; without one the scatter may be larger
+_USUAL_POSITION = np.geomspace(*POSITION_RANGE, 4)  # [m], with a law; without one the scatter may be larger
 _ALL_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)  # [m]
 _BLOCK = 16  # sets of features per block
 _FEW_FEATURES = 3  # up to which products of pairs are fewer than copies weighted for each scatter

@@ -18,7 +18,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.dataset import Lines, curve_lines
-from underskin.diagnosis.inference.evidence import parts
+from underskin.diagnosis.inference.evidence import LEAST_EIGENVALUE, NEGLIGIBLE_NATS, TRADING_CORRELATION, parts
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.gaussian import Gaussian, moments
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
@@ -28,7 +28,7 @@ from underskin.mechanisms.laws import platen_friction, strain_stiffening
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.thickness_error import ThicknessError
 from underskin.mechanisms.models.composed import Model
-from underskin.mechanisms.models.composition import fit_coordinates
+from underskin.mechanisms.models.composition import WIDE_SD, fit_coordinates
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter
@@ -58,7 +58,6 @@ class LayerOfUnknownThickness(LayeredContact):
 
 _BETWEEN_SPECIMENS = 0.02  # sd of the logarithm of the modulus from piece to piece of one elastomer
 _EXTRAPOLATION = 0.15  # of the reduction of a modulus extrapolated to no strain: differs so between laws of one fit
-_RATIO = 0.9  # correlation from which on only the ratio of two quantities is known
 _HIDDEN_PRIOR = 0.5  # prior of a mechanism that cannot show: platens are oiled as often as they are not
 MODULUS_ERROR, MODULUS = "modulus_error", ("", "youngs_modulus")
 
@@ -96,7 +95,7 @@ class CurvePosterior:
         """Whether only the ratio of a quantity to another one of its mechanism is known."""
         mechanism = self.quantities[index][0]
         deviation = np.sqrt(np.diag(self.covariance))
-        correlated = np.abs(self.covariance[index]) > _RATIO * deviation[index] * deviation
+        correlated = np.abs(self.covariance[index]) > TRADING_CORRELATION * deviation[index] * deviation
         return any(
             correlated[other] and quantity[0] == mechanism
             for other, quantity in enumerate(self.quantities)
@@ -284,9 +283,7 @@ def _unit_slope(parameter: Parameter, fit: Floats, index: int, count: int) -> Fl
 
 
 _INFORMATIVE = 0.8  # of a prior's standard deviation: a posterior that is wider is not informative
-_MOST_SETS, _EVIDENCE_MARGIN = 3, 12.0  # sets of a kind of curves, and how far behind the best one [nats]
-_MODULUS_SD = 1.5  # of the logarithm of a modulus that is not declared
-_LEAST_CORRELATION = 1e-11  # eigenvalue of correlations: less is rounding
+_MOST_SETS = 3  # of a kind of curves
 
 # A prior as a normal one: mean, variance, whether it is flat (then the variance is that of a normal one of the same
 # height), and by how much its log density at the curves' mean exceeds that of the normal one
@@ -347,7 +344,7 @@ class CurveLikelihood:
             for names, posterior in kind.posteriors.items()
         }
         ranked = sorted(weights, key=lambda names: -weights[names])
-        return [names for names in ranked[:_MOST_SETS] if weights[names] > weights[ranked[0]] - _EVIDENCE_MARGIN]
+        return [names for names in ranked[:_MOST_SETS] if weights[names] > weights[ranked[0]] - NEGLIGIBLE_NATS]
 
     def log_evidence_apart(self, kind: OtherKind, names: Sequence[str], supported: int) -> float:
         """Of the curves of a kind with a material of their own, where the first kind has a set of mechanisms.
@@ -435,7 +432,7 @@ def _in_model(
             if MODULUS_ERROR in spans:
                 matrix[row, spans[MODULUS_ERROR].start] = 1.0
             offset[row] = np.log(to_si("youngs_modulus_mpa", 1.0 if declared is None else declared))
-            priors.append((float(posterior.mean[row]), _MODULUS_SD**2, False, 0.0))
+            priors.append((float(posterior.mean[row]), WIDE_SD**2, False, 0.0))
             continue
         if (mechanism, key) == THICKNESS:
             matrix[row, names.index("thickness")] = 1.0
@@ -516,7 +513,7 @@ def _inverse(covariance: Floats) -> Floats:
     """Inverse of a covariance whose correlations may be nearly singular (only a ratio of quantities is known)."""
     deviation = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(deviation, deviation))
-    return np.asarray((vectors / np.maximum(values, _LEAST_CORRELATION)) @ vectors.T / np.outer(deviation, deviation))
+    return np.asarray((vectors / np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T / np.outer(deviation, deviation))
 
 
 def _definite(precision: Floats) -> Floats:

@@ -22,8 +22,9 @@ from functools import cached_property
 import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.fit import LEVEL, SMOOTH, Fitter
+from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
 from underskin.diagnosis.selection.priors import LARGEST, even_laws, least_evidence
@@ -42,7 +43,6 @@ _ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
 _DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted
 _PARENTS, _LARGEST_OF_ONE_KIND = 3, 3
 _PAIRED = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.LOAD_INCREMENT)  # of which two may cancel
-_PARENT_WITHIN = 12.0  # nats behind the best within which a single is a parent
 
 
 def search(
@@ -164,7 +164,7 @@ class _Sets:
         ranked = sorted(self.explanations.values(), key=weight, reverse=True)
         smaller = [fitted for fitted in ranked if len(fitted.names) == size - 1]
         if size == 2:
-            return [fitted for fitted in smaller[:_PARENTS] if weight(fitted) > weight(ranked[0]) - _PARENT_WITHIN]
+            return [fitted for fitted in smaller[:_PARENTS] if weight(fitted) > weight(ranked[0]) - NEGLIGIBLE_NATS]
         if size > _LARGEST_OF_ONE_KIND and not self.required:  # guesses, beside the laws that are none
             smaller = [fitted for fitted in smaller if self.contact <= frozenset(fitted.names)]
         best = next(fitted for fitted in ranked if len(fitted.names) < size)
@@ -193,8 +193,8 @@ def smooth_error_gain(explanation: Explanation) -> float:
     at = fitter.evaluate(fitter.at(explanation.point), slopes=False)
     points = at.points[np.zeros(len(_ROUGHER), dtype=np.intp)]
     covariance = points.covariance.copy()
-    covariance[:, LEVEL] += np.log(_ROUGHER)
-    covariance[:, SMOOTH] = explanation.best.hypothesis.covariance[SMOOTH].low
+    covariance[:, Scatter.LEVEL] += np.log(_ROUGHER)
+    covariance[:, Scatter.SMOOTH] = explanation.best.hypothesis.covariance[Scatter.SMOOTH].low
     without = fitter.evaluate(replace(points, covariance=covariance), slopes=False)
     return float(without.cost.min() - at.cost[0])
 

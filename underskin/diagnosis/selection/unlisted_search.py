@@ -19,8 +19,10 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from underskin.autodiff import Differentiated
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
+from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.residuals import (
+    MAY_MATTER_NATS,
     force_and_slopes,
     information,
     information_beyond,
@@ -235,7 +237,6 @@ class _LineNoise:
 
 
 _HOLD = 2e-3  # of the range of displacement: deviation from the deepest sample while a sphere is held
-_START_MARGIN = 30.0  # nats behind the best point of a grid within which a fit begins too
 
 
 class CurveScreening:
@@ -288,9 +289,7 @@ class CurveScreening:
             gains = 0.5 * (amplitudes * moment).sum(axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
             best = int(np.argmax(gains))
             mean = float(np.logaddexp.reduce(gains) - np.log(points))
-            near_best = [
-                index for index in range(points) if index != best and gains[index] > gains[best] - _START_MARGIN
-            ]
+            near_best = [index for index in range(points) if index != best and gains[index] > gains[best] - PRUNE_NATS]
             starts = tuple(np.append(amplitudes[index] * prior_deviations(law), law.grid[index]) for index in near_best)
             scores.append(Score(law, mean, log_share, amplitudes[best], law.grid[best], starts))
         return scores
@@ -325,13 +324,8 @@ def _turning_sample(displacement: Floats) -> int:
     return int(np.flatnonzero(displacement >= displacement.max() - _HOLD * np.ptp(displacement))[-1])
 
 
-_BASE_SETS = 1  # most probable sets of mechanisms on top of which laws are tried, besides the null hypothesis
 _MOST_FITTED = 8  # laws
-_EVIDENCE_MARGIN, _EVIDENCE_MARGIN_SHARE = (
-    12.0,
-    0.35,
-)  # a law is fitted if its score is within so many nats, or this share of the best one's gain, of the best score
-_MAY_MATTER = 6.0  # nats behind the most probable answer, by the score
+_MARGIN_SHARE = 0.35  # of the best law's gain: laws whose scores are within that of the best one are fitted too
 _PAIRED_LAWS = 2  # laws that are fitted with every mechanism; on curves laws that are fitted without mechanisms
 _SINGLE_LAWS = 5  # laws on FRFs that are fitted without mechanisms where no set of mechanisms is nearly as probable
 _DECISIVE = 50.0  # gain over the best set [nats], from which on that set holds wrong mechanisms in place of the law
@@ -357,8 +351,8 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
             for score in _best_of_combinations(screening.scores(base))
         ]
     candidates.sort(key=lambda candidate: -candidate[0])
-    least = candidates[0][0] - max(_EVIDENCE_MARGIN, _EVIDENCE_MARGIN_SHARE * (candidates[0][0] - best))
-    chosen = [candidate for candidate in candidates[:_MOST_FITTED] if candidate[0] > max(least, best - _MAY_MATTER)]
+    least = candidates[0][0] - max(NEGLIGIBLE_NATS, _MARGIN_SHARE * (candidates[0][0] - best))
+    chosen = [candidate for candidate in candidates[:_MOST_FITTED] if candidate[0] > max(least, best - MAY_MATTER_NATS)]
     single = [candidate for candidate in candidates if candidate[1] is null and candidate[2].gain > _LEAST_SINGLE]
     if problem.lines.curves:  # where many laws change the force as mechanisms do
         chosen += [candidate for candidate in single[:_PAIRED_LAWS] if candidate not in chosen]
@@ -405,18 +399,13 @@ def _screening(problem: FittingProblem, null: Explanation, best: Explanation) ->
 
 
 def _base_explanations(search: Search, null: Explanation, ranked: Sequence[Explanation]) -> list[Explanation]:
-    """The explanations on top of which laws are tried."""
-    chosen = {null.names: null}
-    named = [explanation for explanation in ranked if explanation.names][:_BASE_SETS]
+    """The explanations on top of which laws are tried: the null hypothesis, the most probable set of mechanisms, and
+    this one less each of them."""
+    best = next((explanation for explanation in ranked if explanation.names), null)
     by_names = {frozenset(explanation.names): explanation for explanation in search.explanations}
-    for explanation in named:
-        chosen[explanation.names] = explanation
-    for explanation in named[:1]:
-        for name in explanation.names:
-            smaller = by_names.get(frozenset(explanation.names) - {name})
-            if smaller is not None:
-                chosen[smaller.names] = smaller
-    return list(chosen.values())
+    smaller = [by_names.get(frozenset(best.names) - {name}) for name in best.names]
+    chosen = [null, best, *(explanation for explanation in smaller if explanation is not None)]
+    return list({explanation.names: explanation for explanation in chosen}.values())
 
 
 def _best_of_combinations(scores: Sequence[Score]) -> list[Score]:
@@ -454,7 +443,7 @@ def _with_named_mechanisms(problem: FittingProblem, search: Search, fitted: Sequ
     best = max((search.log_weight(explanation) for explanation in search.explanations), default=0.0)
     requests: list[Request] = []
     for explanation in single:
-        if search.log_weight(explanation) < best - _MAY_MATTER:
+        if search.log_weight(explanation) < best - MAY_MATTER_NATS:
             continue
         requests += [
             Request((name, *explanation.names), explanation)

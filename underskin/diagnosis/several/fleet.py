@@ -26,6 +26,7 @@ from underskin.diagnosis.several.joint_report import Fleet, PooledQuantity, flee
 from underskin.diagnosis.several.population import (
     DEPARTURES,
     ERRORS,
+    FAR_SDS,
     LOG_D33_PC_PER_N,
     QUANTITIES,
     REGULAR,
@@ -45,7 +46,6 @@ from underskin.surrogate.sigma_table import SigmaTable
 _LEAST_SKINS = 3  # of a population
 _PRUNE_NATS = 40.0  # nats behind the best set of a skin, at most
 _P_DIFFERS = 0.03  # probability that a skin differs from the others by one mechanism
-_FAR_FROM_DECLARED = 2.0  # common deviation of the skins, in sd, above which an error of the declared values is tried
 # Of the logarithm of a strength: its spread from skin to skin; sd of its mean, and of a skin that departs in it
 _STRENGTH, _STRENGTH_SD, _DEPARTURE_SD = Spread(0.1, 2.0), 10.0, 1.0
 _INFORMS = 0.5  # of the precision of a strength's prior: the least of informative recordings
@@ -183,7 +183,7 @@ def _fleet(results: Mapping[str, DiagnosisResult], lacking: Sequence[str], order
     attempts = [attempt("", (0.0, 0.0), 0.0)]
     for row, error in enumerate(ERRORS):
         off, deviation = _off(attempts[0].skins, row, error)
-        if abs(off) > _FAR_FROM_DECLARED * max(deviation, QUANTITIES[row].declared):
+        if abs(off) > FAR_SDS * max(deviation, QUANTITIES[row].declared):
             centre, far = (off, 0.0) if row == 0 else (0.0, off), QUANTITIES[row].far
             attempts.append(attempt(error, centre, odds + float(np.log(deviation / far) - 0.5 * (off / far) ** 2)))
     weights = np.array([tried.log_weight for tried in attempts])

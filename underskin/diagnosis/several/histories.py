@@ -15,7 +15,9 @@ from typing import Self
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.data.names import RIVAL_SHARE
+from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
+from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.inference.residuals import with_hidden_mechanism
@@ -29,12 +31,10 @@ from underskin.units import Floats
 _OF_SKIN = ("youngs_modulus", "thickness")  # parameters of the base model that belong to the skin
 _P_CHANGE = 0.15  # probability that a set changes from one campaign to the next by one mechanism
 _P_SAME_STRENGTH = 0.9  # probability that a mechanism that remains keeps its strength
-_BEHIND_BEST, _MOST_SETS = 12.0, 12  # nats behind a campaign's best, and how many of its sets
-_PRUNE_NATS = 30.0  # nats behind the best set of a campaign beyond which a set is in no history
+_MOST_SETS = 12  # of a campaign
 _MOST_HISTORIES = 400  # retained from campaign to campaign
 USUAL_CHANGE = 0.2  # sd of the logarithm of d33 between campaigns, where it changes
 AGEING = "ageing"
-_LIKELY = 0.1  # of the weight of the most probable cause: least weight of a listed one
 _SPACING = 0.03  # of ln d33: about the distance of nodes over a mechanism's prior
 
 Names = tuple[str, ...]
@@ -134,7 +134,7 @@ class CampaignFits:
     def required_sets(self) -> list[frozenset[str]]:
         """The supported sets near the best one."""
         ranked = sorted(filter(self.search.is_supported, self.search.explanations), key=self.search.log_weight)[::-1]
-        least = self.search.log_weight(ranked[0]) - _BEHIND_BEST
+        least = self.search.log_weight(ranked[0]) - NEGLIGIBLE_NATS
         return [frozenset(fit.names) for fit in ranked[:_MOST_SETS] if self.search.log_weight(fit) > least]
 
     @property
@@ -196,7 +196,7 @@ def set_histories(fits: Sequence[CampaignFits]) -> list[SetHistory]:
     explanations = [[campaign.explained(names) for names in sets] for campaign in fits]
     log_evidence = np.array([[-np.inf if fit is None else fit.log_evidence for fit in row] for row in explanations])
     log_evidence -= log_evidence.max(axis=1, keepdims=True)
-    log_evidence[log_evidence <= -_PRUNE_NATS] = -np.inf
+    log_evidence[log_evidence <= -PRUNE_NATS] = -np.inf
     weights = log_evidence[0] + [log_prior(len(names), supported) for names in sets]
     paths: list[tuple[float, tuple[int, ...]]] = [(weight, (index,)) for index, weight in enumerate(weights.tolist())]
     for before, after, here in zip(explanations[:-1], explanations[1:], log_evidence[1:].tolist(), strict=True):
@@ -328,7 +328,7 @@ def causes(campaign: CampaignFits, names: Names, size: float, deviation: float) 
                 density = np.exp(log_normal(hidden.mean - before, deviation**2 + _SPACING**2))
                 weights[name] = float(hidden.share @ density)
     most = max(weights.values(), default=0.0)
-    likely = {name: weight for name, weight in weights.items() if weight > _LIKELY * most}
+    likely = {name: weight for name, weight in weights.items() if weight > RIVAL_SHARE * most}
     return tuple(sorted(likely, key=lambda name: (name != AGEING, -likely[name])))
 
 

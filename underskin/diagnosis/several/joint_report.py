@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
+from underskin.diagnosis.data.names import EXPLAINED, MOST_NAMED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.reporting.d33 import StatedD33
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
-from underskin.diagnosis.reporting.report import SCHEMA, Reported
+from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.reporting.report import ALTERNATIVES, LEAST_PROBABILITY, SCHEMA, Reported
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
 from underskin.diagnosis.several.population import D33, REGULAR, STATED, Populations
 from underskin.diagnosis.several.sensors import (
@@ -31,12 +31,10 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_percent, listed, of_clauses
 from underskin.inversion.array_course import FEWEST_DATES
 from underskin.inversion.array_history import TWO_DATES, array_change_in_words
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.units import Floats
 
-_ALTERNATIVES = 6
-_LEAST_PRESENCE = 0.005  # probability of a listed mechanism
 _LEAST_LISTED = 0.1  # probability of a listed quantity in which a skin may depart
-_MOST_NAMED = 3  # changes, causes, skins and departures in a statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +133,7 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
         "alternatives": [
             _share(history.mechanisms or [NOTHING_MISSING], skin.p_described * history.probability)
             | {"why_not": _history_in_words(history, names)}
-            for history in skin.histories[1 : _ALTERNATIVES + 1]
+            for history in skin.histories[1 : ALTERNATIVES + 1]
         ],
         "not_identifiable": _not_identifiable({names[-1]: last}),
         "findings": [*(finding.in_report() for finding in exchanges), *_prefixed(skin.reports, "findings")],
@@ -290,7 +288,7 @@ def _presence(skin: SkinOverDates) -> list[dict[str, Any]]:
         for name in history.mechanisms:
             once[name] = once.get(name, 0.0) + history.probability
     ranked = sorted(once.items(), key=lambda item: -item[1])
-    return [_share([name], skin.p_described * share) for name, share in ranked if share > _LEAST_PRESENCE]
+    return [_share([name], skin.p_described * share) for name, share in ranked if share > LEAST_PROBABILITY]
 
 
 def _per_sensor(skin: SkinOverDates) -> list[dict[str, Any]]:
@@ -380,8 +378,8 @@ def _change_clauses(skin: SkinOverDates) -> list[str]:
     if over is not None and not steps:
         of_array = _array_clauses(over, skin.changes, dates)
     sensors = [change for change in changed_once(skin.changes) if change.sensor is not None]
-    clauses = [_change_in_words(change, dates) for change in sensors[:_MOST_NAMED]]
-    more = len(sensors) - _MOST_NAMED
+    clauses = [_change_in_words(change, dates) for change in sensors[:MOST_NAMED]]
+    more = len(sensors) - MOST_NAMED
     clauses += [f"d33 of each sensor has {more} further changes"] if more > 0 else []
     changed = steps or (over is not None and over.is_significant)
     return [*of_array, *clauses] if changed else [*clauses, *of_array]
@@ -413,8 +411,8 @@ def _array_clauses(over: ArrayOverDates, changes: Sequence[Change], dates: Campa
 
 
 def _causes_in_words(change: Change) -> str:
-    few = [in_words([name]) for name in change.causes[:_MOST_NAMED]]
-    more = ["another mechanism"] if len(change.causes) > _MOST_NAMED else []
+    few = [in_words([name]) for name in change.causes[:MOST_NAMED]]
+    more = ["another mechanism"] if len(change.causes) > MOST_NAMED else []
     causes = " or ".join([*few, *more, "an amplifier's gain", "the temperature"])
     return f"a change of level that {causes} would make: these recordings do not tell which"
 
@@ -451,8 +449,8 @@ def _d33_of_skins(
 
 
 def _few(skins: Sequence[str]) -> str:
-    further = len(skins) - _MOST_NAMED
-    return listed([*skins[:_MOST_NAMED], *([f"{further} more"] if further > 0 else [])])
+    further = len(skins) - MOST_NAMED
+    return listed([*skins[:MOST_NAMED], *([f"{further} more"] if further > 0 else [])])
 
 
 def _population(quantity: PooledQuantity) -> dict[str, Any]:
@@ -528,8 +526,8 @@ def _departure_clauses(quantities: Sequence[PooledQuantity], rows: Sequence[Mapp
                 f"where the others have {others} ({in_percent(departure['probability'])})"
             )
     clauses = [f"one departs, {skin}, {', or '.join(of_skin)}" for skin, of_skin in ways.items()]
-    more = len(clauses) - _MOST_NAMED
-    clauses = [*clauses[:_MOST_NAMED], *([f"{more} more depart, see the populations"] if more > 0 else [])]
+    more = len(clauses) - MOST_NAMED
+    clauses = [*clauses[:MOST_NAMED], *([f"{more} more depart, see the populations"] if more > 0 else [])]
     return clauses or ["none is seen to depart from the others"]
 
 

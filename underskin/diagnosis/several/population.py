@@ -20,23 +20,24 @@ import numpy as np
 from scipy.special import expit, logit
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.evidence import Evidence
+from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS, Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.fit import GAIN
+from underskin.diagnosis.inference.fit import Scatter
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import curvature_of_prior, parameter_slices
 from underskin.diagnosis.noise import Plateau
-from underskin.diagnosis.reporting.numbers import mixture_quantile
+from underskin.diagnosis.reporting.numbers import QUANTILES_OF_95
 from underskin.diagnosis.several.histories import CampaignFits
+from underskin.inversion.mixed_model import mixture_quantile
+from underskin.mechanisms.models import composition
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats
 
-_P_ANY_DEPARTS = 0.5  # prior probability that any skin of a fleet departs
-_PRUNE_NATS = 12.0  # nats behind the best set of departing skins beyond which a set is dropped
-_MOST_SETS = 200  # with equally many departing skins
 _NEGLIGIBLE = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals
+_P_ANY_DEPARTS = 0.5  # prior probability that any skin of a fleet departs
+_MOST_SETS = 200  # with equally many departing skins
 STATED = 0.5  # least probability of a stated departure, and of a stated error of the values declared for all skins
 REGULAR = ""  # the departure of a skin that does not depart
 
@@ -76,7 +77,7 @@ def _far(error: str) -> float:
     return curvature_of_prior(CATALOGUE[error].parameters_stated[0])[0] ** -0.5
 
 
-D33, LOG_D33_PC_PER_N = "d33", float(np.log(15.0))
+D33, LOG_D33_PC_PER_N = composition.D33.name, composition.D33.start
 # Pieces of one cure and of one poled film differ by some percent; a mould sets the thickness. An amplifier's other
 # range changes d33 by half; E and h depart as the priors of the mechanisms have it.
 QUANTITIES = (
@@ -85,8 +86,8 @@ QUANTITIES = (
     Quantity(D33, "d33", "pC/N", 1.5, 1.5, 0.4, Spread(0.03, 2.0)),
 )
 DEPARTURES = tuple(quantity.departure for quantity in QUANTITIES)
-ERRORS = DEPARTURES[:2]
-_BEYOND = 2.0  # deviations from the batch beyond which a regular fit is no approximation
+ERRORS = tuple(departure for departure in DEPARTURES if departure != D33)
+FAR_SDS = 2.0  # deviations from the batch beyond which a regular fit is no approximation, and other values are tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +194,7 @@ class _Fleet:
             totals = {states: float(np.logaddexp.reduce(values, axis=None)) for states, values in weights.items()}
             best = max(best, float(np.logaddexp.reduce(all_weights[none], axis=None)), *totals.values())
             ranked = sorted(totals, key=lambda states: -totals[states])[:_MOST_SETS]
-            current = {states: weights[states] for states in ranked if totals[states] > best - _PRUNE_NATS}
+            current = {states: weights[states] for states in ranked if totals[states] > best - NEGLIGIBLE_NATS}
             all_weights |= current
         return all_weights
 
@@ -214,11 +215,8 @@ class _Fleet:
                     centres.append(np.array([at[nodes] for at, _ in by_skin]))  # (skins, spreads, quantities)
                     deviations.append(np.array([sd[nodes] for _, sd in by_skin]))
         weight = np.concatenate(weights) / sum(part.sum() for part in weights)
-        skins = list(zip(np.concatenate(centres, axis=1), np.concatenate(deviations, axis=1), strict=True))
-        of_skins = [
-            [[mixture_quantile(level, weight, *column) for column in zip(at.T, sd.T, strict=True)] for at, sd in skins]
-            for level in (0.5, 0.025, 0.975)
-        ]
+        centre, deviation = (np.concatenate(parts, axis=1).swapaxes(1, 2) for parts in (centres, deviations))
+        of_skins = [mixture_quantile(weight, centre, deviation, level) for level in QUANTILES_OF_95]
         joint = {
             tuple(skin_states[state].departure for skin_states, state in zip(self.skins, states, strict=True)): of_set
             for states, of_set in zip(log_weights, share.sum(axis=(1, 2)).tolist(), strict=True)
@@ -260,7 +258,7 @@ def benches(candidates: Sequence[CampaignFits]) -> list[Bench]:
     positioning scatter all d33 are biased.
     """
     leaders = [candidate.search.fit_behind(candidate.search.answers[0]) for candidate in candidates]
-    log_gains = np.array([leader.point.covariance[GAIN] for leader in leaders])
+    log_gains = np.array([leader.point.covariance[Scatter.GAIN] for leader in leaders])
     recordings = np.array([leader.best.hypothesis.lines.recordings for leader in leaders])
     precision = 1 / (_FROM_SKIN_TO_SKIN**2 + 0.5 / np.maximum(recordings - 1, 1))
     ends = (_LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
@@ -368,7 +366,7 @@ class FleetSkin:
         others = [name for name in self.errors if (names, name) in self._fitted]
         centre, precision = self._prior(REGULAR)
         mean, _ = regular.posterior(centre, precision)
-        if not others or (np.abs(mean - centre) * np.sqrt(precision))[: len(ERRORS)].max() <= _BEYOND:
+        if not others or (np.abs(mean - centre) * np.sqrt(precision))[: len(ERRORS)].max() <= FAR_SDS:
             return regular
         return self._fitted[names, max(others, key=lambda name: self._log_integral(self._fitted[names, name], name))]
 

@@ -16,14 +16,15 @@ from typing import Self
 
 import numpy as np
 
+from underskin.diagnosis.data.names import NAMED
 from underskin.diagnosis.reporting.facts import DiagnosisResult
-from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.several.histories import USUAL_CHANGE, log_normal
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode, Reason
 from underskin.inversion.array_course import FEWEST_DATES, FEWEST_SENSORS, ArrayLevels, array_levels
 from underskin.inversion.array_course import changes as changes_between_ends
 from underskin.inversion.invert import invert
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.prediction.adopted_model import AdoptedModel
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
@@ -31,7 +32,6 @@ from underskin.recordings.readers.calendar_times import time_zone
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab
 
-_STATED = 0.98  # probability of a change, or of an exchange over two changes, that is stated
 _LEAST, _LEAST_OF_ARRAY = 0.03, 0.05  # relative changes that are stated: amplifiers are calibrated to some percent
 _P_CHANGE, _P_SUSPECTED = 0.05, 0.5  # that d33 changes; of a sensor whose level stands apart in one of two campaigns
 _P_EXCHANGE = 0.2  # odds of an exchange, where two sensors have changed at once, over two changes
@@ -260,7 +260,7 @@ class SensorsOverDates:
         over, levels = self.array, self._levels
         if over is None or len(over.numbers) < FEWEST_DATES:
             return []
-        large = over.change.probability > _STATED and abs(over.change.value) > _LEAST_OF_ARRAY
+        large = over.change.probability > 1 - NAMED and abs(over.change.value) > _LEAST_OF_ARRAY
         gradual = [over.change] if large else []
         between = changes_between_ends(self.times, levels.departure, levels.departure_deviation, gain_scatters=False)
         dates = [np.flatnonzero(np.isfinite(departure)).tolist() for departure in levels.departure]
@@ -282,7 +282,7 @@ class SensorsOverDates:
         }
         for first, second in sorted(odds, key=lambda pair: -odds[pair]):
             free = changes[first].exchanged_with is None and changes[second].exchanged_with is None
-            if free and odds[first, second] > np.log(_STATED / (1 - _STATED)):
+            if free and odds[first, second] > np.log((1 - NAMED) / NAMED):
                 changes[first], changes[second] = (
                     replace(changes[first], exchanged_with=changes[second].sensor),
                     replace(changes[second], exchanged_with=changes[first].sensor),
@@ -310,7 +310,7 @@ def _change(sensor: str | None, before: int, until: int, size: float, sd: float,
 def _is_stated(change: Change) -> bool:
     """Whether a change is probable and large enough to be stated."""
     least = _LEAST_OF_ARRAY if change.sensor is None else _LEAST
-    return change.probability > _STATED and abs(float(np.log1p(change.value))) > least
+    return change.probability > 1 - NAMED and abs(float(np.log1p(change.value))) > least
 
 
 def changed_once(changes: Sequence[Change]) -> list[Change]:

@@ -13,7 +13,7 @@ from math import comb, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, Alternative, Levels, Undone, times
+from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, Alternative, Levels, Undone, times
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
@@ -21,16 +21,14 @@ from underskin.units import Floats, Mask
 
 _FACTORS = {2.0: "peak-to-peak", 0.5: "peak-to-peak", 2.0**0.5: "rms", 0.5**0.5: "rms"}
 _LOG_PRIOR = -log(75)  # over that of a warm-up: settings seldom change in a campaign, and there are four factors
-_OTHER = log(4)  # by which any other factor of the same recordings is rarer, since no convention has it
 _LEAST_SHARE = 0.1  # of the recordings that are off; fewer may have missed their place
 _WELL, _APART = 0.7, 0.85  # share of recordings within a third of ln c of their level: at least; in separate levels
 _SKEWED = 6.5  # of ln prior: misses of the place lower levels by up to half, which two parts fit better than one
-_SEARCHED = tuple(product((0.04, 0.12), (0.03, 0.3)))  # scatter and size of smooth functions
 
 
 def amplitude_factors(levels: Levels) -> Iterator[Alternative]:
     """Each factor with the sets of recordings that may have it, and the rivals."""
-    for factor, (scatter, smooth_size) in product(_FACTORS, _SEARCHED):
+    for factor, (scatter, smooth_size) in product(_FACTORS, SEARCHED):
         precision = levels.precision(scatter, smooth_size)
         off = _chosen(levels.value, precision, log(factor))
         offset = np.where(off, log(factor), 0.0)
@@ -47,7 +45,7 @@ def amplitude_factors(levels: Levels) -> Iterator[Alternative]:
             log_prior -= _SKEWED
         undo = partial(_without_factor, levels=levels, factor=factor, off=off)
         yield Alternative(log_prior, offset=offset, undo=undo)
-        yield Alternative(log_prior - _OTHER, column=CHANGE * off.astype(float))
+        yield Alternative(log_prior - SELDOM, column=CHANGE * off.astype(float))
         yield Alternative(-log(steps), column=CHANGE * step.astype(float))
 
 

@@ -20,6 +20,7 @@ from underskin.recordings.frf.estimation import advanced, common_delay, lines_of
 from underskin.recordings.frf.spectra import stacked
 from underskin.units import Complexes, Floats, Mask
 
+LEAST_RECORDINGS = 3  # so that one can contradict the others
 LEAST_LINES = 4  # for a median of their differences
 _MEAN, _LINES = 9.0, 3.0  # over their variance
 _FLAT_HZ = 130.0  # below it the response is about flat

@@ -15,15 +15,11 @@ from math import log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, Alternative, Levels, Undone
+from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, SPREADS, Alternative, Levels, Undone
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.units import Indices
-
-_SPREADS = (0.06, 0.25)  # t of sensors whose exchange would show
-_SEARCHED = 0.04, 0.03  # s, and size of smooth functions, at which all are tried
-_LOG_PRIOR = -log(4)  # over that of a warm-up: a cable is seldom unplugged in a campaign
 
 Positions = Mapping[str, tuple[float, float]]
 
@@ -39,7 +35,7 @@ class _Exchange:
 
 def exchanged_cables(levels: Levels, positions: Positions) -> Iterator[Alternative]:
     """The likeliest exchanges, and the rivals; `positions` of the sensors are in mm."""
-    for spread in _SPREADS:
+    for spread in SPREADS[1:]:  # of sensors whose exchange would show
         tried = list(_tried(levels, spread))
         if not tried:
             return
@@ -47,7 +43,7 @@ def exchanged_cables(levels: Levels, positions: Positions) -> Iterator[Alternati
         sensor = levels.sensor.copy()
         sensor[best.since] = sum(best.sensors) - sensor[best.since]
         undo = partial(_with_right_sensors, levels=levels, exchange=best, positions=positions)
-        yield Alternative(_LOG_PRIOR - log(len(tried)), sensor=sensor, undo=undo)
+        yield Alternative(-SELDOM - log(len(tried)), sensor=sensor, undo=undo)
         late = np.isin(np.arange(len(levels.value)), best.since)
         for name in best.sensors:
             step = (late & (levels.sensor == name)).astype(float)
@@ -56,7 +52,7 @@ def exchanged_cables(levels: Levels, positions: Positions) -> Iterator[Alternati
 
 def _tried(levels: Levels, spread: float) -> Iterator[_Exchange]:
     """Every pair of sensors and first recording, with the gain at given t."""
-    precision = levels.precision(*_SEARCHED, spread)
+    precision = levels.precision(*SEARCHED[0], spread)
     weighed = precision @ levels.value
     sign = spread**2 * np.array([-1.0, -1.0, 1.0, 1.0])[:, None]
     for pair in combinations(np.unique(levels.sensor).tolist(), 2):

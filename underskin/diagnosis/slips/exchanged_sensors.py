@@ -24,7 +24,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.slips.comparison import aligned_lines, flat_level, no_response
-from underskin.diagnosis.slips.levels import GAIN
+from underskin.diagnosis.slips.levels import GAIN, LEAST_LEVELS, POSITION_MM
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
@@ -33,7 +33,7 @@ from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, Sk
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_SCATTER, _MISS_MM, _REACHES = 0.2, 0.3, 0.05  # s, p, f
+_SCATTER, _REACHES = 0.2, 0.05  # s, f; p is the largest of a stage
 _ASTRAY = 1e-5  # ε
 
 
@@ -47,7 +47,7 @@ class Response:
     def log_density(self, level: Floats, usual: float, largest: float) -> Floats:
         """Log density of each level [C/N], which is `usual` times the response, over that at the `largest` one."""
         value, slope, relative = self.value / largest, self.slope / largest, level / (usual * largest)
-        variance = (_SCATTER * value) ** 2 + (_MISS_MM * slope) ** 2 + _REACHES**2
+        variance = (_SCATTER * value) ** 2 + (POSITION_MM[-1] * slope) ** 2 + _REACHES**2
         density = np.exp(-0.5 * (relative - value) ** 2 / variance) / np.sqrt(2 * np.pi * variance)
         return np.asarray(np.log((1 - _ASTRAY) * density + 0.5 * _ASTRAY))
 
@@ -74,7 +74,6 @@ def response_of(
 _SMALL = 0.3  # of the largest response: the least scale of a level; and of the expected level: a weak one
 _ANSWERS = 0.6  # unexpected share of a level, or of `_SMALL`, above which exchanges are tried
 _GAIN_OF_EACH = log(4)  # of ln evidence, by each sensor's own recordings
-_FEWEST = 4  # recordings, so that one can contradict the others
 _FAR_OFF = 30.0  # times the usual response
 
 
@@ -97,7 +96,7 @@ def without_exchanges(
     campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable
 ) -> tuple[list[FrfRecording], list[Finding]]:
     """The recordings with true sensors, without those that fit no sensor, and the findings."""
-    if len(campaign.skin.sensors) < 2 or len(recordings) < _FEWEST:
+    if len(campaign.skin.sensors) < 2 or len(recordings) < LEAST_LEVELS:
         return list(recordings), []
     level = np.array([flat_level(recording) for recording in recordings])
     labels, near = (

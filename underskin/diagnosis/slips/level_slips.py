@@ -11,14 +11,13 @@ import numpy as np
 
 from underskin.diagnosis.slips.amplitude_factors import amplitude_factors
 from underskin.diagnosis.slips.exchanged_cables import exchanged_cables
-from underskin.diagnosis.slips.levels import GAIN, Alternative, Undone, causes_of, explained, levels
+from underskin.diagnosis.slips.levels import GAIN, LEAST_LEVELS, Alternative, Undone, causes_of, explained, levels
 from underskin.diagnosis.slips.sensor_gain import sensor_gains
 from underskin.diagnosis.slips.warm_up import warm_ups
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
-_LEAST = 4  # recordings, so that some agree and one can differ
 _MOST = 300  # recordings: the covariance of more takes minutes
 _MOST_SLIPS = 4  # of one campaign; more are no slips but an unusual rig
 
@@ -39,10 +38,10 @@ def without_level_slips(
 
 def _without_plainest(campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable) -> Undone | None:
     """The recordings without the likeliest slip, and the finding; None where no slip is likely."""
-    if len(recordings) < _LEAST:
+    if len(recordings) < LEAST_LEVELS:
         return None
     recorded = levels(campaign, recordings, table)
-    if not _LEAST <= len(recorded.value) <= _MOST:
+    if not LEAST_LEVELS <= len(recorded.value) <= _MOST:
         return None
     positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
     alternatives = [

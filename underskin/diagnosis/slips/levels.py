@@ -44,6 +44,8 @@ from underskin.units import Array, Floats, Indices
 
 GAIN = log(25)  # ln odds that a slip must have against none
 CHANGE = 0.45  # prior standard deviation of a slip's change of ln level of unknown size
+LEAST_LEVELS = 4  # of recordings or of sensors, so that some agree and one can differ
+SELDOM = log(4)  # by which what no convention or habit makes likely is rarer than what one does
 LEAST_CHANGE = 0.12  # of ln level; smaller ones are within the scatter of gains
 
 
@@ -68,9 +70,10 @@ def smooth_along(axis: Floats) -> Floats:
 
 _SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s, about the range of a rig's gain (recordings/usual_scatter.py)
 _SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
-_SPREAD = (0.01, 0.06, 0.25)  # t, of calibrated, of good and of poled sensors
+SPREADS = (0.01, 0.06, 0.25)  # t, of calibrated, of good and of poled sensors
 _SMOOTH_SIZES = (0.1, 0.4, 1.0)  # of all smooth functions together
-_POSITION_MM = (0.0, 0.1, 0.3)  # p, of a stage (recordings/usual_scatter.py)
+POSITION_MM = (0.0, 0.1, 0.3)  # p, of a stage (recordings/usual_scatter.py)
+SEARCHED = tuple(product((0.04, 0.12), (0.03, 0.3)))  # s, and size of smooth functions, at which slips are tried
 _OVERALL = 3.0  # prior standard deviation of ln of the gain, the d33 of all sensors
 
 
@@ -91,9 +94,9 @@ class Levels:
         """Smooth functions along all axes, times their prior standard deviation (recordings, functions)."""
         return np.hstack([np.zeros((len(self.value), 0)), *(smooth_along(axis) for axis in self.axes)])
 
-    def precision(self, scatter: float, smooth_size: float, spread: float = _SPREAD[1]) -> Floats:
+    def precision(self, scatter: float, smooth_size: float, spread: float = SPREADS[1]) -> Floats:
         """C⁻¹ (recordings, recordings) of smooth functions of a given size, at given s and t."""
-        noise = scatter**2 + (_POSITION_MM[1] * self.slope) ** 2
+        noise = scatter**2 + (POSITION_MM[1] * self.slope) ** 2
         return np.asarray(np.linalg.inv(self.expected(spread, smooth_size * self.smooth) + np.diag(noise)))
 
     def expected(self, spread: float, columns: Floats) -> Floats:
@@ -104,12 +107,12 @@ class Levels:
     @property
     def spreads(self) -> tuple[float, ...]:
         """The values of t that are tried."""
-        return _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
+        return SPREADS if self.sensor.max() > 0 else SPREADS[:1]
 
     @property
     def position_scatters(self) -> tuple[float, ...]:
         """The values of p that are tried."""
-        return _POSITION_MM if self.slope.max(initial=0.0) > 0.05 else _POSITION_MM[:1]
+        return POSITION_MM if self.slope.max(initial=0.0) > 0.05 else POSITION_MM[:1]
 
 
 def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable) -> Levels:

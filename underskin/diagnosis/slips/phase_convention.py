@@ -23,7 +23,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import norm
 
-from underskin.diagnosis.slips.comparison import LEAST_LINES
+from underskin.diagnosis.slips.comparison import LEAST_LINES, LEAST_RECORDINGS
 from underskin.diagnosis.slips.levels import times
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -233,7 +233,6 @@ def _fit(log_frf: LogFrf, elements: Elements) -> tuple[float, Floats]:
     return chi2, weights
 
 
-_LEAST = 3  # recordings with a phase, so that some can contradict the others
 _LARGEST = 0.7  # rad: limit that reduces the weight of sharp resonances, whose frequency differs between recordings
 _RELAXATIONS, _COEFFICIENT = 4, 0.1  # terms of a smooth phase, and the prior standard deviation of each [rad]
 _OVER_CHANNELS = 4.5  # of ln likelihood: phases of channels are ten times as frequent
@@ -285,7 +284,7 @@ def _aligned(bands: LogFrfBands) -> Floats:
     phase."""
     telling = bands.telling
     same = telling.astype(float)
-    if telling.sum() < _LEAST:
+    if telling.sum() < LEAST_RECORDINGS:
         return same
     phase, weight = _phases(bands)
     smooth = _SmoothPhase(bands.frequency, weight)

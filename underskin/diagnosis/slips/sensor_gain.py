@@ -10,13 +10,12 @@ from math import exp, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, Alternative, Levels, Undone, times
+from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, LEAST_LEVELS, Alternative, Levels, Undone, times
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 
 _WEAK, _WEAK_SPREAD = -2.0, 0.7  # prior of ln gain of a weak sensor: a third to a thirtieth
-_LEAST_SENSORS = 4  # so that three agree
 
 
 def sensor_gains(levels: Levels) -> Iterator[Alternative]:
@@ -31,7 +30,7 @@ def sensor_gains(levels: Levels) -> Iterator[Alternative]:
             column=_WEAK_SPREAD * of_sensor,
             undo=partial(_without_sensor, number=number),
         )
-        if len(sensors) >= _LEAST_SENSORS:
+        if len(sensors) >= LEAST_LEVELS:
             undo = partial(_without_gain, number=number)
             yield Alternative(-2 * log(len(sensors)), column=CHANGE * of_sensor, undo=undo)
 

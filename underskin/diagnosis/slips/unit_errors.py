@@ -7,9 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from underskin.diagnosis.slips.comparison import LEAST_RECORDINGS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
+from underskin.mechanisms.models.composition import D33
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Floats, Mask
@@ -17,10 +19,8 @@ from underskin.units import Floats, Mask
 SLIP = 1000.0  # between neighbouring units
 MOST_SHARE = 0.25  # of the recordings; more are no slip of single ones
 _WIDTH = np.log(12.0)  # of ln 1000: values that are meant to be equal differ by less
-_LEAST = 3  # recordings, so that one can contradict the others
 _FAINT = 5e-4  # dynamic force over preload: instruments resolve no less
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
-_D33 = 15.0  # pC/N: that of the base model, the centre of the prior
 _FIELDS = {  # the units that make values too large, and too small
     "preload_n": ("mN", "kN"),
     "dynamic_force_n": ("mN", "kN"),
@@ -33,7 +33,7 @@ def off_by_1000(values: Floats) -> Floats:
     """1 for each value that is about 1000 times those of the others, −1 where it is a thousandth, else 0; a value that
     is NaN or 0 is unknown. More than a quarter of all, but for one, are no slip."""
     known = values > 0
-    if known.sum() < _LEAST:
+    if known.sum() < LEAST_RECORDINGS:
         return np.zeros(len(values))
     usual = float(np.median(values[known]))
     slip = np.log(np.where(known, values, usual) / usual)
@@ -97,7 +97,7 @@ def levels_off_by_1000(recordings: Sequence[FrfRecording], ratio: Floats) -> tup
 
 def unlikely_d33(ratio: Floats, declared: float | None) -> list[Finding]:
     """The finding on a d33 that no sensor has, or that is off the declared one by a factor of 1000."""
-    d33 = float(np.nanmedian(np.abs(ratio))) * _D33 if np.isfinite(ratio).any() else 0.0
+    d33 = float(np.nanmedian(np.abs(ratio))) * D33.from_fit(D33.start) if np.isfinite(ratio).any() else 0.0
     if d33 <= 0:
         return []
     low, high = _LIKELY_D33

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import cell_response
 from underskin.diagnosis.noise import NoiseLevels
@@ -31,11 +32,10 @@ from underskin.units import Floats, Indices, Mask
 
 _STRETCHES = 9  # of a curve
 _HIGH_FORCE = 0.6  # of a curve's highest force
-_LEAST_LOAD, _LEAST_RETURN = 0.02, 0.02  # of the highest force and of the travel: unloading in contact
+_UNLOADING = 0.02  # of the highest force and of the travel: least load and return while unloading in contact
 _LEAST_SAMPLES = 6  # beyond the highest force, for a hold or an unloading branch
 _LEAST_RECORDINGS = 3  # that must remain
 _MOST_RIVALS = 10  # sets among which the choice is repeated
-_EVIDENCE_MARGIN = 15.0  # of these behind the best one [nats]
 _MOST_EXPLANATIONS = 4  # laws, and sets of mechanisms, among which the choice is repeated
 
 
@@ -108,10 +108,10 @@ def _curve_parts(lines: Lines) -> dict[str, Mask]:
         if lines.kind == "compression" and -travel.min() > travel.max():  # pulled
             travel = -travel
         turn = int(np.argmax(travel))
-        loaded = np.flatnonzero(force[first + turn : end] > _LEAST_LOAD * force[first:end].max())
+        loaded = np.flatnonzero(force[first + turn : end] > _UNLOADING * force[first:end].max())
         last_loaded = turn + (int(loaded[-1]) if len(loaded) else 0)
         peak = int(np.argmax(force[first : first + turn + 1])) if turn else 0
-        if last_loaded - turn >= _LEAST_SAMPLES and travel[turn] - travel[last_loaded] > _LEAST_RETURN * float(
+        if last_loaded - turn >= _LEAST_SAMPLES and travel[turn] - travel[last_loaded] > _UNLOADING * float(
             np.ptp(travel[: turn + 1])
         ):
             third = (last_loaded - turn) // 3
@@ -158,7 +158,7 @@ def hold_out(
     def weight(explanation: Explanation) -> float:
         return explanation.log_evidence + log_prior(explanation)
 
-    least = max(map(weight, ranked[:1]), default=0.0) - _EVIDENCE_MARGIN
+    least = max(map(weight, ranked[:1]), default=0.0) - NEGLIGIBLE_NATS
     rivals = [explanation for explanation in ranked if weight(explanation) > least][:_MOST_RIVALS]
     candidates = list({explanation.names: explanation for explanation in (null, *rivals)}.values())
     predictions = []
@@ -277,7 +277,7 @@ def nearest_law_findings(problem: FittingProblem, result: Search, null: Explanat
     return [Finding(Reason.NO_SIMPLE_LAW, "", "", arguments)]
 
 
-NOISY = 2.0  # times the noise by the lines' roughness
+FAR_ABOVE = 2.0  # times what noise, or the scatter of a poor rig, explains: worth a sentence
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines, curve_lines
-from underskin.diagnosis.data.names import EXPLAINED
+from underskin.diagnosis.data.names import EXPLAINED, RIVAL_SHARE
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.hypothesis import Likelihoods
@@ -301,7 +301,6 @@ def hidden_shifts(
 
 _LEAST_CHI2 = 9.0
 _CONFOUNDED_COSINE = 0.98
-_RIVAL_SHARE = 0.1  # of the leader's probability: a rival with more cannot be told from it
 
 
 class Likeness(Enum):
@@ -361,7 +360,7 @@ def remaining_confounding(confounded: Sequence[Confounding], answers: Sequence[A
     leader = answers[0]
     named = set(_sets([leader])[0]) if _sets([leader]) else set()
     swapped = {}
-    for rival in _sets([answer for answer in answers[1:] if answer.probability >= _RIVAL_SHARE * leader.probability]):
+    for rival in _sets([answer for answer in answers[1:] if answer.probability >= RIVAL_SHARE * leader.probability]):
         removed, added = named - set(rival), set(rival) - named
         if len(removed) == len(added) == 1:
             swapped[frozenset(removed | added)] = (*removed, *added)

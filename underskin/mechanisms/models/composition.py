@@ -37,7 +37,7 @@ STRAIN_SHARE = Parameter(
 )
 _LEAST_SD = 1e-4  # of a factor on a value that is declared to be exact
 _BOUNDS = 5.0  # standard deviations
-_WIDE_SD = 1.5  # of the logarithm of an undeclared modulus
+WIDE_SD = 1.5  # of the logarithm of an undeclared modulus
 
 
 def frf_nuisances(skin: SkinDescription) -> tuple[Parameter, ...]:
@@ -66,7 +66,7 @@ def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Para
     if skin.youngs_modulus_mpa is not None:
         return YOUNGS_MODULUS
     middle = float(to_lab("youngs_modulus_mpa", np.median(estimates)))
-    low, high, prior = middle * 1e-3, middle * 1e3, Normal(float(np.log(middle)), _WIDE_SD)
+    low, high, prior = middle * 1e-3, middle * 1e3, Normal(float(np.log(middle)), WIDE_SD)
     return Parameter(
         "youngs_modulus", "MPa", low, high, prior, "log", limit=None, proportional=True, reason=_FREE_MODULUS
     )
