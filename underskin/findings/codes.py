@@ -160,6 +160,7 @@ class Reason(StrEnum):
     LINES_LEFT_OUT = "lines_left_out"
     FORCE_ACTS_ONCE = "force_acts_once"
     MAINS_IN_CHARGE = "mains_in_charge"
+    EXCITED_AT_MAINS = "mains_in_charge.excited_there"
     NOISE_IN_FRF = "noise_in_frf"
     BEHIND_FILTER = "behind_filter"
     CONSTANT_AXIS = "constant_axis"

@@ -267,6 +267,9 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.MAINS_IN_CHARGE: "in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a "
     "multiple of it by about {charge_pc:significant 2} pC, and the force does not: mains pickup? The lines there "
     "are left out",
+    Reason.EXCITED_AT_MAINS: "in {affected} of {recordings} recordings the force acts near a multiple of the mains "
+    "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge cannot be told from the response there, and "
+    "d33 holds only if there is none; record at other frequencies",
     Reason.NOISE_IN_FRF: sentences.noise_in_frf,
     Reason.BEHIND_FILTER: sentences.behind_filter,
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",

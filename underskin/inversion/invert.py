@@ -31,12 +31,21 @@ from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter
 from underskin.prediction import plausibility, pressed_skin
+from underskin.prediction.declared_values import unlikely
 from underskin.prediction.exchanged_values import exchanged_values
 from underskin.prediction.pressed_skin import DECLARED, declared_skin, log_slopes, transmission, usable
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
 from underskin.recordings.frf.estimation import common_delay, exchanged_channels, lines_of, without_delay
-from underskin.recordings.frf.flat_zone import FlatZone, RollOff, band_average, flat_zone, lower_half, roll_off
-from underskin.recordings.frf.line_choice import noise_findings, usable_lines
+from underskin.recordings.frf.flat_zone import (
+    FlatZone,
+    RollOff,
+    band_average,
+    flat_zone,
+    lower_half,
+    roll_off,
+    without_mains,
+)
+from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
 from underskin.recordings.plausibility import at_reading
 from underskin.surrogate.contact_model import ContactModel
@@ -406,17 +415,21 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     for excess in excesses(campaign.skin):
         raise NoD33(f"skin.{excess.field}", excess.largest, f"skin.{excess.error}")
-    measured, recorded, left_out, exchange_findings = _measured(recorded, units_checked=campaign.units_checked)
+    measured, recorded, left_out, of_recordings = _measured(recorded, units_checked=campaign.units_checked)
     if not recorded:
         raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
-    delay = common_delay(frfs)
+    delay = common_delay(without_mains(frfs))
     frfs = without_delay(frfs, delay)
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
-    if (exchanged := exchanged_values(campaign.skin, recorded, contact_model)) and not campaign.units_checked:
-        raise NoD33("preload_n", campaign.name, exchanged[0].statement)
+    unusual_values = unlikely(campaign, recorded, [frf.frequency for frf in measured])
+    slips = [*exchanged_values(campaign.skin, recorded, contact_model), *unusual_values]
+    deciding = next((slip for slip in slips if slip.field != "frequency_hz"), None)
+    if deciding is not None and not campaign.units_checked:
+        reason = f"{deciding.field}: {deciding.statement} (if it is meant, set units_checked to true)"
+        raise NoD33(deciding.field, campaign.name, reason)
     contact = _Contact(campaign, recorded, contact_model)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = pressed_skin.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
@@ -449,7 +462,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     others = findings_of(recorded, measured, level, inversion.campaign_d33)
     if filtered:  # whose phase hides the sign
         others = tuple(finding for finding in others if finding.arguments.get("kind") != ImplausibleD33.NEGATIVE)
-    findings = (*at_reading(campaign), *exchange_findings, *filtered, *others)
+    findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
@@ -474,13 +487,13 @@ def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
 def _measured(
     recorded: Sequence[FrfRecording], *, units_checked: bool
 ) -> tuple[list[Frf], list[FrfRecording], list[Finding], list[Finding]]:
-    """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on
-    recordings whose channels look exchanged although the units were checked."""
-    frfs, recordings, left_out, exchange_findings = [], [], [], []
+    """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on those
+    that are used: channels that look exchanged although the units were checked, and forces at the mains alone."""
+    frfs, recordings, left_out, findings = [], [], [], []
     for recording in recorded:
         exchanged = exchanged_channels(recording)
         if exchanged is not None and units_checked:
-            exchange_findings.append(exchanged)
+            findings.append(exchanged)
         elif exchanged is not None:
             left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
             continue
@@ -494,7 +507,13 @@ def _measured(
             recordings.append(recording)
         except InvalidInput as refusal:
             left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    return [line_set.frf for line_set in usable_lines(frfs)], recordings, left_out, exchange_findings
+    chosen = dict(zip((recording.id for recording in recordings), usable_lines(frfs), strict=True))
+    for name, mains_hz in [(name, lines.all_spoilt_by_hz) for name, lines in chosen.items() if lines.all_spoilt_by_hz]:
+        left_out.append(Finding(Reason.MAINS_SPOIL_ALL, name, "charge_pc", {"mains_hz": mains_hz}))
+        del chosen[name]
+    findings += excited_at_mains(chosen)
+    used = [recording for recording in recordings if recording.id in chosen]
+    return [lines.frf for lines in chosen.values()], used, left_out, findings
 
 
 class _Contact:

@@ -17,7 +17,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import exchanged_channels, lines_of, oscillation_of
-from underskin.recordings.frf.line_choice import Usable, noise_findings, usable_lines
+from underskin.recordings.frf.line_choice import Usable, excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of
 from underskin.units import Floats, to_lab
 
@@ -112,6 +112,7 @@ def as_lines(recordings: Sequence[FrfRecording], *, units_checked: bool) -> Esti
         *_lines_left_out(list(chosen.values())),
         *_single_passes(series),
         *_mains(series),
+        *excited_at_mains({recording.id: chosen[recording.id] for recording in usable}),
         *noise_findings(frfs),
     ]
     uneven = {
@@ -162,9 +163,9 @@ def _measured(recordings: Sequence[FrfRecording]) -> tuple[dict[str, Frf], list[
 
 def _unusable(recording: FrfRecording, lines: Usable) -> Finding:
     """Why no line of a time series can be used."""
-    if lines.choice.mains is None:
+    if lines.all_spoilt_by_hz is None:
         return Finding(Reason.INCOHERENT, recording.id, "charge_pc")
-    return Finding(Reason.MAINS_SPOIL_ALL, recording.id, "charge_pc", {"mains_hz": lines.choice.mains.mains_hz})
+    return Finding(Reason.MAINS_SPOIL_ALL, recording.id, "charge_pc", {"mains_hz": lines.all_spoilt_by_hz})
 
 
 def _with_lines(recording: FrfRecording, lines: Usable) -> FrfRecording:
