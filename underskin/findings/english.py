@@ -14,7 +14,12 @@ from underskin.findings.formatting import in_digits, significant
 from underskin.findings.lacking import Lack, Lacking
 
 Words = str | Callable[..., str]
-OPTIONAL: Mapping[str, Any] = {"left_out": False, "example": "", "frequency_hz": None}  # arguments of some findings
+OPTIONAL: Mapping[str, Any] = {
+    "left_out": False,
+    "guess": None,
+    "example": "",
+    "frequency_hz": None,
+}  # arguments of some findings
 
 
 class _Template(string.Formatter):
@@ -243,7 +248,7 @@ ENGLISH: Mapping[Reason, Words] = {
     "are exchanged: L = F/(R²E) of {beyond} of {recordings} contacts is beyond the tables, and within if they are "
     "exchanged",
     Reason.FORCE_CONTRADICTS_PRELOAD: "the force is {mean_n:.3g} N in the mean, but the preload is {preload_n:g} N: "
-    "is one in another unit?",
+    "{guess:{guess}|is one in another unit?}{left_out: Left out|}",
     Reason.SENSORS_AT_ONE_PLACE: "{sensors:sensors} lie at one place, x {x_mm:g} mm, y {y_mm:g} mm: is it a "
     "slip?{more:more place}",
     Reason.SENSORS_TOO_NEAR: "{sensors:sensors} of {radius_mm:g} mm radius cannot lie {pitch_mm:g} mm apart: "

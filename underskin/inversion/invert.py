@@ -50,7 +50,7 @@ from underskin.recordings.frf.spectra import Frf, mean_of, stacked
 from underskin.recordings.plausibility import at_reading
 from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
-from underskin.units import Floats, Indices, Mask, to_lab, to_si, unusual
+from underskin.units import Floats, Indices, Mask, force_unit, to_lab, to_si, unusual
 
 _DEAD = 0.05  # of the array's d33
 _LEAST_PILOT = 1e-3  # of the array's d33: a dead sensor may give exact zeros
@@ -277,7 +277,8 @@ def findings_of(
     typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
     unit_errors = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]
     implausible = [] if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
-    return (*defects, *noise_findings(measured), *_preloads(recorded), *unit_errors, *implausible)
+    preloads = [finding for recording in recorded if (finding := _preload_contradiction(recording)) is not None]
+    return (*defects, *noise_findings(measured), *preloads, *unit_errors, *implausible)
 
 
 def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
@@ -289,15 +290,14 @@ def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
     return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
 
 
-def _preloads(recorded: Sequence[FrfRecording]) -> list[Finding]:
-    """The recordings whose force has a mean that contradicts the preload."""
-    findings = []
-    for recording in recorded:
-        mean = None if recording.force_n is None else mean_of(recording.force_n)
-        if mean is not None and not 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
-            arguments = {"mean_n": mean, "preload_n": recording.preload_n}
-            findings.append(Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", arguments))
-    return findings
+def _preload_contradiction(recording: FrfRecording) -> Finding | None:
+    """The finding on a recording whose force has a mean that contradicts the preload."""
+    mean = None if recording.force_n is None else mean_of(recording.force_n)
+    if mean is None or 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
+        return None
+    guess = force_unit(mean, recording.preload_n)
+    arguments = {"mean_n": mean, "preload_n": recording.preload_n, "guess": guess}
+    return Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", arguments)
 
 
 _LEAST_CHARGE = 1e-24  # least FRF of a measurement [C/N]
@@ -496,6 +496,10 @@ def _measured(
             findings.append(exchanged)
         elif exchanged is not None:
             left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
+            continue
+        slip = _preload_contradiction(recording)
+        if slip is not None and slip.arguments["guess"] is not None and not units_checked:
+            left_out.append(replace(slip, arguments={**slip.arguments, "left_out": True}))
             continue
         beyond = next((excess for excess in excesses(recording) if not excess.is_faint), None)
         if beyond is not None:
