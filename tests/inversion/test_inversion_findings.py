@@ -199,8 +199,8 @@ def test_modulus_of_no_elastomer_gives_no_d33(table: SigmaTable) -> None:
 @pytest.mark.parametrize("mains_hz", [50.0, 60.03])
 def test_force_at_the_mains_alone_is_said(table: SigmaTable, mains_hz: float) -> None:
     """d33 of a tone at the mains is stated with the word that pick-up cannot be told from it; of another tone not."""
-    time = np.arange(8192) / 1000.0
-    for tone_hz, is_said in ((np.round(mains_hz), True), (np.round(mains_hz) - 10.0, False)):
+    time = np.arange(8192) / 800.0  # as `shaken`
+    for tone_hz, is_said in ((np.round(mains_hz), True), (40.0, False)):
         tone = 0.09 * np.sin(2 * np.pi * tone_hz * time)
         pick_up = 0.5 * np.sin(2 * np.pi * mains_hz * time + 0.3)
         campaign = shaken()

@@ -105,6 +105,7 @@ class Reason(StrEnum):
     WIDE_PITCH = "units_off_by_1000.pitch"
     PRELOADS_SMALL = "units_off_by_1000.preloads_small"
     PRELOADS_LARGE = "units_off_by_1000.preloads_large"
+    COHERENCE_SMALL = "unusual_magnitude.coherence"
     FREQUENCIES = "units_off_by_1000.frequencies"
     PERIODS_TOO_LONG = "units_off_by_1000.periods_too_long"
     RESPONSE_BESIDE_OTHERS = "units_off_by_1000.response_beside_others"

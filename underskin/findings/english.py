@@ -164,6 +164,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
     Reason.PRELOADS_SMALL: "no preload is above {highest_n:g} N: they look 1000 × too small; were they given in kN?",
     Reason.PRELOADS_LARGE: "no preload is below {lowest_n:g} N: they look 1000 × too large; were they given in mN?",
+    Reason.COHERENCE_SMALL: "no coherence is above {largest:.2g}: does its heading say %, where it is a share of 1?",
     Reason.FREQUENCIES: "frequencies are {lowest_hz:g} to {highest_hz:g} Hz: they look 1000 × too "
     "{too_large:large|small}; were "
     "they given in {given_in}?",

@@ -31,7 +31,7 @@ from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter
 from underskin.prediction import plausibility, pressed_skin
-from underskin.prediction.declared_values import unlikely
+from underskin.prediction.declared_values import UNUSED_FOR_D33, unlikely
 from underskin.prediction.exchanged_values import exchanged_values
 from underskin.prediction.pressed_skin import DECLARED, declared_skin, log_slopes, transmission, usable
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
@@ -426,7 +426,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
     unusual_values = unlikely(campaign, recorded, [frf.frequency for frf in measured])
     slips = [*exchanged_values(campaign.skin, recorded, contact_model), *unusual_values]
-    deciding = next((slip for slip in slips if slip.field != "frequency_hz"), None)
+    deciding = next((slip for slip in slips if slip.field not in UNUSED_FOR_D33), None)
     if deciding is not None and not campaign.units_checked:
         reason = f"{deciding.field}: {deciding.statement} (if it is meant, set units_checked to true)"
         raise NoD33(deciding.field, campaign.name, reason)

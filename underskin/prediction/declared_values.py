@@ -2,7 +2,7 @@
 
 Such a value looks like a wrong unit, which nothing else in the campaign would reveal: every contact law would be fitted
 with a wrong force or modulus. It is a finding, and nothing is concluded until it is corrected, or confirmed by
-`units_checked`; d33 by the base model does not depend on frequencies, and is stated all the same.
+`units_checked`. d33 by the base model does not depend on `UNUSED_FOR_D33`, and is stated all the same.
 """
 
 from collections.abc import Sequence
@@ -15,6 +15,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.plausibility import moment, pitch_mm
 from underskin.units import Floats, unit_guess, unusual
 
+UNUSED_FOR_D33 = ("frequency_hz", "coherence")
 _PRELOADS_N = (
     0.01,
     150.0,
@@ -23,6 +24,7 @@ _FREQUENCIES_HZ = (0.5, 2e4)  # of shakers and charge amplifiers: range of the h
 _LEAST_PAUSE_S = 5.0  # no sweep takes less
 _SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency
 _ELASTOMERS_MPA = (0.02, 100.0)  # from gels to the hardest (Ashby, Materials Selection in Mechanical Design, fig. 4.3)
+_PERCENT = 0.01  # largest coherence of a campaign that looks like a share read as per cent
 _SLIP = 1000.0  # between neighbouring units
 _WIDEST_PITCH_MM = 300.0  # skins of robots have 2 to 50
 _GEOMETRY = ("thickness_mm", "sensor_radius_mm", "width_mm", "length_mm")
@@ -64,7 +66,12 @@ def _of_recordings(recordings: Sequence[FrfRecording]) -> list[Finding]:
     if preload.min() > _PRELOADS_N[1]:
         findings.append(Finding(Reason.PRELOADS_LARGE, "", "preload_n", {"lowest_n": float(preload.min())}))
     sphere = float(np.median([recording.indenter_radius_mm for recording in recordings]))
-    return [*findings, *_unusual("indenter_radius_mm", unusual("indenter_radius_mm", sphere))]
+    findings += _unusual("indenter_radius_mm", unusual("indenter_radius_mm", sphere))
+    coherence = [recording.coherence for recording in recordings if recording.coherence is not None]
+    largest = max((float(of_lines.max()) for of_lines in coherence), default=1.0)
+    if 0 < largest <= _PERCENT:
+        findings.append(Finding(Reason.COHERENCE_SMALL, "", "coherence", {"largest": largest}))
+    return findings
 
 
 def _unusual(field: str, findings: Sequence[Finding]) -> list[Finding]:
