@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from tests.inversion.inverted_campaigns import covered, moved, scaled
+from tests.support.shaken_series import shaken
 from tests.support.simulated_campaign import Rig, simulate
+from underskin.diagnosis.slips.time_series import as_lines
+from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode
 from underskin.inversion.invert import Inversion, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -152,8 +155,66 @@ def test_force_mean_contradicts_preload_finding(table: SigmaTable) -> None:
     recorded = [item for item in campaign.recordings if isinstance(item, FrfRecording)]
     for means, accused in (((1.0, 0.0), []), ((0.05, 2.5), []), ((4.0, 0.2), ["r0", "r1"]), ((1.0, -1000.0), ["r1"])):
         series = tuple(as_series(item, mean) for item, mean in zip(recorded, means, strict=True))
-        found = invert(replace(campaign, recordings=series), table).findings
-        assert [one.recording for one in found if one.code == FindingCode.FORCE_CONTRADICTS_PRELOAD] == accused
+        found = invert(replace(campaign, recordings=series), table)
+        told = [*found.findings, *found.left_out]
+        assert [one.recording for one in told if one.code == FindingCode.FORCE_CONTRADICTS_PRELOAD] == accused
+
+
+@pytest.mark.parametrize(("unit", "newtons"), [("gf", 9.80665e-3), ("mN", 1e-3), ("lbf", 4.4482216), ("kgf", 9.80665)])
+def test_force_in_another_unit_is_named_and_left_out(table: SigmaTable, unit: str, newtons: float) -> None:
+    """Of a force in another unit, which its mean beside the preload tells, no d33 is stated, here or in a diagnosis."""
+    campaign = shaken()
+    wrong = tuple(
+        replace(recording, force_n=recording.force_n / newtons)
+        for recording in campaign.recordings
+        if isinstance(recording, FrfRecording) and recording.force_n is not None
+    )
+    with pytest.raises(InvalidInput, match=rf"force_n.*was it given in {unit}\?|the force is .* N: .* in {unit}\?"):
+        invert(replace(campaign, recordings=wrong), table)
+    told = as_lines(wrong, units_checked=False).doubtful
+    assert {finding.field for finding in told} == {"force_n"}
+    assert all(unit in finding.statement for finding in told)
+
+
+def test_modulus_of_no_elastomer_gives_no_d33(table: SigmaTable) -> None:
+    """A modulus in kPa under MPa gives no d33 and names the unit; frequencies in kHz leave d33 and are named."""
+    campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(0.5, 1.0)), np.random.default_rng(18))
+    modulus = campaign.skin.youngs_modulus_mpa
+    assert modulus is not None
+    for factor in (1e3, 1e3 / modulus * 0.5):
+        stiff = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=factor * modulus))
+        with pytest.raises(InvalidInput, match=r"skin.youngs_modulus_mpa: .* was it given in kPa\?"):
+            invert(stiff, table)
+        assert invert(replace(stiff, units_checked=True), table).campaign_d33 is not None
+    slow = tuple(
+        replace(recording, frequency_hz=1e-3 * recording.frequency_hz)
+        for recording in campaign.recordings
+        if isinstance(recording, FrfRecording) and recording.frequency_hz is not None
+    )
+    found = invert(replace(campaign, recordings=slow), table)
+    assert found.campaign_d33 is not None
+    assert [one.statement for one in found.findings if one.field == "frequency_hz" and "kHz" in one.statement]
+
+
+@pytest.mark.parametrize("mains_hz", [50.0, 60.03])
+def test_force_at_the_mains_alone_is_said(table: SigmaTable, mains_hz: float) -> None:
+    """d33 of a tone at the mains is stated with the word that pick-up cannot be told from it; of another tone not."""
+    time = np.arange(8192) / 800.0  # as `shaken`
+    for tone_hz, is_said in ((np.round(mains_hz), True), (40.0, False)):
+        tone = 0.09 * np.sin(2 * np.pi * tone_hz * time)
+        pick_up = 0.5 * np.sin(2 * np.pi * mains_hz * time + 0.3)
+        campaign = shaken()
+        tones = tuple(
+            replace(recording, force_n=recording.preload_n + tone, charge_pc=7.4 * tone + pick_up)
+            for recording in campaign.recordings
+            if isinstance(recording, FrfRecording)
+        )
+        found = invert(replace(campaign, recordings=tones), table)
+        said = [one for one in found.findings if one.code == FindingCode.MAINS_IN_CHARGE]
+        assert bool(said) is is_said
+        assert found.campaign_d33 is not None
+        if not is_said:
+            assert found.campaign_d33.d33_rows()[0][0] == pytest.approx(14.0, rel=0.02)
 
 
 def test_zeros_outside_analyzers_band(table: SigmaTable) -> None:

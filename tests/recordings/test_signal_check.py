@@ -113,3 +113,14 @@ def test_a_spike_is_a_defect_and_a_blow_is_not() -> None:
     assert frf.defects == ()
     struck = frf.frequency < 300  # the blow's own spectrum ends at 670 Hz
     assert rms_error(Frf(frf.frequency[struck], frf.values[struck])) < 0.03
+
+
+def test_force_window_between_blows_is_no_overload() -> None:
+    """A force that is exactly one value between blows, as a force window sets it, is undamaged; a cut peak is not."""
+    force = np.full(16_384, 0.5)
+    for first in (2000, 6000, 10_000, 14_000):
+        force[first : first + 39] += np.hanning(41)[1:-1]
+    charge = answer_to(force - 0.5) + 1e-16 * np.random.default_rng(12).standard_normal(len(force))
+    assert defects_of_pair(force, charge) == []
+    assert defects_of_pair(-force, charge) == []
+    assert {found.kind for found in defects_of_pair(np.minimum(force, 1.2), charge)} == {"overload"}

@@ -14,7 +14,12 @@ from underskin.findings.formatting import in_digits, significant
 from underskin.findings.lacking import Lack, Lacking
 
 Words = str | Callable[..., str]
-OPTIONAL: Mapping[str, Any] = {"left_out": False, "example": "", "frequency_hz": None}  # arguments of some findings
+OPTIONAL: Mapping[str, Any] = {
+    "left_out": False,
+    "guess": None,
+    "example": "",
+    "frequency_hz": None,
+}  # arguments of some findings
 
 
 class _Template(string.Formatter):
@@ -159,6 +164,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
     Reason.PRELOADS_SMALL: "no preload is above {highest_n:g} N: they look 1000 × too small; were they given in kN?",
     Reason.PRELOADS_LARGE: "no preload is below {lowest_n:g} N: they look 1000 × too large; were they given in mN?",
+    Reason.COHERENCE_SMALL: "no coherence is above {largest:.2g}: does its heading say %, where it is a share of 1?",
     Reason.FREQUENCIES: "frequencies are {lowest_hz:g} to {highest_hz:g} Hz: they look 1000 × too "
     "{too_large:large|small}; were "
     "they given in {given_in}?",
@@ -243,7 +249,7 @@ ENGLISH: Mapping[Reason, Words] = {
     "are exchanged: L = F/(R²E) of {beyond} of {recordings} contacts is beyond the tables, and within if they are "
     "exchanged",
     Reason.FORCE_CONTRADICTS_PRELOAD: "the force is {mean_n:.3g} N in the mean, but the preload is {preload_n:g} N: "
-    "is one in another unit?",
+    "{guess:{guess}|is one in another unit?}{left_out: Left out|}",
     Reason.SENSORS_AT_ONE_PLACE: "{sensors:sensors} lie at one place, x {x_mm:g} mm, y {y_mm:g} mm: is it a "
     "slip?{more:more place}",
     Reason.SENSORS_TOO_NEAR: "{sensors:sensors} of {radius_mm:g} mm radius cannot lie {pitch_mm:g} mm apart: "
@@ -267,6 +273,9 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.MAINS_IN_CHARGE: "in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a "
     "multiple of it by about {charge_pc:significant 2} pC, and the force does not: mains pickup? The lines there "
     "are left out",
+    Reason.EXCITED_AT_MAINS: "in {affected} of {recordings} recordings the force acts near a multiple of the mains "
+    "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge cannot be told from the response there, and "
+    "d33 holds only if there is none; record at other frequencies",
     Reason.NOISE_IN_FRF: sentences.noise_in_frf,
     Reason.BEHIND_FILTER: sentences.behind_filter,
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",

@@ -32,17 +32,26 @@ from underskin.inversion.mixed_model import SDS_OF_95, Estimate, LevelRows, Mixe
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter
 from underskin.prediction import plausibility, pressed_skin
+from underskin.prediction.declared_values import UNUSED_FOR_D33, unlikely
 from underskin.prediction.exchanged_values import exchanged_values
 from underskin.prediction.pressed_skin import DECLARED, declared_skin, log_slopes, transmission, usable
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
 from underskin.recordings.frf.estimation import common_delay, exchanged_channels, lines_of, without_delay
-from underskin.recordings.frf.flat_zone import FlatZone, RollOff, band_average, flat_zone, lower_half, roll_off
-from underskin.recordings.frf.line_choice import noise_findings, usable_lines
+from underskin.recordings.frf.flat_zone import (
+    FlatZone,
+    RollOff,
+    band_average,
+    flat_zone,
+    lower_half,
+    roll_off,
+    without_mains,
+)
+from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
 from underskin.recordings.plausibility import at_reading
 from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
-from underskin.units import Floats, Indices, Mask, to_lab, to_si, unusual
+from underskin.units import Floats, Indices, Mask, force_unit, to_lab, to_si, unusual
 
 _DEAD = 0.05  # of the array's d33
 _LEAST_PILOT = 1e-3  # of the array's d33: a dead sensor may give exact zeros
@@ -269,7 +278,8 @@ def findings_of(
     typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
     unit_errors = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]
     implausible = [] if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
-    return (*defects, *noise_findings(measured), *_preloads(recorded), *unit_errors, *implausible)
+    preloads = [finding for recording in recorded if (finding := _preload_contradiction(recording)) is not None]
+    return (*defects, *noise_findings(measured), *preloads, *unit_errors, *implausible)
 
 
 def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
@@ -281,15 +291,14 @@ def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
     return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
 
 
-def _preloads(recorded: Sequence[FrfRecording]) -> list[Finding]:
-    """The recordings whose force has a mean that contradicts the preload."""
-    findings = []
-    for recording in recorded:
-        mean = None if recording.force_n is None else mean_of(recording.force_n)
-        if mean is not None and not 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
-            arguments = {"mean_n": mean, "preload_n": recording.preload_n}
-            findings.append(Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", arguments))
-    return findings
+def _preload_contradiction(recording: FrfRecording) -> Finding | None:
+    """The finding on a recording whose force has a mean that contradicts the preload."""
+    mean = None if recording.force_n is None else mean_of(recording.force_n)
+    if mean is None or 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
+        return None
+    guess = force_unit(mean, recording.preload_n)
+    arguments = {"mean_n": mean, "preload_n": recording.preload_n, "guess": guess}
+    return Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", arguments)
 
 
 _LEAST_CHARGE = 1e-24  # least FRF of a measurement [C/N]
@@ -406,17 +415,21 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     for excess in excesses(campaign.skin):
         raise NoD33(f"skin.{excess.field}", excess.largest, f"skin.{excess.error}")
-    measured, recorded, left_out, exchange_findings = _measured(recorded, units_checked=campaign.units_checked)
+    measured, recorded, left_out, of_recordings = _measured(recorded, units_checked=campaign.units_checked)
     if not recorded:
         raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
-    delay = common_delay(frfs)
+    delay = common_delay(without_mains(frfs))
     frfs = without_delay(frfs, delay)
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
-    if (exchanged := exchanged_values(campaign.skin, recorded, contact_model)) and not campaign.units_checked:
-        raise NoD33("preload_n", campaign.name, exchanged[0].statement)
+    unusual_values = unlikely(campaign, recorded, [frf.frequency for frf in measured])
+    slips = [*exchanged_values(campaign.skin, recorded, contact_model), *unusual_values]
+    deciding = next((slip for slip in slips if slip.field not in UNUSED_FOR_D33), None)
+    if deciding is not None and not campaign.units_checked:
+        reason = f"{deciding.field}: {deciding.statement} (if it is meant, set units_checked to true)"
+        raise NoD33(deciding.field, campaign.name, reason)
     contact = _Contact(campaign, recorded, contact_model)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = pressed_skin.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
@@ -449,7 +462,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     others = findings_of(recorded, measured, level, inversion.campaign_d33)
     if filtered:  # whose phase hides the sign
         others = tuple(finding for finding in others if finding.arguments.get("kind") != ImplausibleD33.NEGATIVE)
-    findings = (*at_reading(campaign), *exchange_findings, *filtered, *others)
+    findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
@@ -474,15 +487,19 @@ def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
 def _measured(
     recorded: Sequence[FrfRecording], *, units_checked: bool
 ) -> tuple[list[Frf], list[FrfRecording], list[Finding], list[Finding]]:
-    """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on
-    recordings whose channels look exchanged although the units were checked."""
-    frfs, recordings, left_out, exchange_findings = [], [], [], []
+    """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on those
+    that are used: channels that look exchanged although the units were checked, and forces at the mains alone."""
+    frfs, recordings, left_out, findings = [], [], [], []
     for recording in recorded:
         exchanged = exchanged_channels(recording)
         if exchanged is not None and units_checked:
-            exchange_findings.append(exchanged)
+            findings.append(exchanged)
         elif exchanged is not None:
             left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
+            continue
+        slip = _preload_contradiction(recording)
+        if slip is not None and slip.arguments["guess"] is not None and not units_checked:
+            left_out.append(replace(slip, arguments={**slip.arguments, "left_out": True}))
             continue
         beyond = next((excess for excess in excesses(recording) if not excess.is_faint), None)
         if beyond is not None:
@@ -494,7 +511,13 @@ def _measured(
             recordings.append(recording)
         except InvalidInput as refusal:
             left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    return [line_set.frf for line_set in usable_lines(frfs)], recordings, left_out, exchange_findings
+    chosen = dict(zip((recording.id for recording in recordings), usable_lines(frfs), strict=True))
+    for name, mains_hz in [(name, lines.all_spoilt_by_hz) for name, lines in chosen.items() if lines.all_spoilt_by_hz]:
+        left_out.append(Finding(Reason.MAINS_SPOIL_ALL, name, "charge_pc", {"mains_hz": mains_hz}))
+        del chosen[name]
+    findings += excited_at_mains(chosen)
+    used = [recording for recording in recordings if recording.id in chosen]
+    return [lines.frf for lines in chosen.values()], used, left_out, findings
 
 
 class _Contact:

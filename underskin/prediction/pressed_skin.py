@@ -22,7 +22,7 @@ from underskin.physics import charge_response, hertz
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
 from underskin.recordings.campaign import FrfRecording, SkinDescription
 from underskin.surrogate.contact_model import ContactModel
-from underskin.units import Floats, Mask
+from underskin.units import GRAM_FORCE, Floats, Mask
 
 
 @dataclass(frozen=True)
@@ -276,6 +276,8 @@ def beyond(
     if load > most_load:
         most = most_load * radius**2 * modulus
         slip = "; is the preload in mN?" if force >= _LIKE_MILLI and force / 1000 <= most else ""
+        if slip and force * GRAM_FORCE <= most:
+            slip = f"{slip.removesuffix('?')} or gf?"
         return f"{row}: L = {load:.3g} exceeds {most_load:g}: at most {most:.3g} N with this sphere{slip}"
     at_most, at_row = contact_model.load_over_cube(np.array([most_a, over_h]))[0].tolist()
     most = force * (most_a / over_h) ** 3 * (at_most / at_row)

@@ -47,8 +47,8 @@ def _times(campaign: Campaign) -> Iterator[Finding]:
     stated = [
         (recording.id, recording.recorded_at) for recording in campaign.recordings if recording.recorded_at is not None
     ]
-    to_come = [stamp for stamp in stated if _moment(stamp[1]) > latest]
-    too_old = [stamp for stamp in stated if _moment(stamp[1]) < _EARLIEST]
+    to_come = [stamp for stamp in stated if moment(stamp[1]) > latest]
+    too_old = [stamp for stamp in stated if moment(stamp[1]) < _EARLIEST]
     limit = {"year": _EARLIEST.year}
     for reason, matching, bounds in ((Reason.TIME_TO_COME, to_come, {}), (Reason.TIME_TOO_OLD, too_old, limit)):
         if matching:
@@ -56,7 +56,8 @@ def _times(campaign: Campaign) -> Iterator[Finding]:
             yield Finding(reason, recording_id, "recorded_at", {"written": written, "more": len(others), **bounds})
 
 
-def _moment(written: str) -> datetime:
+def moment(written: str) -> datetime:
+    """A stated time, in UTC where it has no zone."""
     moment = datetime.fromisoformat(written)
     return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 

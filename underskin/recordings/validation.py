@@ -276,11 +276,16 @@ def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
     return column
 
 
+_PERCENT = 100.0
+
+
 def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of coherences γ², 0 to 1."""
     column = series(field, value, units_checked)
     bad = (column < 0) | (column > 1 + COHERENCE_ROUNDING)
-    _refuse_where(field, column, bad, "must be 0 to 1", ErrorCode.OUT_OF_RANGE)
+    in_percent = bad.any() and column.min() >= 0 and column.max() <= _PERCENT * (1 + COHERENCE_ROUNDING)
+    allowed = "must be 0 to 1; was it given in %?" if in_percent else "must be 0 to 1"
+    _refuse_where(field, column, bad, allowed, ErrorCode.OUT_OF_RANGE)
     return column
 
 

@@ -347,6 +347,11 @@ class Facts:
             "kinds of recordings contradict each other": bool(self.contradictions),
             " and ".join(self.bounds): bool(self.bounds),
             "a law that is in no list acts on it": law is not None and not law.is_outside_band,
+            "its force acts at the mains alone": any(
+                finding.reason == Reason.EXCITED_AT_MAINS
+                and finding.arguments["affected"] == finding.arguments["recordings"]
+                for finding in diagnosis.findings
+            ),
             "no PVDF has such a value": plausibility.implausibility(d33["value"]) is not None,
             f"the error in the recordings, {in_digits(error, 2)} %, is well above their noise": not (
                 error <= cross_validation.REACHES_NOISE * floor

@@ -13,7 +13,6 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import Inspected, agree, recording_axes
 from underskin.diagnosis.slips.comparison import compared
-from underskin.diagnosis.slips.declared_values import unlikely
 from underskin.diagnosis.slips.exchanged_sensors import without_exchanges
 from underskin.diagnosis.slips.level_slips import without_level_slips
 from underskin.diagnosis.slips.phase_convention import in_common_convention
@@ -32,6 +31,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.models.composed import compose
+from underskin.prediction.declared_values import unlikely
 from underskin.prediction.exchanged_values import exchanged_values
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
@@ -77,7 +77,8 @@ def _inspect_lines(
         return _inspected(campaign, recordings, findings)
     contradictory = [*loose_sphere(recordings), *overlapping_sensors(campaign), *misgiven]
     exchanged = exchanged_values(campaign.skin, recordings, table)
-    doubtful = [*unlikely(campaign, recordings), *at_sensors(campaign, recordings), *exchanged]
+    lines = [lines_of(recording).frequency for recording in recordings]
+    doubtful = [*unlikely(campaign, recordings, lines), *at_sensors(campaign, recordings), *exchanged]
     findings += [*doubtful, *contradictory]
     if contradictory or (doubtful and not campaign.units_checked):
         lacking = _impossible([*doubtful, *contradictory], confirmable=not contradictory)

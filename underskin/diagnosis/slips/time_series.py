@@ -17,10 +17,11 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import exchanged_channels, lines_of, oscillation_of
-from underskin.recordings.frf.line_choice import Usable, noise_findings, usable_lines
+from underskin.recordings.frf.line_choice import Usable, excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of
-from underskin.units import Floats, to_lab
+from underskin.units import Floats, force_unit, to_lab
 
+_NO_PREFIX = ("gf", "kgf", "lbf")  # units of force that are no power of 1000 off
 _WITHIN = 30.0  # times what is declared, or a thousand times it
 
 
@@ -36,6 +37,10 @@ def contradiction_of(recording: FrfRecording) -> Finding | None:
     agrees = any(_near(ratio, 1.0) for ratio in oscillation)
     nearest = oscillation[int(np.argmin(np.abs(np.log(np.maximum(oscillation, 1e-300)))))] * recording.dynamic_force_n
     pressed = None if preload is None else abs(preload) / recording.preload_n
+    guess = None if preload is None else force_unit(preload, recording.preload_n)
+    if guess is not None and guess.meant[0][1] in _NO_PREFIX:
+        values = {"mean_n": preload, "preload_n": recording.preload_n, "guess": guess}
+        return Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", values)
     for factor, unit, other_unit in ((SLIP, "mN", "kN"), (1 / SLIP, "kN", "mN")):
         off = any(_near(ratio, factor) for ratio in oscillation)
         dynamic_force = {"dynamic_force_n": recording.dynamic_force_n}
@@ -112,6 +117,7 @@ def as_lines(recordings: Sequence[FrfRecording], *, units_checked: bool) -> Esti
         *_lines_left_out(list(chosen.values())),
         *_single_passes(series),
         *_mains(series),
+        *excited_at_mains({recording.id: chosen[recording.id] for recording in usable}),
         *noise_findings(frfs),
     ]
     uneven = {
@@ -162,9 +168,9 @@ def _measured(recordings: Sequence[FrfRecording]) -> tuple[dict[str, Frf], list[
 
 def _unusable(recording: FrfRecording, lines: Usable) -> Finding:
     """Why no line of a time series can be used."""
-    if lines.choice.mains is None:
+    if lines.all_spoilt_by_hz is None:
         return Finding(Reason.INCOHERENT, recording.id, "charge_pc")
-    return Finding(Reason.MAINS_SPOIL_ALL, recording.id, "charge_pc", {"mains_hz": lines.choice.mains.mains_hz})
+    return Finding(Reason.MAINS_SPOIL_ALL, recording.id, "charge_pc", {"mains_hz": lines.all_spoilt_by_hz})
 
 
 def _with_lines(recording: FrfRecording, lines: Usable) -> FrfRecording:

@@ -27,11 +27,10 @@ from scipy.ndimage import median_filter
 from underskin.errors import too_few
 from underskin.recordings.frf.line_choice import (
     HARMONIC_WIDTH_HZ,
-    HARMONICS,
-    MAINS_HZ,
     bin_of,
     edges_over,
     excited_lines,
+    near_mains,
 )
 from underskin.recordings.frf.spectra import Frf, Stack, stacked
 from underskin.units import Complexes, Floats, Indices, Mask, to_lab
@@ -121,8 +120,10 @@ def _below(low_hz: float, departure: float) -> str:
 FLATNESS = 0.02
 STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
 _BEYOND_NOISE = 3.0
-_OUTSTANDING = 4.0  # scatter of a mains line over that of its neighbours
-_NEIGHBOURS = 11
+SUPPORTED_NATS = 3.0  # as of a law without a free parameter in a diagnosis
+_COURSE = 4  # degree of the course through the neighbours of a mains line
+_EACH_SIDE, _FEWEST_EACH_SIDE = 6, 2  # lines
+_WIDTHS = 4.0  # widths of a harmonic that its neighbours span on each side
 
 Condition = tuple[float, float]  # indenter radius [mm], preload [N]
 
@@ -138,6 +139,11 @@ class FlatZone:
     left_out_hz: tuple[float, ...] = ()
     idle_hz: tuple[float, ...] = ()
     chosen_by_user: bool = False
+
+    @property
+    def middle_hz(self) -> float:
+        """The middle of the band in ln f."""
+        return float(np.sqrt(self.low_hz * self.high_hz))
 
     def holds(self, frequency: Floats) -> Mask:
         """Which lines are averaged."""
@@ -177,7 +183,7 @@ def flat_zone(
     edges = edges_over(frequencies)
     excited_stacks = [stack.at(np.asarray(stack.used.any(axis=0))) for stack in stacks]
     excited = np.isin(frequencies, np.concatenate([stack.frequency for stack in excited_stacks]))
-    mains = _mains_lines(excited_stacks)
+    mains = mains_lines(excited_stacks)
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
         if not inside.any():
@@ -275,23 +281,66 @@ def _of_the_largest(real: Floats, used: Mask) -> Floats:
     return largest
 
 
-def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
-    """Lines at mains harmonics whose scatter about their neighbours is outstanding."""
-    harmonics = np.outer(MAINS_HZ, HARMONICS).ravel()
+def mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
+    """Lines near mains harmonics that a smooth course through their neighbours does not explain.
+
+    The course of a line is the polynomial of fourth degree in ln f through the lines around it that are near no
+    harmonic, on both sides, by least squares for each recording. With R the power of what it leaves over ν degrees of
+    freedom and D that of the line's departures over n recordings, each over its own variance for one noise, a noise of
+    the line's own gains
+        (ν + n) ln((R + D)/(ν + n)) − ν ln(R/ν) − n ln(D/n)
+    nats of likelihood (complex normal); more than those of a choice among all such lines leave it out.
+    """
     lines_hz: set[float] = set()
     for stack in stacks:
-        near = np.abs(stack.frequency[:, None] - harmonics).min(axis=1) <= HARMONIC_WIDTH_HZ
-        if not near.any() or len(near) < _NEIGHBOURS:
-            continue
-        real, imaginary = (
-            median_filter(part, (1, _NEIGHBOURS), mode="nearest") for part in (stack.values.real, stack.values.imag)
-        )
-        scatter = np.median(np.abs(stack.values - (real + 1j * imaginary)), axis=0)
-        usual = median_filter(np.where(near, np.median(scatter[~near]), scatter), _NEIGHBOURS, mode="nearest")
-        few = 1 + 1.5 / np.sqrt(len(stack.rows))  # scatter over few recordings is itself unsure
-        lines = stack.frequency[near & (scatter > _OUTSTANDING * few * usual)]
-        lines_hz.update(np.round(lines, 6).tolist())
+        near = near_mains(stack.frequency)
+        required = SUPPORTED_NATS + np.log(max(int(near.sum()), 1))
+        for line in np.flatnonzero(near).tolist():
+            around = _around(stack.frequency, line, ~near)
+            if around is not None and _departure_nats(stack, line, around) > required:
+                lines_hz.add(round(float(stack.frequency[line]), 6))
     return tuple(sorted(lines_hz))
+
+
+def without_mains(stacks: Sequence[Stack]) -> list[Stack]:
+    """The stacks without the lines that `mains_lines` names; as they are where nothing else would be left."""
+    spoilt = mains_lines(stacks)
+    plain = [~np.isin(np.round(stack.frequency, 6), spoilt) for stack in stacks]
+    return [stack.at(lines) if lines.any() else stack for stack, lines in zip(stacks, plain, strict=True)]
+
+
+def _around(frequency: Floats, line: int, plain: Mask) -> Indices | None:
+    """The plain lines nearest to a line on each side, as many as make the course certain across the width of a
+    harmonic; None where either side has too few."""
+    reach = _WIDTHS * HARMONIC_WIDTH_HZ
+    below, above = (side[plain[side]] for side in (np.arange(line)[::-1], np.arange(line + 1, len(frequency))))
+    sides = [
+        side[: max(_EACH_SIDE, int((np.abs(frequency[side] - frequency[line]) <= reach).sum()))]
+        for side in (below, above)
+    ]
+    enough = min(map(len, sides)) >= _FEWEST_EACH_SIDE and sum(map(len, sides)) > _COURSE + 1
+    return np.sort(np.concatenate(sides)) if enough else None
+
+
+def _departure_nats(stack: Stack, line: int, around: Indices) -> float:
+    """The log likelihood that a line gains by a noise of its own beside that of the lines around it."""
+    x = np.log(stack.frequency[around] / stack.frequency[line])
+    course, triangle = np.linalg.qr(np.vander(x / np.abs(x).max(), _COURSE + 1))
+    at_line = np.linalg.solve(triangle.T, np.eye(_COURSE + 1)[-1])  # the course at x = 0 is at_line · courseᵀ y
+    values = stack.values[:, around]
+    fitted = values @ course
+    left = float((np.abs(values - fitted @ course.T) ** 2).sum())
+    off = float((np.abs(stack.values[:, line] - fitted @ at_line) ** 2).sum()) / (1 + float(at_line @ at_line))
+    recordings = len(stack.rows)
+    degrees = recordings * (len(around) - _COURSE - 1)
+    if not off / recordings > left / degrees > 0:
+        return 0.0
+    common = (left + off) / (degrees + recordings)
+    return float(
+        (degrees + recordings) * np.log(common)
+        - degrees * np.log(left / degrees)
+        - recordings * np.log(off / recordings)
+    )
 
 
 def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) -> Floats:
@@ -386,7 +435,6 @@ _BELOW, _ABOVE = 30.0, 10.0  # range of corner frequencies, as factors on the en
 _LOW_PASSES = ((1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (1, 4))  # k and m: Butterworth's of order k, m times in a row
 _HIGH_PASSES = ((1, 1), (2, 1), (1, 2))
 _FIRST_ORDER = (1, 1)
-_SLOPES = np.linspace(0.0, STEEPEST, 6)
 _LEAST_NOISE = 0.003  # of a bin's magnitude
 _SEVERAL, _USUAL_NOISE = 4, 0.02  # lines of a bin that determine its scatter, and the default scatter
 _LIFTED = 1.05  # of the plateau: a resonance
@@ -417,24 +465,22 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
     end = int(lifted[0]) if len(lifted) else len(frequency)
     if end < _FEWEST_BINS:
         return None
-    x, y, weight = np.log(frequency[:end]), np.log(magnitude[:end]), noise[:end] ** -2.0
-    plain = _fitted(x, y, weight, 0.0, np.inf)
-    if plain[0] < _SPEAKS:
+    curve = _Curve(np.log(frequency[:end]), np.log(magnitude[:end]), noise[:end] ** -2.0, np.log(zone.middle_hz))
+    plain = curve.fitted(Filters())[0]
+    if plain < _SPEAKS:
         return None
-    highs = [0.0, *np.geomspace(frequency[0] / _BELOW, frequency[end - 1] * _ABOVE, _CORNERS).tolist()]
-    lows = [np.inf, *np.geomspace(frequency[0] / _ABOVE, frequency[end - 1] * _BELOW, _CORNERS).tolist()]
-    single = [(high, np.inf, kind, _FIRST_ORDER) for high in highs for kind in _HIGH_PASSES] + [
-        (0.0, low, _FIRST_ORDER, kind) for low in lows for kind in _LOW_PASSES
-    ]
-    best = min(single, key=lambda corners: _fitted(x, y, weight, *corners)[0])
-    in_order = [(high, low, _FIRST_ORDER, _FIRST_ORDER) for high, low in product(highs[1::2], lows[1::2]) if high < low]
-    both = min(in_order, key=lambda corners: _fitted(x, y, weight, *corners)[0])
-    if _fitted(x, y, weight, *best)[0] - _fitted(x, y, weight, *both)[0] > _SPEAKS:
+    highs = np.geomspace(frequency[0] / _BELOW, frequency[end - 1] * _ABOVE, _CORNERS)
+    lows = np.geomspace(frequency[0] / _ABOVE, frequency[end - 1] * _BELOW, _CORNERS)
+    single = [Filters(high_hz=high, high_pass=kind) for high in highs.tolist() for kind in _HIGH_PASSES]
+    single += [Filters(low_hz=low, low_pass=kind) for low in lows.tolist() for kind in _LOW_PASSES]
+    pairs = [Filters(high, low) for high, low in product(highs[::2].tolist(), lows[::2].tolist()) if high < low]
+    best, both = (curve.refined(min(every, key=lambda filters: curve.fitted(filters)[0])) for every in (single, pairs))
+    if curve.fitted(best)[0] - curve.fitted(both)[0] > _SPEAKS:
         best = both
-    misfit, plateau = _fitted(x, y, weight, *best)
+    misfit, plateau = curve.fitted(best)
     share = 1 - float(np.exp(-plateau))
-    is_explained = plain[0] - misfit >= _SPEAKS and misfit <= _EXPLAINED**2 * plain[0] + len(x)
-    return RollOff(best[0], best[1], share) if is_explained and share >= _LEAST_SHARE else None
+    is_explained = plain - misfit >= _SPEAKS and misfit <= _EXPLAINED**2 * plain + len(curve.x)
+    return RollOff(best.high_hz, best.low_hz, share) if is_explained and share >= _LEAST_SHARE else None
 
 
 def _falls_after(magnitude: Floats, index: int) -> bool:
@@ -442,37 +488,63 @@ def _falls_after(magnitude: Floats, index: int) -> bool:
     return bool(magnitude[-1] < 0.8 * magnitude[index:].max())
 
 
-def _fitted(
-    x: Floats,
-    y: Floats,
-    weight: Floats,
-    high: float,
-    low: float,
-    high_pass: tuple[int, int] = _FIRST_ORDER,
-    low_pass: tuple[int, int] = _FIRST_ORDER,
-) -> tuple[float, float]:
-    """χ² of the best plateau and slope with these corners and these kinds of filters (k, m), and the logarithm of the
-    plateau at the middle of the band, where the slope has no effect."""
-    frequency = np.exp(x)
-    (high_order, high_times), (low_order, low_times) = high_pass, low_pass
-    filters = -0.5 * (
-        high_times * np.log1p((high / frequency) ** (2 * high_order))
-        + low_times * np.log1p((frequency / low) ** (2 * low_order))
-    )
-    laws = filters - np.outer(_SLOPES, x - x.mean())
-    plateaus = (weight * (y - laws)).sum(axis=1) / weight.sum()
-    misfits = (weight * (y - laws - plateaus[:, None]) ** 2).sum(axis=1)
-    best = int(np.argmin(misfits))
-    return float(misfits[best]), float(plateaus[best])
+@dataclass(frozen=True)
+class Filters:
+    """Corner frequencies [Hz], 0 and ∞ without one, and kinds (k, m) of a high-pass and a low-pass."""
+
+    high_hz: float = 0.0
+    low_hz: float = np.inf
+    high_pass: tuple[int, int] = _FIRST_ORDER
+    low_pass: tuple[int, int] = _FIRST_ORDER
+
+    def log_gain(self, frequency: Floats) -> Floats:
+        """ln of the filters' magnitude at these frequencies [Hz]."""
+        (high_order, high_times), (low_order, low_times) = self.high_pass, self.low_pass
+        return -0.5 * (
+            high_times * np.log1p((self.high_hz / frequency) ** (2 * high_order))
+            + low_times * np.log1p((frequency / self.low_hz) ** (2 * low_order))
+        )
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """ln f `x`, ln of the magnitude `y` and its `weight` (bins,), and ln of the frequency `at` which the plateau is
+    stated."""
+
+    x: Floats
+    y: Floats
+    weight: Floats
+    at: float
+
+    def fitted(self, filters: Filters) -> tuple[float, float]:
+        """χ² of the best plateau and slope behind these filters, and the logarithm of the plateau at `at`."""
+        y, middle = self.y - filters.log_gain(np.exp(self.x)), float(np.average(self.x, weights=self.weight))
+        x, level = self.x - middle, float(np.average(y, weights=self.weight))
+        slope = float(np.clip((self.weight * x * y).sum() / (self.weight * x**2).sum(), -STEEPEST, 0.0))
+        return float((self.weight * (y - level - slope * x) ** 2).sum()), level + slope * (self.at - middle)
+
+    def refined(self, filters: Filters) -> Filters:
+        """The filters with the corners that fit best near their own."""
+        from scipy.optimize import minimize  # takes 0.3 s to load, which few need
+
+        names = [name for name in ("high_hz", "low_hz") if 0 < getattr(filters, name) < np.inf]
+        start = np.log([getattr(filters, name) for name in names])
+
+        def moved(corners: Floats) -> Filters:
+            return replace(filters, **dict(zip(names, np.exp(corners).tolist(), strict=True)))
+
+        found = minimize(lambda corners: self.fitted(moved(corners))[0], start, method="Nelder-Mead")
+        return moved(found.x)
 
 
 def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:
-    """For non-empty bins of equal width in ln f: the middle [Hz], the median over recordings of the magnitude over
-    their level, and its relative noise."""
+    """For non-empty bins of equal width in ln f: the middle of its lines [Hz], the median over recordings of the
+    magnitude over their level, and its relative noise."""
     lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
     edges = edges_over(np.unique(np.concatenate(lines)))
     ratios: list[list[float]] = [[] for _ in edges[1:]]
     bin_scatters: list[list[tuple[float, int]]] = [[] for _ in edges[1:]]
+    lines_of_bins: list[list[float]] = [[] for _ in edges[1:]]
     for stack in stacks:
         bins = bin_of(stack.frequency, edges)
         for row, number in enumerate(stack.rows.tolist()):
@@ -482,9 +554,12 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
             for bin_index in np.unique(bins[stack.used[row]]).tolist():
                 of_bin = size[stack.used[row] & (bins == bin_index)]
                 ratios[bin_index].append(float(np.median(of_bin)))
+                lines_of_bins[bin_index].append(
+                    float(np.median(stack.frequency[stack.used[row] & (bins == bin_index)]))
+                )
                 bin_scatters[bin_index].append((float(np.std(of_bin)), len(of_bin)))
     filled_bins = [bin_index for bin_index, of_bin in enumerate(ratios) if of_bin and np.median(of_bin) > 0]
-    middle = np.sqrt(edges[1:] * edges[:-1])[filled_bins]
+    middle = np.array([float(np.median(lines_of_bins[bin_index])) for bin_index in filled_bins])
     magnitude = np.array([float(np.median(ratios[bin_index])) for bin_index in filled_bins])
     several = [deviation for of_bin in bin_scatters for deviation, count in of_bin if count >= _SEVERAL]
     usual = float(np.median(several)) if several else _USUAL_NOISE
@@ -510,7 +585,7 @@ def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Fl
     A contact resonance above the zone raises its upper end first, and a high-pass lowers its lower end. `level` and
     `noise` (recordings,) are those of the whole zone, as `band_average` has them.
     """
-    half = replace(zone, high_hz=float(np.sqrt(zone.low_hz * zone.high_hz)))
+    half = replace(zone, high_hz=zone.middle_hz)
     lower, lower_noise, _ = band_average(stacks, half)
     with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
         change, relative_noise = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)

@@ -34,7 +34,7 @@ The rest is corrected for the bias of the estimator. For imported FRFs with γ²
 most recordings, and lines that are exactly 0, are idle.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -122,6 +122,27 @@ class MainsOnCharge:
     mains_hz: float
     charge: float
     spoilt: Mask
+
+
+def near_mains(frequency: Floats) -> Mask:
+    """Which lines (lines,) [Hz] lie within the width of a mains harmonic."""
+    harmonics = np.outer(MAINS_HZ, HARMONICS).ravel()
+    return np.asarray(np.abs(frequency[:, None] - harmonics).min(axis=1) <= HARMONIC_WIDTH_HZ)
+
+
+def excited_at_mains(chosen: Mapping[str, "Usable"]) -> list[Finding]:
+    """The finding on recordings all of whose used lines lie near mains harmonics: there pick-up in the charge adds to
+    the response, and no other line tells them apart. `chosen`: the lines by the recordings' ids."""
+    at_mains = {}
+    for name, usable in chosen.items():
+        lines = usable.frf.frequency[usable.frf.used_or_all]
+        if len(lines) and np.isfinite(lines).all() and near_mains(lines).all():
+            at_mains[name] = float(lines[0])
+    if not at_mains:
+        return []
+    (first, frequency), *others = at_mains.items()
+    arguments = {"affected": len(at_mains), "recordings": len(chosen), "frequency_hz": frequency}
+    return [Finding(Reason.EXCITED_AT_MAINS, "" if others else first, "frequency_hz", arguments)]
 
 
 @dataclass(frozen=True)
@@ -392,6 +413,11 @@ class Usable:
 
     frf: Frf
     choice: Choice
+
+    @property
+    def all_spoilt_by_hz(self) -> float | None:
+        """The mains frequency that may spoil all lines where the force has its power; None where others remain."""
+        return None if self.choice.mains is None or len(self.choice.lines) else self.choice.mains.mains_hz
 
 
 def usable_lines(measured: Sequence[Frf]) -> list[Usable]:

@@ -145,8 +145,9 @@ def defects(channel: str, signal: Floats) -> list[Defect]:
     """
     if len(signal) < 3:
         return []
-    clipped = _overload(signal)
-    held = _held(signal) & ~clipped
+    rest = _rest(signal)
+    clipped = _overload(signal) & ~rest
+    held = _held(signal) & ~clipped & ~rest
     jump = _jumps(signal) & ~clipped & ~held
     kinds = ((DefectKind.OVERLOAD, clipped), (DefectKind.HELD_SAMPLES, held), (DefectKind.JUMP, jump))
     return [Defect(kind, channel, count, first) for kind, mask in kinds for first, count in _runs(mask)]
@@ -158,6 +159,11 @@ def damaged(every: list[Defect], samples: int) -> Mask:
     for defect in every:
         mask[defect.first_sample : defect.first_sample + defect.samples] = True
     return mask
+
+
+def _rest(signal: Floats) -> Mask:
+    """Where a signal of blows is at its one exact value between them, which a force window sets."""
+    return np.asarray(signal == np.median(signal)) if _kurtosis(signal) > _BLOW else np.zeros(len(signal), dtype=bool)
 
 
 def _overload(signal: Floats) -> Mask:

@@ -196,7 +196,12 @@ def field_of(heading: str, field_names: Collection[str]) -> Meaning:
     lower = heading.lower()
     if (name := lower.replace(" ", "_")) in field_names:
         return name, 1.0
-    return polar_field(heading) or lab_field(heading) or lab_field(lower)
+    return polar_field(heading) or lab_field(heading) or lab_field(lower) or _share(heading)
+
+
+def _share(heading: str) -> Meaning:
+    """The coherence in percent."""
+    return ("coherence", 0.01) if in_brackets(heading.lower()) == ("coherence", "%") else None
 
 
 def misspelt(heading: str, fields: Iterable[str]) -> str | None:

@@ -14,10 +14,9 @@ from functools import lru_cache
 from itertools import product
 
 from underskin.recordings.validation import LONGEST_NAME
-from underskin.units import LAB
+from underskin.units import GRAM_FORCE, LAB, POUND_FORCE
 
 STANDARD_GRAVITY = 9.80665  # m/s²
-_POUND = 4.4482216152605  # N, of a pound-force
 _INCH = 25.4e-3  # m
 
 # Words of each SI unit in English, French, German, Italian, Spanish, Russian, Chinese and Japanese where they differ.
@@ -67,18 +66,21 @@ _PREFIX_WORDS: Mapping[str, float] = {
     "キロ": 1e3,
 }
 _OTHERS: Mapping[tuple[str, float], str] = {
-    ("force", _POUND): "lb lbs lbf lbsf lb-f pound pounds pound-force pounds-force pfund libra libras livre livres",
-    ("force", _POUND / 16): "oz ozf ounce ounces",
+    (
+        "force",
+        POUND_FORCE,
+    ): "lb lbs lbf lbsf lb-f pound pounds pound-force pounds-force pfund libra libras livre livres",
+    ("force", POUND_FORCE / 16): "oz ozf ounce ounces",
     ("force", 1e-5): "dyne dynes",
     ("force", STANDARD_GRAVITY): "kg kgf kp kilopond kilogram kilograms kilogram-force kilogramm",
-    ("force", 1e-3 * STANDARD_GRAVITY): "gf gram grams gramm gram-force pond",
+    ("force", GRAM_FORCE): "gf gram grams gramm gram-force pond",
     ("length", _INCH): "in inch inches zoll pouce pouces pulgada pulgadas pollice pollici",
     ("length", 12 * _INCH): "ft foot feet",
     ("length", 1e-3 * _INCH): "mil mils thou",
     ("length", 1e-6): "micron microns mikron мкм",
     ("length", 1e-3): "мм",
-    ("pressure", _POUND / _INCH**2): "psi",
-    ("pressure", 1e3 * _POUND / _INCH**2): "ksi",
+    ("pressure", POUND_FORCE / _INCH**2): "psi",
+    ("pressure", 1e3 * POUND_FORCE / _INCH**2): "ksi",
     ("pressure", 1e5): "bar bars",
     ("pressure", 1e2): "mbar millibar",
     ("pressure", 101325.0): "atm",
@@ -126,7 +128,7 @@ _BASES = {
     "V": "voltage",
     "A": "current",
 }
-_GRAM_FORCE = ("force", 1e-3 * STANDARD_GRAVITY)  # g of a load cell
+_GRAM_FORCE = ("force", GRAM_FORCE)  # g of a load cell
 _ROUNDING = 1e-9  # relative, of quotients of prefixes
 _LONGEST = 40
 _NO_UNITS = ("n/a",)  # although either side is one

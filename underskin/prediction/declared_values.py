@@ -2,22 +2,20 @@
 
 Such a value looks like a wrong unit, which nothing else in the campaign would reveal: every contact law would be fitted
 with a wrong force or modulus. It is a finding, and nothing is concluded until it is corrected, or confirmed by
-`units_checked`.
+`units_checked`. d33 by the base model does not depend on `UNUSED_FOR_D33`, and is stated all the same.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.diagnosis.data.dataset import hours
-from underskin.diagnosis.slips.unit_errors import SLIP
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.plausibility import pitch_mm
-from underskin.units import unit_guess, unusual
+from underskin.recordings.plausibility import moment, pitch_mm
+from underskin.units import Floats, unit_guess, unusual
 
+UNUSED_FOR_D33 = ("frequency_hz", "coherence")
 _PRELOADS_N = (
     0.01,
     150.0,
@@ -25,14 +23,17 @@ _PRELOADS_N = (
 _FREQUENCIES_HZ = (0.5, 2e4)  # of shakers and charge amplifiers: range of the highest line of a campaign
 _LEAST_PAUSE_S = 5.0  # no sweep takes less
 _SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency
-_ELASTOMERS_MPA = (0.02, 300.0)  # from gels to the hardest polyurethanes
+_ELASTOMERS_MPA = (0.02, 100.0)  # from gels to the hardest (Ashby, Materials Selection in Mechanical Design, fig. 4.3)
+_PERCENT = 0.01  # largest coherence of a campaign that looks like a share read as per cent
+_SLIP = 1000.0  # between neighbouring units
 _WIDEST_PITCH_MM = 300.0  # skins of robots have 2 to 50
 _GEOMETRY = ("thickness_mm", "sensor_radius_mm", "width_mm", "length_mm")
 
 
-def unlikely(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
-    """Findings on magnitudes of the skin, or common to all recordings, that look like a wrong unit."""
-    return [*_of_skin(campaign), *_of_recordings(recordings)]
+def unlikely(campaign: Campaign, recordings: Sequence[FrfRecording], lines: Sequence[Floats]) -> list[Finding]:
+    """Findings on magnitudes of the skin, or common to all recordings, that look like a wrong unit; `lines`: the
+    frequencies of each recording [Hz]."""
+    return [*_of_skin(campaign), *_of_recordings(recordings), *_of_frequencies(recordings, lines)]
 
 
 def _of_skin(campaign: Campaign) -> list[Finding]:
@@ -66,7 +67,11 @@ def _of_recordings(recordings: Sequence[FrfRecording]) -> list[Finding]:
         findings.append(Finding(Reason.PRELOADS_LARGE, "", "preload_n", {"lowest_n": float(preload.min())}))
     sphere = float(np.median([recording.indenter_radius_mm for recording in recordings]))
     findings += _unusual("indenter_radius_mm", unusual("indenter_radius_mm", sphere))
-    return [*findings, *_of_frequencies(recordings)]
+    coherence = [recording.coherence for recording in recordings if recording.coherence is not None]
+    largest = max((float(of_lines.max()) for of_lines in coherence), default=1.0)
+    if 0 < largest <= _PERCENT:
+        findings.append(Finding(Reason.COHERENCE_SMALL, "", "coherence", {"largest": largest}))
+    return findings
 
 
 def _unusual(field: str, findings: Sequence[Finding]) -> list[Finding]:
@@ -74,8 +79,7 @@ def _unusual(field: str, findings: Sequence[Finding]) -> list[Finding]:
     return [Finding(Reason.DECLARED_UNUSUAL, "", field, finding.arguments) for finding in findings]
 
 
-def _of_frequencies(recordings: Sequence[FrfRecording]) -> list[Finding]:
-    lines = [lines_of(recording).frequency for recording in recordings]
+def _of_frequencies(recordings: Sequence[FrfRecording], lines: Sequence[Floats]) -> list[Finding]:
     lowest, highest = (
         min(float(frequency.min()) for frequency in lines),
         max(float(frequency.max()) for frequency in lines),
@@ -89,7 +93,7 @@ def _of_frequencies(recordings: Sequence[FrfRecording]) -> list[Finding]:
             arguments = {"lowest_hz": lowest, "highest_hz": highest, "too_large": too_large, "given_in": unit}
             return [Finding(Reason.FREQUENCIES, "", "frequency_hz", arguments)]
     pause = _pause_s(recordings)
-    if pause is not None and pause * lowest < 1 and SLIP * highest <= _FREQUENCIES_HZ[1]:
+    if pause is not None and pause * lowest < 1 and _SLIP * highest <= _FREQUENCIES_HZ[1]:
         arguments = {"lowest_hz": lowest, "pause_s": pause}
         return [Finding(Reason.PERIODS_TOO_LONG, "", "frequency_hz", arguments)]
     return []
@@ -97,10 +101,10 @@ def _of_frequencies(recordings: Sequence[FrfRecording]) -> list[Finding]:
 
 def _pause_s(recordings: Sequence[FrfRecording]) -> float | None:
     """The median time from one recording of a sensor to its next [s]; stamps within seconds count as one recording."""
-    times = [recording.recorded_at for recording in recordings]
-    if None in times:
+    times = [recording.recorded_at for recording in recordings if recording.recorded_at is not None]
+    if len(times) < len(recordings):
         return None
-    seconds = 3600 * hours(times)
+    seconds = np.array([moment(time).timestamp() for time in times])
     sensors = np.array([recording.sensor for recording in recordings])
     steps = np.concatenate([np.diff(np.sort(seconds[sensors == name])) for name in np.unique(sensors)])
     pauses = steps[steps >= _LEAST_PAUSE_S]
