@@ -94,6 +94,18 @@ _YEOH = (
         reason="c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %",
     ),
     _EXPONENT,
+    Parameter(
+        name="ogden_exponent",
+        unit="-",
+        low=-40.0,
+        high=20.0,
+        prior=HeavyTailed(2.0, 4.0),
+        scale="linear",
+        limit=2.0,
+        shown=2.0,
+        starts=(2.0, -10.0),
+        reason="α of Ogden's law: 2 is neo-Hookean, 1.3 to 5 of rubbers, -20 of brain (Budday et al. 2017)",
+    ),
 )
 
 
@@ -104,13 +116,14 @@ class StrainStiffening(Mechanism):
     plain = """The elastomer's modulus changes with its strain, and mostly grows, so at high loads the force rises more,
     and a contact grows less, than a constant modulus would have it."""
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
-    together. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain;
-    compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the strain itself); under
-    a sphere f = (1 + q c J)^(1/q) at ε multiplies the modulus of the neo-Hookean contact."""
+    together. Curves: J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain; compression: nominal stress 2E/(3α) (λ^(−α/2 −
+    1) − λ^(α − 1)) (1 + 2 c2 J + 3 c3 J²): Ogden's law at c2 = c3 = 0, Yeoh's at α = 2 and m = 2, a modulus that grows
+    with the strain itself at m = 1; under a sphere (1 + q c J)^(1/q) at ε multiplies the modulus of the neo-Hookean
+    contact."""
     assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
-    strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a
+    strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 and α = 2 a
     compression is neo-Hookean, as the base model is, and so is a sphere's contact at c = 0."""
-    source = """Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
+    source = """Ogden, Proc. R. Soc. A 326 (1972) 565; Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
     Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
     stage = Stage.MATERIAL
     order = 40
@@ -133,7 +146,7 @@ class StrainStiffening(Mechanism):
         elif "stiffening_form" in values:
             state.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:
-            state.yeoh = values["second_over_first"], values["third_over_first"], values["stiffening_exponent"]
+            state.yeoh = tuple(values[parameter.name] for parameter in _YEOH)
 
 
 def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated]:
