@@ -9,11 +9,14 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
+from underskin.physics.uniaxial import neo_hookean
+from underskin.physics.uniaxial import stiffening as nominal_stress
 from underskin.recordings.campaign import Conditions
 from underskin.units import Array
 
 _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8
+_STRAINED = 0.2  # at which a sample is said to be softer or not
 _COMPARED = 0.1  # the strain at which laws of curves and of FRFs are compared, as large as a contact's
 _LOCKED = 0.05  # of 1 + q c J, which is 0 where Gent's law locks
 _LEAST_FORM = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
@@ -116,15 +119,15 @@ class StrainStiffening(Mechanism):
     plain = """The elastomer's modulus changes with its strain, and mostly grows, so at high loads the force rises more,
     and a contact grows less, than a constant modulus would have it."""
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
-    together. Curves: J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain; compression: nominal stress 2E/(3α) (λ^(−α/2 −
-    1) − λ^(α − 1)) (1 + 2 c2 J + 3 c3 J²): Ogden's law at c2 = c3 = 0, Yeoh's at α = 2 and m = 2, a modulus that grows
-    with the strain itself at m = 1; under a sphere (1 + q c J)^(1/q) at ε multiplies the modulus of the neo-Hookean
-    contact."""
+    together. Curves: J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain; compression: nominal stress 2E/(3α)
+    (λ^(−α/2 − 1) − λ^(α − 1)) (1 + 2 c2 J + 3 c3 J²): Ogden's law at c2 = c3 = 0, Yeoh's at α = 2 and m = 2, a modulus
+    that grows with the strain itself at m = 1; under a sphere (1 + q c J)^(1/q) at ε multiplies the modulus of the
+    neo-Hookean contact."""
     assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
     strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 and α = 2 a
     compression is neo-Hookean, as the base model is, and so is a sphere's contact at c = 0."""
-    source = """Ogden, Proc. R. Soc. A 326 (1972) 565; Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
-    Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
+    source = """Ogden, Proc. R. Soc. A 326 (1972) 565; Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of
+    Metals (1951), for 0.2 a/R; Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
     stage = Stage.MATERIAL
     order = 40
     kinds = ("frf", "indentation", "compression")
@@ -146,7 +149,7 @@ class StrainStiffening(Mechanism):
         elif "stiffening_form" in values:
             state.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:
-            state.yeoh = tuple(values[parameter.name] for parameter in _YEOH)
+            state.stiffened = tuple(values[parameter.name] for parameter in _YEOH)
 
 
 def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated]:
@@ -167,9 +170,16 @@ def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated
 
 
 def meaning(values: Mapping[str, float]) -> str:
-    """That a compressed sample is softer than a neo-Hookean solid, where it is."""
-    softer = values.get("second_over_first", 0.0) < 0
-    return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
+    """That a compressed or pulled sample is softer than a neo-Hookean solid, where it is by a fifth of its height."""
+    if "ogden_exponent" not in values:
+        return ""
+    stretch = np.array([1.0 - _STRAINED, 1.0 + _STRAINED])
+    law = nominal_stress(stretch, *(np.array(values[parameter.name]) for parameter in _YEOH))
+    pressed, pulled = np.abs(law) < np.abs(neo_hookean(stretch))
+    if not (pressed or pulled):
+        return ""
+    how = "strained" if pressed and pulled else "pressed" if pressed else "pulled"
+    return f"As it is {how}, the sample gets softer than a neo-Hookean solid."
 
 
 def _radius_ratio(excess: Array) -> tuple[Array, Array]:

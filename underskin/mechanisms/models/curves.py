@@ -28,6 +28,7 @@ from underskin.mechanisms.models.curve_state import Curve, memories, numbers
 from underskin.mechanisms.models.frf_design import Pickup
 from underskin.mechanisms.parameter import Parameter
 from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.uniaxial import neo_hookean, stiffening
 from underskin.recordings.campaign import (
     CompressionConditions,
     CompressionRecording,
@@ -153,7 +154,6 @@ def declared_modulus(youngs_modulus_mpa: float | None) -> float:
 
 _CONTACT_SD, _CONTACT_BOUND = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
 _LEAST_STRETCH = 0.02  # of λ: curves that are pressed to 0.15 are left out
-_LEAST_ALPHA = 1e-3  # of Ogden's exponent, below which his law is taken there
 
 
 class CompressionModel(CurveModel):
@@ -195,20 +195,11 @@ class CompressionModel(CurveModel):
         return stress if curve.softening is None else stress * curve.softening(strain)
 
     def _solid(self, curve: Curve, strain: Floats) -> Floats:
-        """Of an incompressible solid between platens.
-
-        Neo-Hookean, (λ⁻² − λ)/3; with stiffening Ogden's, 2/(3α) (λ^(−α/2 − 1) − λ^(α − 1)), times 1 + 2 c2 J + 3 c3
-        J², J = 3 (I/3)^(m/2), I = I1 − 3: neo-Hookean at α = 2, then Yeoh's law at m = 2.
-        """
+        """Of an incompressible solid between platens."""
         stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
-        stress = (1.0 / (stretch * stretch) - stretch) / 3.0
-        if curve.yeoh is not None:
-            second, third, exponent, alpha = map(numbers, curve.yeoh)
-            alpha = np.where(np.abs(alpha) < _LEAST_ALPHA, _LEAST_ALPHA, alpha)
-            invariant = stretch * stretch + 2.0 / stretch - 3.0
-            grown = 3.0 * (np.maximum(invariant, 0.0) / 3.0) ** (0.5 * exponent)
-            stress = 2.0 / (3.0 * alpha) * (stretch ** (-0.5 * alpha - 1.0) - stretch ** (alpha - 1.0))
-            stress = stress * (1.0 + 2.0 * second * grown + 3.0 * third * grown * grown)
+        stress = (
+            neo_hookean(stretch) if curve.stiffened is None else stiffening(stretch, *map(numbers, curve.stiffened))
+        )
         if curve.platen_friction is None:
             return stress
         return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * numbers(curve.platen_friction)))
