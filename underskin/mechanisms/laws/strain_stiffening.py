@@ -21,93 +21,34 @@ _COMPARED = 0.1  # the strain at which laws of curves and of FRFs are compared, 
 _LOCKED = 0.05  # of 1 + q c J, which is 0 where Gent's law locks
 _LEAST_FORM = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
 
+_OF_CONTACTS = "1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more"
+_M = "m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself"
+_C = "c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels"
+_Q = "q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's"
+_C2 = "c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %"
+_C3 = "c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %"
+_ALPHA = "α of Ogden's law: 2 is neo-Hookean, 1.3 to 5 of rubbers, -20 of brain (Budday et al. 2017)"
+_ENDS, _FORMS = (1.0, 2.0), (-2.0, 2.0)
+
 _COEFFICIENT = Parameter(
-    name="stiffening",
-    unit="-",
-    low=0.0,
-    high=40.0,
-    prior=HeavyTailed(1.0, 4.0),
-    scale="linear",
-    limit=0.0,
-    shown=5.0,
-    reason="1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more",
+    "stiffening", "-", 0.0, 40.0, HeavyTailed(1.0, 4.0), "linear", limit=0.0, shown=5.0, reason=_OF_CONTACTS
 )
 _EXPONENT = Parameter(
-    name="stiffening_exponent",
-    unit="-",
-    low=1.0,
-    high=2.0,
-    prior=Normal(2.0, 0.3),
-    scale="linear",
-    limit=None,
-    shown=2.0,
-    starts=(1.0, 2.0),
-    closed=(1.0, 2.0),
-    reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
+    "stiffening_exponent", "-", 1.0, 2.0, Normal(2.0, 0.3), "linear", None, _M, shown=2.0, starts=_ENDS, closed=_ENDS
 )
 _SPHERE = (
+    Parameter("stiffening_coefficient", "-", 1e-2, 300.0, Normal(0.0, 2.0), "log", None, _C, shown=5.0, closed=(1e-2,)),
     Parameter(
-        name="stiffening_coefficient",
-        unit="-",
-        low=1e-2,
-        high=300.0,
-        prior=Normal(0.0, 2.0),
-        scale="log",
-        limit=None,
-        shown=5.0,
-        closed=(1e-2,),
-        reason="c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels",
-    ),
-    Parameter(
-        name="stiffening_form",
-        unit="-",
-        low=-2.0,
-        high=2.0,
-        prior=Uniform(),
-        scale="linear",
-        limit=None,
-        shown=1.0,
-        starts=(-1.0, 1.0),
-        closed=(-2.0, 2.0),
-        reason="q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
+        "stiffening_form", "-", -2.0, 2.0, Uniform(), "linear", None, _Q, shown=1.0, starts=(-1.0, 1.0), closed=_FORMS
     ),
     _EXPONENT,
 )
-_YEOH = (
-    Parameter(
-        name="second_over_first",
-        unit="-",
-        low=-1.0,
-        high=2.0,
-        prior=Normal(0.0, 0.3),
-        scale="linear",
-        limit=0.0,
-        shown=0.1,
-        reason="c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %",
-    ),
-    Parameter(
-        name="third_over_first",
-        unit="-",
-        low=-1.0,
-        high=1.0,
-        prior=Normal(0.0, 0.1),
-        scale="linear",
-        limit=0.0,
-        shown=0.02,
-        reason="c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %",
-    ),
+_CYLINDER = (
+    Parameter("second_over_first", "-", -1.0, 2.0, Normal(0.0, 0.3), "linear", 0.0, _C2, shown=0.1),
+    Parameter("third_over_first", "-", -1.0, 1.0, Normal(0.0, 0.1), "linear", 0.0, _C3, shown=0.02),
     _EXPONENT,
     Parameter(
-        name="ogden_exponent",
-        unit="-",
-        low=-40.0,
-        high=20.0,
-        prior=HeavyTailed(2.0, 4.0),
-        scale="linear",
-        limit=2.0,
-        shown=2.0,
-        starts=(2.0, -10.0),
-        reason="α of Ogden's law: 2 is neo-Hookean, 1.3 to 5 of rubbers, -20 of brain (Budday et al. 2017)",
+        "ogden_exponent", "-", -40.0, 20.0, HeavyTailed(2.0, 4.0), "linear", 2.0, _ALPHA, shown=2.0, starts=(2.0, -10.0)
     ),
 )
 
@@ -137,7 +78,7 @@ class StrainStiffening(Mechanism):
         self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
         """The stiffening coefficient, or for curves the law's constants."""
-        return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
+        return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _CYLINDER}[kind]
 
     def act(self, state: Contacts | Curve, values: Values) -> None:
         """Stiffen each contact by its own strain; a curve takes the law."""
@@ -149,7 +90,7 @@ class StrainStiffening(Mechanism):
         elif "stiffening_form" in values:
             state.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:
-            state.stiffened = tuple(values[parameter.name] for parameter in _YEOH)
+            state.stiffened = tuple(values[parameter.name] for parameter in _CYLINDER)
 
 
 def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated]:
@@ -174,7 +115,7 @@ def meaning(values: Mapping[str, float]) -> str:
     if "ogden_exponent" not in values:
         return ""
     stretch = np.array([1.0 - _STRAINED, 1.0 + _STRAINED])
-    law = nominal_stress(stretch, *(np.array(values[parameter.name]) for parameter in _YEOH))
+    law = nominal_stress(stretch, *(np.array(values[parameter.name]) for parameter in _CYLINDER))
     pressed, pulled = np.abs(law) < np.abs(neo_hookean(stretch))
     if not (pressed or pulled):
         return ""
