@@ -1,6 +1,6 @@
 """The mechanism `strain_stiffening`."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -11,11 +11,13 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.physics.uniaxial import neo_hookean
 from underskin.physics.uniaxial import stiffening as nominal_stress
-from underskin.recordings.campaign import Conditions
+from underskin.recordings.campaign import CompressionRecording, Conditions
 from underskin.units import Array
 
 _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8
+_LEAST_STRETCH = 0.02
+_ALPHAS = (-20.0, -5.0, 2.0, 5.0)  # of brain, between, neo-Hookean, of rubbers
 _STRAINED = 0.2  # at which a sample is said to be softer or not
 _COMPARED = 0.1  # the strain at which laws of curves and of FRFs are compared, as large as a contact's
 _LOCKED = 0.05  # of 1 + q c J, which is 0 where Gent's law locks
@@ -80,6 +82,13 @@ class StrainStiffening(Mechanism):
         """The stiffening coefficient, or for curves the law's constants."""
         return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _CYLINDER}[kind]
 
+    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
+        """Of measured cylinders c2 and c3 by linear least squares at m = 2 and several α."""
+        curves = [recording for recording in conditions.recordings if isinstance(recording, CompressionRecording)]
+        if kind != "compression" or not curves:
+            return ()
+        return [(*_polynomial(curves, alpha), 2.0, alpha) for alpha in _ALPHAS]
+
     def act(self, state: Contacts | Curve, values: Values) -> None:
         """Stiffen each contact by its own strain; a curve takes the law."""
         if isinstance(state, Contacts):
@@ -121,6 +130,21 @@ def meaning(values: Mapping[str, float]) -> str:
         return ""
     how = "strained" if pressed and pulled else "pressed" if pressed else "pulled"
     return f"As it is {how}, the sample gets softer than a neo-Hookean solid."
+
+
+def _polynomial(curves: Sequence[CompressionRecording], alpha: float) -> tuple[float, float]:
+    """c2 and c3 of the least residual of nominal stress at m = 2."""
+    rows = []
+    for curve in curves:
+        unloaded = curve.displacement_mm[np.abs(curve.force_n).argmin()]
+        stretch = np.maximum(1.0 - (curve.displacement_mm - unloaded) / curve.sample_height_mm, _LEAST_STRETCH)
+        ogden = nominal_stress(stretch, *map(np.array, (0.0, 0.0, 2.0, alpha)))
+        invariant = stretch**2 + 2.0 / stretch - 3.0
+        columns = ogden, 2.0 * ogden * invariant, 3.0 * ogden * invariant**2
+        rows.append(np.column_stack([*columns, curve.force_n / curve.sample_diameter_mm**2]))
+    *design, stress = np.concatenate(rows).T
+    first, second, third = np.linalg.lstsq(np.column_stack(design), stress, rcond=None)[0]
+    return (second / first, third / first) if first > 0 else (0.0, 0.0)
 
 
 def _radius_ratio(excess: Array) -> tuple[Array, Array]:
