@@ -29,7 +29,7 @@ _C = "c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law
 _Q = "q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's"
 _C2 = "c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %"
 _C3 = "c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %"
-_ALPHA = "α of Ogden's law: 2 is neo-Hookean, 1.3 to 5 of rubbers, -20 of brain (Budday et al. 2017)"
+_ALPHA = "α of Ogden's law: 2 is neo-Hookean, the silicones of docs/mechanisms.md have 2 to 4.8, brain has -20"
 _ENDS, _FORMS = (1.0, 2.0), (-2.0, 2.0)
 
 _COEFFICIENT = Parameter(
@@ -50,7 +50,7 @@ _CYLINDER = (
     Parameter("third_over_first", "-", -1.0, 1.0, Normal(0.0, 0.1), "linear", 0.0, _C3, shown=0.02),
     _EXPONENT,
     Parameter(
-        "ogden_exponent", "-", -40.0, 20.0, HeavyTailed(2.0, 4.0), "linear", 2.0, _ALPHA, shown=2.0, starts=(2.0, -10.0)
+        "ogden_exponent", "-", -40.0, 20.0, HeavyTailed(2.0, 2.0), "linear", 2.0, _ALPHA, shown=2.0, starts=(2.0, -10.0)
     ),
 )
 
