@@ -208,9 +208,9 @@ def _over_depth(name: str, table: SigmaTable) -> Panel:
 
 
 def _over_strain(name: str, table: SigmaTable) -> Panel:
-    strain = np.append(np.linspace(0, 0.4, 60), np.linspace(0.4, 0, 60))
+    strain = np.tile(np.append(np.linspace(0, 0.4, 60), np.linspace(0.4, 0, 60)), 2)
     force = 2.0 * np.pi / 4 * 20.0**2 * strain
-    recording = CompressionRecording("c", 10.0, 20.0, 10.0 * strain, force, time_s=np.arange(120.0))
+    recording = CompressionRecording("c", 10.0, 20.0, 10.0 * strain, force, time_s=np.arange(240.0))
     return _curve(name, Campaign("signature", _SKIN, (recording,)), table, "strain of a 20 mm × 10 mm cylinder", strain)
 
 

@@ -45,6 +45,7 @@ TRIPLES: list[tuple[tuple[str, ...], Kind]] = [
     (("instrument_compliance", "contact_creep", "adhesion"), "indentation"),
     (("compressible_layer", "layered_contact", "instrument_compliance"), "indentation"),
     (("strain_stiffening", "contact_creep", "platen_friction"), "compression"),
+    (("cell_collapse", "contact_creep", "cyclic_softening"), "compression"),
 ]
 
 

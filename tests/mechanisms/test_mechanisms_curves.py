@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from tests.support.mechanism_campaigns import (
@@ -217,6 +218,62 @@ def test_platens_hold_stiffen_gent_lindley_s() -> None:
     strain = np.linspace(0.0, 1e-6, 61)
     ratio = stress_over_modulus(["platen_friction"], strain, friction=1.0)[1:] / strain[1:]
     assert ratio == pytest.approx(np.full(60, 1 + 2 * (30 / 80) ** 2), rel=1e-5)
+
+
+@pytest.mark.parametrize("alpha", [-20.0, -0.5, 3.0, 6.0])
+def test_ogden_exponent_is_that_of_his_energy(alpha: float) -> None:
+    """Stiffening by Ogden's exponent is the derivative of (2E/3α²)(λ^α + 2 λ^(−α/2) − 3)."""
+    strain, step = np.linspace(-0.4, 0.4, 41), 1e-5
+    stretch = 1 - strain
+
+    def energy(stretch: Floats) -> Floats:
+        return 2 / (3 * alpha**2) * (stretch**alpha + 2 * stretch ** (-alpha / 2) - 3)
+
+    expected = -(energy(stretch + step) - energy(stretch - step)) / (2 * step)
+    law = {"second_over_first": 0.0, "third_over_first": 0.0, "ogden_exponent": alpha}
+    assert stress_over_modulus(["strain_stiffening"], strain, **law) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+FOAM = {"collapse_strain": 0.1, "densification_strain": 0.8}
+
+
+def test_foam_collapses_and_densifies() -> None:
+    """A foam's skeleton relaxes towards its plateau, dσ/dε = 1 − σ/ε_c, and 1/(1 − ε/ε_D) of it is left to bear; it is
+    linear in tension, and platens do not hold it."""
+    strain = np.linspace(0.0, 0.6, 61)
+    skeleton = solve_ivp(lambda _, stress: 1 - stress / 0.1, (0.0, 0.6), [0.0], t_eval=strain, rtol=1e-9, atol=1e-12).y
+    stress = stress_over_modulus(["cell_collapse"], strain, **FOAM)
+    assert stress == pytest.approx(skeleton[0] * sum((strain / 0.8) ** n for n in range(200)), rel=1e-6)
+    assert stress[40] == pytest.approx(0.1963369, rel=1e-6)  # at 0.4: 0.1 (1 − e^-4)/(1 − 0.5)
+    pulled = np.linspace(-0.3, 0.3, 61)
+    assert stress_over_modulus(["cell_collapse"], pulled, **FOAM)[:30] == pytest.approx(pulled[:30])
+    held = stress_over_modulus(["cell_collapse", "platen_friction"], strain, friction=1.0, **FOAM)
+    assert held == pytest.approx(stress)
+
+
+def test_packed_foam_goes_on_as_its_tangent() -> None:
+    """Pressed beyond densification a foam's force stays finite, continuous and rising."""
+    strain = np.linspace(0.7, 0.9, 401)
+    stress = stress_over_modulus(["cell_collapse"], strain, **FOAM)
+    slope = np.gradient(stress, strain)
+    assert (slope > 0).all()
+    assert np.abs(np.diff(slope)).max() < 0.06 * slope.max()
+
+
+def test_cycles_soften_below_the_largest_strain() -> None:
+    """The first loading is not softened; below the largest strain so far a fraction is lost, the same way in and
+    back; beyond it the first loading goes on."""
+    ways = [(0.0, 0.3), (0.3, 0.0), (0.0, 0.3), (0.3, 0.5), (0.5, 0.1)]
+    strain = np.concatenate([np.linspace(*way, 31) for way in ways])
+    base = stress_over_modulus([], strain)
+    softened = stress_over_modulus(["cyclic_softening"], strain, softened_fraction=0.4, softening_strain=0.2)
+    largest = 0.0
+    for at, virgin, found in zip(strain, base, softened, strict=True):
+        largest = max(largest, at)
+        assert found == pytest.approx(virgin * (0.6 + 0.4 * np.exp(-(largest - at) / 0.2)), abs=1e-12)
+    assert softened[45] / base[45] == pytest.approx(0.7986341, rel=1e-6)  # at 0.16: 0.6 + 0.4 e^-0.7
+    assert softened[:31] == pytest.approx(base[:31])
+    assert softened[93:124] == pytest.approx(base[93:124])
 
 
 NEEDS_RECORDINGS = pytest.mark.skipif(

@@ -99,10 +99,10 @@ def hertz_force(depth_mm: Floats, radius_mm: float, modulus_mpa: float) -> Float
 
 
 def compression_campaign() -> Campaign:
-    """Two cylinders of different shape, loaded and unloaded."""
+    """Two cylinders of different shape, loaded and unloaded twice."""
     recordings = []
     for number, height in enumerate((30.0, 15.0)):
-        displacement = height * np.concatenate([np.linspace(0, 0.4, 40), np.linspace(0.39, 0, 40)])
+        displacement = height * np.tile(np.concatenate([np.linspace(0, 0.4, 40), np.linspace(0.39, 0, 40)]), 2)
         stretch = 1 - displacement / height
         recordings.append(
             CompressionRecording(
@@ -111,7 +111,7 @@ def compression_campaign() -> Campaign:
                 sample_diameter_mm=30.0,
                 displacement_mm=displacement,
                 force_n=2.0 * np.pi / 4 * 30.0**2 * (stretch**-2 - stretch) / 3,
-                time_s=np.linspace(0.0, 39.5, len(displacement)),
+                time_s=np.linspace(0.0, 79.5, len(displacement)),
             )
         )
     return Campaign("cylinders", SKIN, tuple(recordings))

@@ -65,8 +65,8 @@ def _indentations() -> tuple[IndentationRecording, ...]:
 
 
 def _compressions() -> tuple[CompressionRecording, ...]:
-    """Two cylinders of different shape, loaded and unloaded."""
-    strain = np.concatenate([np.linspace(0, 0.4, 20), np.linspace(0.38, 0, 20)])
+    """Two cylinders of different shape, loaded and unloaded twice."""
+    strain = np.tile(np.concatenate([np.linspace(0, 0.4, 20), np.linspace(0.38, 0, 20)]), 2)
     return tuple(
         CompressionRecording(
             id=f"c{number}",
@@ -74,7 +74,7 @@ def _compressions() -> tuple[CompressionRecording, ...]:
             sample_diameter_mm=30.0,
             displacement_mm=height * strain,
             force_n=2.0 * np.pi / 4 * 30.0**2 * strain,
-            time_s=np.arange(40.0),
+            time_s=np.arange(80.0),
         )
         for number, height in enumerate((30.0, 15.0))
     )

@@ -172,6 +172,17 @@ def foot(displacement: Floats, force: Floats) -> int | None:
     return int(np.argmax(displacement > _least(travel, misfit)[1]))
 
 
+_RETURN = 0.05  # of the range of displacement: smaller returns are noise
+
+
+def presses_again(displacement: Floats) -> bool:
+    """Whether a curve is loaded again after its way back, by more than a twentieth of its range."""
+    least = _RETURN * np.ptp(displacement)
+    returned = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
+    after = displacement[returned[0] :] if len(returned) else displacement[:1]
+    return bool((after - np.minimum.accumulate(after)).max() > least)
+
+
 def curve_landmarks(displacement: Floats, force: Floats, time: Floats | None = None) -> CurveLandmarks:
     """The landmarks of finite samples (samples,); without times, evenly sampled ones are assumed."""
     time = np.arange(float(len(force))) if time is None else time

@@ -12,13 +12,13 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.recordings.campaign import CompressionConditions, Conditions, CurveConditions, IndentationConditions
+from underskin.recordings.curve_course import presses_again
 from underskin.units import Floats
 
 # Curves that add no information by their times: share of the span, of the duration; ratio of speeds
 _TURNED_BACK = 0.02  # of the span
 _UNEVEN = 0.1  # of the duration
 _LIKE_SPEEDS = 1.5
-_RETURN = 0.05  # of the range of displacement: smaller returns are noise
 _FRACTION = "from a few percent in a well cured silicone to most of the modulus in a gel"
 _CURVE_TIME = "mean of the logarithms; no shorter than the time between two samples; an instrument sees up to hours"
 _SHORTEST = 1e-3  # s, where the recordings have no times
@@ -155,18 +155,11 @@ def _times(conditions: Conditions) -> list[Floats]:
 def _repeated_press(conditions: Conditions) -> str | None:
     """A refusal of the first indentation that presses in again after its way back; None without one."""
     for recording in conditions.recordings:
-        if isinstance(recording, IndentationConditions) and _presses_again(recording.displacement_mm):
+        if isinstance(recording, IndentationConditions) and presses_again(recording.displacement_mm):
             return (
                 f"recording {recording.id!r} presses again after it was drawn back: give each way in and back by itself"
             )
     return None
-
-
-def _presses_again(displacement: Floats) -> bool:
-    least = _RETURN * np.ptp(displacement)
-    returned = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
-    after = displacement[returned[0] :] if len(returned) else displacement[:1]
-    return bool((after - np.minimum.accumulate(after)).max() > least)
 
 
 def _time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:

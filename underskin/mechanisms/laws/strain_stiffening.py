@@ -1,6 +1,6 @@
 """The mechanism `strain_stiffening`."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -9,102 +9,51 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
-from underskin.recordings.campaign import Conditions
+from underskin.physics.uniaxial import neo_hookean
+from underskin.physics.uniaxial import stiffening as nominal_stress
+from underskin.recordings.campaign import CompressionRecording, Conditions
 from underskin.units import Array
 
 _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8
+_LEAST_STRETCH = 0.02
+_ALPHAS = (-20.0, -5.0, 2.0, 5.0)  # of brain, between, neo-Hookean, of rubbers
+_STRAINED = 0.2  # at which a sample is said to be softer or not
 _COMPARED = 0.1  # the strain at which laws of curves and of FRFs are compared, as large as a contact's
 _LOCKED = 0.05  # of 1 + q c J, which is 0 where Gent's law locks
 _LEAST_FORM = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
 
+_OF_CONTACTS = "1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more"
+_M = "m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself"
+_C = "c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels"
+_Q = "q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's"
+_C2 = "c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %"
+_C3 = "c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %"
+_ALPHA = "α of Ogden's law: 2 is neo-Hookean, the silicones of docs/mechanisms.md have 2 to 4.8, brain has -20"
+_SMALL_C2 = "c2 of the silicones of docs/mechanisms.md is 0.1 and, below 40 %, up to 0.6; the table ends at 7"
+_ENDS, _FORMS = (1.0, 2.0), (-2.0, 2.0)
+
 _COEFFICIENT = Parameter(
-    name="stiffening",
-    unit="-",
-    low=0.0,
-    high=40.0,
-    prior=HeavyTailed(1.0, 4.0),
-    scale="linear",
-    limit=0.0,
-    shown=5.0,
-    reason="1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more",
+    "stiffening", "-", 0.0, 40.0, HeavyTailed(1.0, 4.0), "linear", limit=0.0, shown=5.0, reason=_OF_CONTACTS
 )
-_OF_CONTACT = Parameter(
-    name="second_over_first",
-    unit="-",
-    low=0.0,
-    high=7.0,
-    prior=HeavyTailed(0.0, 1.0),
-    scale="linear",
-    limit=0.0,
-    shown=1.0,
-    reason="c2 of the silicones of docs/mechanisms.md is 0.1 and, below 40 %, up to 0.6; the table ends at 7",
-)
+_OF_CONTACT = Parameter("second_over_first", "-", 0.0, 7.0, HeavyTailed(0.0, 1.0), "linear", 0.0, _SMALL_C2, shown=1.0)
 _EXPONENT = Parameter(
-    name="stiffening_exponent",
-    unit="-",
-    low=1.0,
-    high=2.0,
-    prior=Normal(2.0, 0.3),
-    scale="linear",
-    limit=None,
-    shown=2.0,
-    starts=(1.0, 2.0),
-    closed=(1.0, 2.0),
-    reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
+    "stiffening_exponent", "-", 1.0, 2.0, Normal(2.0, 0.3), "linear", None, _M, shown=2.0, starts=_ENDS, closed=_ENDS
 )
 _SPHERE = (
+    Parameter("stiffening_coefficient", "-", 1e-2, 300.0, Normal(0.0, 2.0), "log", None, _C, shown=5.0, closed=(1e-2,)),
     Parameter(
-        name="stiffening_coefficient",
-        unit="-",
-        low=1e-2,
-        high=300.0,
-        prior=Normal(0.0, 2.0),
-        scale="log",
-        limit=None,
-        shown=5.0,
-        closed=(1e-2,),
-        reason="c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels",
-    ),
-    Parameter(
-        name="stiffening_form",
-        unit="-",
-        low=-2.0,
-        high=2.0,
-        prior=Uniform(),
-        scale="linear",
-        limit=None,
-        shown=1.0,
-        starts=(-1.0, 1.0),
-        closed=(-2.0, 2.0),
-        reason="q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
+        "stiffening_form", "-", -2.0, 2.0, Uniform(), "linear", None, _Q, shown=1.0, starts=(-1.0, 1.0), closed=_FORMS
     ),
     _EXPONENT,
 )
-_YEOH = (
-    Parameter(
-        name="second_over_first",
-        unit="-",
-        low=-1.0,
-        high=2.0,
-        prior=Normal(0.0, 0.3),
-        scale="linear",
-        limit=0.0,
-        shown=0.1,
-        reason="c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %",
-    ),
-    Parameter(
-        name="third_over_first",
-        unit="-",
-        low=-1.0,
-        high=1.0,
-        prior=Normal(0.0, 0.1),
-        scale="linear",
-        limit=0.0,
-        shown=0.02,
-        reason="c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %",
-    ),
+_CYLINDER = (
+    Parameter("second_over_first", "-", -1.0, 2.0, Normal(0.0, 0.3), "linear", 0.0, _C2, shown=0.1),
+    Parameter("third_over_first", "-", -1.0, 1.0, Normal(0.0, 0.1), "linear", 0.0, _C3, shown=0.02),
     _EXPONENT,
+    Parameter(
+        "ogden_exponent", "-", -40.0, 20.0, HeavyTailed(2.0, 2.0), "linear", 2.0, _ALPHA, shown=2.0, starts=(2.0, -10.0)
+    ),
 )
 
 
@@ -116,15 +65,16 @@ class StrainStiffening(Mechanism):
     and a contact grows less, than a constant modulus would have it."""
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
     together; or Yeoh's law, (G/2)(K + c2 K²), K = I1 − 3, in the solved contact: σ plus what tables/contact.h5 has for
-    c2 over the contact at E0; or both. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3,
-    λ = 1 − strain; compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the
-    strain itself); under a sphere f = (1 + q c J)^(1/q) at ε multiplies the modulus of the neo-Hookean contact."""
+    c2 over the contact at E0; or both. Curves: J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain; compression:
+    nominal stress 2E/(3α) (λ^(−α/2 − 1) − λ^(α − 1)) (1 + 2 c2 J + 3 c3 J²): Ogden's law at c2 = c3 = 0, Yeoh's at α =
+    2 and m = 2, a modulus that grows with the strain itself at m = 1; under a sphere (1 + q c J)^(1/q) at ε multiplies
+    the modulus of the neo-Hookean contact."""
     assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
     strain, as s takes it: the a in it is Hertz' also where the contact is the layer's or sticks; c2's stress on the
-    base is that of a frictionless sphere on the incompressible layer. With c2 = c3 = 0 a compression is neo-Hookean, as
-    the base model is, and so is a sphere's contact at c = 0."""
-    source = """Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
-    Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
+    base is that of a frictionless sphere on the incompressible layer. With c2 = c3 = 0 and α = 2 a compression is
+    neo-Hookean, as the base model is, and so is a sphere's contact at c = 0."""
+    source = """Ogden, Proc. R. Soc. A 326 (1972) 565; Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of
+    Metals (1951), for 0.2 a/R; Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
     stage = Stage.MATERIAL
     order = 40
     kinds = ("frf", "indentation", "compression")
@@ -134,7 +84,14 @@ class StrainStiffening(Mechanism):
         self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
         """The stiffening coefficient, or for curves the law's constants."""
-        return {"frf": (_COEFFICIENT, _OF_CONTACT), "indentation": _SPHERE, "compression": _YEOH}[kind]
+        return {"frf": (_COEFFICIENT, _OF_CONTACT), "indentation": _SPHERE, "compression": _CYLINDER}[kind]
+
+    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
+        """Of measured cylinders c2 and c3 by linear least squares at m = 2 and several α."""
+        curves = [recording for recording in conditions.recordings if isinstance(recording, CompressionRecording)]
+        if kind != "compression" or not curves:
+            return ()
+        return [(*_polynomial(curves, alpha), 2.0, alpha) for alpha in _ALPHAS]
 
     def act(self, state: Contacts | Curve, values: Values) -> None:
         """Stiffen each contact by its own strain; a curve takes the law."""
@@ -147,7 +104,7 @@ class StrainStiffening(Mechanism):
         elif "stiffening_form" in values:
             state.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:
-            state.yeoh = values["second_over_first"], values["third_over_first"], values["stiffening_exponent"]
+            state.stiffened = tuple(values[parameter.name] for parameter in _CYLINDER)
 
 
 def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated]:
@@ -168,9 +125,31 @@ def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated
 
 
 def meaning(values: Mapping[str, float]) -> str:
-    """That a compressed sample is softer than a neo-Hookean solid, where it is."""
-    softer = values.get("second_over_first", 0.0) < 0
-    return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
+    """That a compressed or pulled sample is softer than a neo-Hookean solid, where it is by a fifth of its height."""
+    if "ogden_exponent" not in values:
+        return ""
+    stretch = np.array([1.0 - _STRAINED, 1.0 + _STRAINED])
+    law = nominal_stress(stretch, *(np.array(values[parameter.name]) for parameter in _CYLINDER))
+    pressed, pulled = np.abs(law) < np.abs(neo_hookean(stretch))
+    if not (pressed or pulled):
+        return ""
+    how = "strained" if pressed and pulled else "pressed" if pressed else "pulled"
+    return f"As it is {how}, the sample gets softer than a neo-Hookean solid."
+
+
+def _polynomial(curves: Sequence[CompressionRecording], alpha: float) -> tuple[float, float]:
+    """c2 and c3 of the least residual of nominal stress at m = 2."""
+    rows = []
+    for curve in curves:
+        unloaded = curve.displacement_mm[np.abs(curve.force_n).argmin()]
+        stretch = np.maximum(1.0 - (curve.displacement_mm - unloaded) / curve.sample_height_mm, _LEAST_STRETCH)
+        ogden = nominal_stress(stretch, *map(np.array, (0.0, 0.0, 2.0, alpha)))
+        invariant = stretch**2 + 2.0 / stretch - 3.0
+        columns = ogden, 2.0 * ogden * invariant, 3.0 * ogden * invariant**2
+        rows.append(np.column_stack([*columns, curve.force_n / curve.sample_diameter_mm**2]))
+    *design, stress = np.concatenate(rows).T
+    first, second, third = np.linalg.lstsq(np.column_stack(design), stress, rcond=None)[0]
+    return (second / first, third / first) if first > 0 else (0.0, 0.0)
 
 
 def _radius_ratio(excess: Array) -> tuple[Array, Array]:

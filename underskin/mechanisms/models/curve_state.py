@@ -109,7 +109,9 @@ class Curve:
     work_of_adhesion: Differentiated | None = None  # [J/m²]
     work_of_separation: Differentiated | None = None  # the same where it is no larger
     stiffening: tuple[Differentiated, ...] | None = None  # of an indentation: c, q and m (Stiffening)
-    yeoh: tuple[Differentiated, ...] | None = None  # of a compression: c2 = C20/C10, c3 = C30/C10 and m (2: Yeoh's law)
+    stiffened: tuple[Differentiated, ...] | None = None  # of a compression: c2, c3, m and α (physics/uniaxial.py)
+    foam: Callable[[Floats], Floats] | None = None  # of a compression that does not widen: stress over E of strains
+    softening: Callable[[Floats], Floats] | None = None  # of a compression: factor on the stress, of all strains
     relaxation: tuple[tuple[Differentiated, Differentiated], ...] = ()  # g and τ [s] of each Prony pair
     stage_stiffness: Differentiated | None = None  # [N/m]
     platen_friction: Differentiated | None = None  # 0 to 1

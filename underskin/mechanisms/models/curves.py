@@ -28,6 +28,7 @@ from underskin.mechanisms.models.curve_state import Curve, memories, numbers
 from underskin.mechanisms.models.frf_design import Pickup
 from underskin.mechanisms.parameter import Parameter
 from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.uniaxial import neo_hookean, stiffening
 from underskin.recordings.campaign import (
     CompressionConditions,
     CompressionRecording,
@@ -189,18 +190,16 @@ class CompressionModel(CurveModel):
         return force, all_samples, all_samples
 
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
-        """Nominal stress over E, compression positive.
+        """Nominal stress over E, compression positive: of the material, and as cycles soften it."""
+        stress = self._solid(curve, strain) if curve.foam is None else curve.foam(strain)
+        return stress if curve.softening is None else stress * curve.softening(strain)
 
-        Neo-Hookean, (λ⁻² − λ)/3; with stiffening times 1 + 2 c2 J + 3 c3 J², J = 3 (I/3)^(m/2), I = I1 − 3: Yeoh's
-        law at m = 2.
-        """
+    def _solid(self, curve: Curve, strain: Floats) -> Floats:
+        """Of an incompressible solid between platens."""
         stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
-        stress = (1.0 / (stretch * stretch) - stretch) / 3.0
-        if curve.yeoh is not None:
-            second, third, exponent = map(numbers, curve.yeoh)
-            invariant = stretch * stretch + 2.0 / stretch - 3.0
-            grown = 3.0 * (np.maximum(invariant, 0.0) / 3.0) ** (0.5 * exponent)
-            stress = stress * (1.0 + 2.0 * second * grown + 3.0 * third * grown * grown)
+        stress = (
+            neo_hookean(stretch) if curve.stiffened is None else stiffening(stretch, *map(numbers, curve.stiffened))
+        )
         if curve.platen_friction is None:
             return stress
         return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * numbers(curve.platen_friction)))
