@@ -106,7 +106,7 @@ class ContactCreep(Mechanism):
             lacking = [recording.id for recording in curves if recording.time_s is None]
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
-            if _time_runs_with_displacement(curves):
+            if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
             return _repeated_press(conditions)
         dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
@@ -169,7 +169,7 @@ def _presses_again(displacement: Floats) -> bool:
     return bool((after - np.minimum.accumulate(after)).max() > least)
 
 
-def _time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
+def time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
     """Whether no law of time can be identified: all curves move one way at the same constant speed.
 
     Recordings without time_s are ignored.

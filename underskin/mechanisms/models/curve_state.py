@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from underskin.autodiff import Differentiated, contiguous
 from underskin.mechanisms.models.sphere_kernels import memory_rows
@@ -55,14 +56,33 @@ def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
     return memory
 
 
+_SPEED_SAMPLES = 7  # whose straight line gives a speed: few enough for a turn, enough for a noisy displacement
+
+
+def speeds(displacement: Floats, time: Floats) -> Floats:
+    """The speed at each sample (curves, samples) of displacements at times: the slope of the straightest of the lines
+    through the samples before it, around it and after it, so that a speed may change at once where the motion turns."""
+    count = min(_SPEED_SAMPLES, displacement.shape[-1])
+    places, times = (sliding_window_view(column, count, axis=-1) for column in (displacement, time))
+    places, times = (part - part.mean(axis=-1, keepdims=True) for part in (places, times))
+    square = np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny)
+    slope = (times * places).sum(axis=-1) / square
+    bend = (places * places).sum(axis=-1) - slope * slope * square
+    first = np.arange(displacement.shape[-1])[:, None] - np.array([count // 2, count - 1, 0])
+    first = np.clip(first, 0, slope.shape[-1] - 1)
+    straightest = bend[:, first].argmin(axis=-1)[..., None]  # (curves, samples, 1)
+    return np.asarray(np.take_along_axis(slope[:, first], straightest, axis=-1)[..., 0])
+
+
 @dataclass(frozen=True)
 class Samples:
-    """The samples before any law: `travel` from the contact point [m] (points, curves, samples), `time` [s] (curves,
-    samples), and the recordings' `ids`."""
+    """The samples before any law: `travel` from the contact point [m] (points, curves, samples), `time` [s] and
+    `speed` of the travel [m/s] (curves, samples), and the recordings' `ids`."""
 
     ids: Sequence[str]
     travel: Floats
     time: Floats
+    speed: Floats
 
     def along(self, axis: str, force: Floats, origins: Mapping[str, float]) -> Floats:
         """An axis of laws of curves: the depth beyond the contact point [mm], the contact force [N], or the time since

@@ -59,7 +59,7 @@ from underskin.mechanisms.models.composition import (
     required_modulus,
     thickness_parameter,
 )
-from underskin.mechanisms.models.curve_state import Curve, Relaxation, Samples, memories, numbers
+from underskin.mechanisms.models.curve_state import Curve, Relaxation, Samples, memories, numbers, speeds
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
 from underskin.mechanisms.models.sphere_kernels import (
     contact_rows,
@@ -439,6 +439,7 @@ class IndentationModel(CurveModel):
         nuisances = _nuisances(recordings, conditions.skin, sticks)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
         self._ids = [recording.id for recording in recordings]
+        self._speed = speeds(self.displacement, self.time)
         stiffnesses = [recording.stage_stiffness_n_per_mm for recording in recordings]
         self._stage_compliance = np.array([0.0 if stage is None else 1e-3 / stage for stage in stiffnesses])[
             :, None
@@ -475,7 +476,7 @@ class IndentationModel(CurveModel):
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         travel = self.displacement - contact
-        samples = Samples(self._ids, travel, self.time)
+        samples = Samples(self._ids, travel, self.time, self._speed)
         for law in curve.laws:
             travel = law.pressed_travel(samples, travel)
         force, contact_mask, inside = self._force_at(curve, travel, contact_mask)
