@@ -74,7 +74,7 @@ class LiquidDrag(Mechanism):
     def act(self, state: Curve, values: Values) -> None:
         """Add the drag to the measured force."""
         coefficient = 1e3 * numbers(values["drag_coefficient"])  # N·s/m
-        state.laws.append(SampleLaw("force", lambda samples, force: coefficient * samples.speed))
+        state.laws.append(SampleLaw("force", lambda samples, _: coefficient * samples.speed))
 
 
 def _indentations(conditions: Conditions) -> list[IndentationConditions]:

@@ -469,6 +469,7 @@ class IndentationModel(CurveModel):
             poisson_ratio=constant(self._skin.poisson_ratio, 0, modulus.value.shape[:-1]),
             strain_share=nuisances[STRAIN_SHARE.name],
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
+            times=self.times,
         )
         for mechanism in self._mechanisms:
             mechanism.act(curve, values[mechanism.name])
@@ -486,7 +487,7 @@ class IndentationModel(CurveModel):
 
     def _force_at(self, curve: Curve, travel: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         sphere, adhesion = self._sphere(curve), _adhesion(curve)
-        relaxation = curve.prony_pairs
+        relaxation = curve.relaxes
         if relaxation is not None:
             relaxing_force = relaxing if curve.stage_stiffness is None else relaxing_on_stage
             return self._relaxing(
@@ -551,7 +552,7 @@ class IndentationModel(CurveModel):
             layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in distinct])
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
         compliance = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
-        reduced = numbers(curve.modulus) / (1 - poisson_ratio**2)
+        reduced = curve.modulus_at_rest / (1 - poisson_ratio**2)
         assert curve.strain_share is not None
         return Sphere(reduced, self._radius, layers, stiffening, compliance, self._deep, numbers(curve.strain_share))
 
