@@ -2,7 +2,8 @@
 
 Relaxation with fading memory: E(t)/E(0) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs. A power law (t/1 s)^(−n) is
 the sum of the pairs of 1/Γ(n) ∫ τ^(−n) e^(−t/τ) d ln τ by the trapezoidal rule, to 0.3 % for n up to 0.5; times longer
-and shorter than those of a recording count as one constant and one dashpot. u(t) is the force of the elastic body; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading memories
+and shorter than those of a recording count as one constant and one dashpot. u(t) is the force of the elastic body;
+F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading memories
 Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for which the step is exact (Fung, Biomechanics,
 1993, section 7.6). Memories have the pairs on a last axis of their own.
 """
