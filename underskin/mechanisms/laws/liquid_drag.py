@@ -33,7 +33,7 @@ class LiquidDrag(Mechanism):
     source = """Alcaraz, Buscemi, Puig-de-Morales, Colchero, Baró & Navajas, Langmuir 18 (2002) 716 (drag on
     cantilevers in water)."""
     stage = Stage.CURVE
-    order = 20
+    order = 30
     kinds = ("indentation",)
     axes = ("time_s",)
     needs = "time_s, and two speeds, a hold or a way back"
