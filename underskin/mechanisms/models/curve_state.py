@@ -92,22 +92,26 @@ def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
     return memory
 
 
-_SPEED_SAMPLES = 7  # whose straight line gives a speed: few enough for a turn, enough for a noisy displacement
+_FEW, _MORE = 3, 7  # samples whose straight line gives a speed; more where the displacement is noisy
+_STEADY = 0.05  # of the largest speed: scatter of a steady speed, by noise of the displacement
 
 
 def speeds(displacement: Floats, time: Floats) -> Floats:
-    """The speed at each sample (curves, samples) of displacements at times: the slope of the straightest of the lines
-    through the samples before it, around it and after it, so that a speed may change at once where the motion turns."""
-    count = min(_SPEED_SAMPLES, displacement.shape[-1])
+    """The speed at each sample (curves, samples) of displacements at times: the slope of the straight line through it
+    and its neighbours, few so that it turns as fast as the motion does."""
+    few, more = _slopes(displacement, time, _FEW), _slopes(displacement, time, _MORE)
+    scatter = np.median(np.abs(few - more), axis=-1, keepdims=True)
+    return np.where(scatter > _STEADY * np.abs(more).max(axis=-1, keepdims=True), more, few)
+
+
+def _slopes(displacement: Floats, time: Floats, count: int) -> Floats:
+    """Slopes of the lines through `count` samples around each, fewer where there are no more."""
+    count = min(count, displacement.shape[-1])
     places, times = (sliding_window_view(column, count, axis=-1) for column in (displacement, time))
     places, times = (part - part.mean(axis=-1, keepdims=True) for part in (places, times))
-    square = np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny)
-    slope = (times * places).sum(axis=-1) / square
-    bend = (places * places).sum(axis=-1) - slope * slope * square
-    first = np.arange(displacement.shape[-1])[:, None] - np.array([count // 2, count - 1, 0])
-    first = np.clip(first, 0, slope.shape[-1] - 1)
-    straightest = bend[:, first].argmin(axis=-1)[..., None]  # (curves, samples, 1)
-    return np.asarray(np.take_along_axis(slope[:, first], straightest, axis=-1)[..., 0])
+    slope = (times * places).sum(axis=-1) / np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny)
+    first = np.clip(np.arange(displacement.shape[-1]) - count // 2, 0, slope.shape[-1] - 1)
+    return np.asarray(slope[..., first])
 
 
 @dataclass(frozen=True)
