@@ -111,6 +111,9 @@ EFFECTS: dict[str, Effect] = {
     "instrument_compliance": Effect(
         "compliance of the stage, F/k", (INDENTATION,), {"stiffness_n_per_mm": (1e-3, 1e6)}
     ),
+    "liquid_drag": Effect(
+        "a liquid drags on the moving sphere, c dz/dt", (INDENTATION,), {"coefficient_n_s_per_mm": (0, 1e3)}
+    ),
     "platen_friction": Effect(
         "friction f at the ends of the cylinder: stiffer by 1 + 2 f S², S = diameter/(4 height)",
         (COMPRESSION,),

@@ -82,6 +82,9 @@ def _distorted(on: Mapping[str, Values], time: Floats, displacement: Floats, for
         measured_force = measured_force * (
             1 + value("nonlinear_cell", "nonlinearity") * measured_force / value("nonlinear_cell", "range_n")
         )
+    if "liquid_drag" in on:
+        speed = np.gradient(displacement, time)
+        measured_force = measured_force + value("liquid_drag", "coefficient_n_s_per_mm") * speed
     return moved, measured_force + value("force_drift", "n_per_root_s") * np.sqrt(time)
 
 

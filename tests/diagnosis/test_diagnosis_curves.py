@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+import underskin
 from bench.soak import SOAK
 from proof.real import recorded
 from rig.description import parse as experiment
@@ -359,3 +360,25 @@ def test_adhesion_gel_liquid_leaves_modulus(work: float, table: SigmaTable) -> N
     assert names(report) == ["adhesion"]
     stated = report["mechanisms"][0]["parameters"][0]
     assert 0.8 * stated["low"] < work < 1.25 * stated["high"]
+
+
+def test_drag_of_a_liquid_leaves_the_modulus() -> None:
+    """A soft gel under a cantilever in a liquid: the zeros of both ways differ, the force steps where it turns, and
+    threads of gel let go gradually, without a visible pull-off. E, 15 kPa, and the drag lie in their intervals."""
+    travel = 1e-3 * np.concatenate([np.linspace(-3.0, 0.17, 1200), np.linspace(0.17, -3.0, 1201)[1:]])  # mm
+    time = 5e-4 * np.arange(len(travel))
+    force = 16 / 9 * 0.015 * np.sqrt(0.010) * np.maximum(travel, 0.0) ** 1.5
+    largest, back = force.max(), np.arange(len(travel)) >= 1200
+    drag = 0.012 * largest / (travel[1] - travel[0]) * 5e-4
+    stuck = np.where(travel > -5e-5, (1.7e-4 - travel) / 2.2e-4, np.exp((travel + 5e-5) / 3e-5))
+    force += drag * np.gradient(travel, time) - 0.1 * largest * np.where(back, np.clip(stuck, 0.0, 1.0), 0.0)
+    force += 3e-3 * largest * np.random.default_rng(4).normal(size=len(time))
+    recording = IndentationRecording("gel", 0.010, travel, force, time_s=time)
+    measured = Campaign("gel", SkinDescription(poisson_ratio=0.5), (recording,), units_checked=True)
+    report = underskin.diagnose(measured, without=beside("liquid_drag", "instrument_compliance"))
+    assert report.verdict == "explained", report.statement
+    assert [mechanism.name for mechanism in report.mechanisms] == ["liquid_drag"]
+    assert report.fit is not None
+    modulus, (found,) = report.fit.after.youngs_modulus, report.mechanisms[0].parameters
+    assert modulus.low <= 0.015 <= modulus.high < 1.5 * modulus.low
+    assert found.low <= drag <= found.high

@@ -75,6 +75,9 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
         {"fraction": 0.4, "time_s": 4.0}, {"relaxed_fraction": "fraction", "relaxation_time": "time_s"}
     ),
     ("indentation", "instrument_compliance"): Hidden({"stiffness_n_per_mm": 6.0}, {"stiffness": "stiffness_n_per_mm"}),
+    ("indentation", "liquid_drag"): Hidden(
+        {"coefficient_n_s_per_mm": 0.2}, {"drag_coefficient": "coefficient_n_s_per_mm"}
+    ),
     ("indentation", "modulus_error"): Hidden({"factor": 1.5}, {"modulus_factor": "factor"}),
     ("compression", "strain_stiffening"): Hidden({"coefficient": 3.0}),  # in another parametrisation
     ("compression", "contact_creep"): Hidden(

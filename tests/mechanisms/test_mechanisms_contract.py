@@ -124,7 +124,7 @@ def test_its_limits_recover_the_base_model(name: str, kind: Kind) -> None:
 @pytest.mark.parametrize(("names", "kind"), [*(((name,), kind) for name, kind in EACH), *TRIPLES])
 def test_derivatives_match_finite_differences(names: tuple[str, ...], kind: Kind) -> None:
     model = model_of(names, kind)
-    random = np.random.default_rng(len(names[0]))
+    random = np.random.default_rng(len("".join(names)))
     fit = np.array([parameter.quantile(random.uniform(0.25, 0.75)) for parameter in model.parameters])
     exact = model.predict(fit)
     smooth = _away_from_first_contact(exact.value, kind)

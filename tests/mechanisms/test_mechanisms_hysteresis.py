@@ -1,11 +1,13 @@
-"""Contacts that part at another price than they were made at, and that relax in two times: against their equations."""
+"""Contacts that part at another price than they were made at, relax over decades of time, or move in a liquid."""
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.special import beta, betainc
 
-from tests.mechanisms.indentation_loops import E_MPA, NO_CREEP, R_MM, REDUCED, R, force_at, jkr
-from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted
+from tests.mechanisms.indentation_loops import E_MPA, NO_CREEP, R_MM, REDUCED, TIME, R, force_at, jkr, recorded
+from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted, table
+from underskin.mechanisms import Unsupported, compose
 from underskin.mechanisms.laws import contact_creep
 from underskin.mechanisms.models.indentation import Sphere, Stiffening
 from underskin.recordings.campaign import Campaign, IndentationRecording
@@ -60,20 +62,48 @@ def test_creep_leaves_hysteresis_body_not_relax() -> None:
     assert found == pytest.approx(expected, abs=5e-5 * expected.max())
 
 
-def test_two_prony_pairs_relax_as_their_sum() -> None:
-    depth = np.append(np.linspace(0, 0.3, 2000), np.full(8, 0.3))
-    ages = np.array([0.01, 0.1, 0.5, 1, 5, 20, 50, 1000.0])
-    time = np.append(np.linspace(0, 1e-6, 2000), 1e-6 + ages)
+def test_power_law_relaxes_as_lee_and_radok() -> None:
+    """A sphere pressed in at a constant speed and held is that of the hereditary integral in closed form.
+
+    E(t) = E (t/1 s)^(−n) and δ = vt give F ∝ ∫₀^t (t−s)^(−n) d(s^(3/2)), an incomplete Beta function.
+    """
+    ramp, depth_mm = 0.2, 0.3
+    time = np.concatenate([np.linspace(0, ramp, 400), ramp + np.geomspace(1e-3, 30.0, 60)])
+    depth = np.minimum(time / ramp, 1.0) * depth_mm
     recording = IndentationRecording("i", R_MM, depth, hertz_force(depth, R_MM, E_MPA), time_s=time)
-    values = {"relaxed_fraction": 0.5, "relaxation_time": 2.0, "time_spread": 3.0, "first_share": 0.3}
-    found = predicted(["contact_creep"], Campaign("one", SKIN, (recording,)), **{"contact_point i": 0.0}, **values)
-    fast, slow = 2.0 * np.exp(-3.0 * 0.7), 2.0 * np.exp(3.0 * 0.3)
-    left = 1 - 0.5 * (0.3 * (1 - np.exp(-ages / fast)) + 0.7 * (1 - np.exp(-ages / slow)))
-    assert found[-8:] == pytest.approx(found[1999] * left, rel=1e-4)
-    told = contact_creep.meaning(values)
-    assert told == f"The force relaxes by 15 % with {fast:.2g} s and by 35 % with {slow:.2g} s."
-    at_once = {**values, "time_spread": 0.001}
-    assert contact_creep.meaning(at_once) == "The force relaxes by 50 % with 2 s."
+    for n in (0.05, 0.15, 0.4):
+        values = {"relaxed_fraction": 0.0, "relaxation_exponent": n}
+        found = predicted(["contact_creep"], Campaign("one", SKIN, (recording,)), **{"contact_point i": 0.0}, **values)
+        reached = np.minimum(ramp / np.maximum(time, 1e-12), 1.0)
+        integral = 1.5 * time ** (1.5 - n) * beta(1.5, 1 - n) * betainc(1.5, 1 - n, reached)
+        exact = hertz_force(np.array([depth_mm]), R_MM, E_MPA)[0] * integral / ramp**1.5
+        assert found[20:] == pytest.approx(exact[20:], rel=5e-3)
+    assert contact_creep.meaning({"relaxation_exponent": 0.1}).startswith("From each time to one ten times as long")
+    assert not contact_creep.meaning({"relaxation_exponent": 0.0})
+
+
+def test_power_law_and_pair_multiply() -> None:
+    """After a step both forms together leave (1 − g (1 − e^(−t/τ))) t^(−n) of the force; at n = 0 the pair alone."""
+    ages = np.geomspace(1e-2, 1e2, 9)
+    time = np.concatenate([np.linspace(0, 1e-3, 200), 1e-3 + ages])
+    depth = np.append(np.linspace(0, 0.3, 200), np.full(9, 0.3))
+    recording = IndentationRecording("i", R_MM, depth, hertz_force(depth, R_MM, E_MPA), time_s=time)
+    for n in (0.0, 0.12):
+        values = {"relaxed_fraction": 0.4, "relaxation_time": 2.0, "relaxation_exponent": n}
+        found = predicted(["contact_creep"], Campaign("one", SKIN, (recording,)), **{"contact_point i": 0.0}, **values)
+        left = (1 - 0.4 * (1 - np.exp(-ages / 2.0))) * ages**-n
+        assert found[-9:] == pytest.approx(recording.force_n[-1] * left, rel=1e-2)
+
+
+def test_drag_adds_its_coefficient_times_the_speed() -> None:
+    """On each way and in the air, with a step where the motion turns, whatever the noise of the displacement."""
+    depth = np.concatenate([np.linspace(-0.2, 0.3, 60), np.linspace(0.3, -0.3, 90)[1:]])
+    speed = np.where(np.arange(len(depth)) < 59.5, 0.5 / (59 * TIME), -0.6 / (89 * TIME))
+    drag = force_at(["liquid_drag"], depth, drag_coefficient=0.7) - force_at([], depth)
+    turn = np.isin(np.arange(len(depth)), (59, 60))
+    assert drag[~turn] == pytest.approx(0.7 * speed[~turn], rel=1e-6)
+    with pytest.raises(Unsupported, match="one way at one speed"):
+        compose(["liquid_drag"], recorded(depth[:60]), table())
 
 
 def test_radius_travel_travel_stiffening_law() -> None:

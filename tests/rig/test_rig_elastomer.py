@@ -22,6 +22,7 @@ INDENTATION: dict[str, dict[str, Any]] = {
     "compressible_layer": {"poisson_ratio": 0.4},
     "contact_creep": {"fraction": 0.4, "time_s": 5.0},
     "instrument_compliance": {"stiffness_n_per_mm": 5.0},
+    "liquid_drag": {"coefficient_n_s_per_mm": 0.5},
     "modulus_error": {"factor": 1.2},
     "force_ripple": {"amplitude": 0.05, "pitch_mm": 0.1},
     "force_drift": {"n_per_root_s": 0.02},

@@ -256,6 +256,7 @@ def _correlation(path_fraction: Floats) -> Floats:
 
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which a way is summed, standard deviations of noise
 _RADIUS_SHARE = 0.7  # of the way along a curve, that of the contact radius
+_LINE = 3  # samples, of which a straight line leaves scatter
 _LEAST_CONTACT = 1e-3  # of the largest force, below which a sample is out of contact
 
 
@@ -284,18 +285,47 @@ def path_fractions(displacement: Floats, force: Floats, seen: CurveLandmarks, ki
     return np.concatenate([[0.0], total])
 
 
-def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -> Floats:
-    """The contact radius over the largest one by Hertz's depth (samples,), 0 in the air."""
-    largest = float(np.abs(force).max())
-    without = np.flatnonzero(force <= max(_BEYOND_NOISE * seen.noise, _LEAST_CONTACT * largest))
+def contact_samples(force: Floats, seen: CurveLandmarks) -> tuple[int, int]:
+    """The first sample of an indentation's contact, and the one after its last.
+
+    Contact ends with a visible pull-off; else not where the force passes zero, below which the sphere may still stick,
+    but where it joins the straight line on which it stays: the zero on the way back may be another one than before.
+    """
+    band = max(_BEYOND_NOISE * seen.noise, _LEAST_CONTACT * float(np.abs(force).max()))
+    without = np.flatnonzero(force <= band)
     before, after = without[without < seen.turn], without[without > seen.turn]
     first = seen.snap_in if seen.snap_in is not None else (before[-1] + 1 if len(before) else 0)
-    end = seen.pull_off if seen.pull_off is not None else (after[0] if len(after) else len(force))
-    lowest = float(displacement[first:end].min())
-    depth = np.maximum(displacement - lowest, 0.0)
-    depth[:first], depth[end:] = 0.0, 0.0
+    if seen.pull_off is not None or not len(after):
+        return int(first), len(force) if seen.pull_off is None else seen.pull_off
+    end, last_half = int(after[0]), np.arange(int(after[0]) + (len(force) - int(after[0])) // 2, len(force))
+    if len(last_half) <= _LINE:
+        return int(first), end
+    line = np.polyfit(last_half, force[last_half], 1)
+    away = np.abs(force[end:] - np.polyval(line, np.arange(end, len(force))))
+    band = max(band, _BEYOND_NOISE * float(away[-len(last_half) :].std()))
+    return int(first), end + int(np.flatnonzero(away > band)[-1] + 1 if (away > band).any() else 0)
+
+
+def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -> Floats:
+    """The contact radius over the largest one by Hertz's depth (samples,), 0 in the air.
+
+    The depth on each way is that from where its contact begins or ends, as a share of the deepest; after a snap-in it
+    begins as wide as it is there on the way back.
+    """
+    first, end = contact_samples(force, seen)
     coarse = _evenly(len(force))
-    return np.sqrt(np.interp(np.arange(len(force)), coarse, depth[coarse]) / (float(depth.max()) or 1.0))
+    share = np.zeros(len(force))
+    deepest = float(displacement[first:end].max())
+    least = float(displacement[first:end].min())
+    for way, lowest in (
+        (
+            slice(first, seen.turn),
+            least if seen.snap_in is not None else float(displacement[first : seen.turn + 1].min()),
+        ),
+        (slice(seen.turn, end), float(displacement[seen.turn : end].min())),
+    ):
+        share[way] = np.clip((displacement[way] - lowest) / ((deepest - lowest) or 1.0), 0.0, 1.0)
+    return np.sqrt(np.interp(np.arange(len(force)), coarse, share[coarse]))
 
 
 def _evenly(samples: int) -> Indices:

@@ -17,7 +17,7 @@ from underskin.recordings.campaign import Conditions
 
 Kind = Literal["frf", "indentation", "compression"]
 UNITS = (
-    *("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N", "1/N", "g", "J/m²", "Hz", "s", "1/s", "ms", "µs", "°"),
+    *("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N·s/mm", "N", "1/N", "g", "J/m²", "Hz", "s", "1/s", "ms", "µs", "°"),
     *("pC", "pC/N", "pF", "MΩ", "cycles", "h"),
 )
 AXES = (  # fields of a campaign along which an effect can show

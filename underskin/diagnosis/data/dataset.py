@@ -26,6 +26,7 @@ from underskin.diagnosis.noise import (
     CurveError,
     LineNoise,
     Whitening,
+    contact_samples,
     instrument_columns,
     line_noise,
     path_fractions,
@@ -568,6 +569,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
             time,
             path_fraction,
             drift,
+            contact_samples(columns[1], seen)[1],
             (*_straight_lines(columns[1], counts), np.full(len(force), slow)),
         )
         errors.append(error)
@@ -653,20 +655,23 @@ def _error(
     time: Floats | None,
     path_fraction: Floats,
     drift: float,
+    end: int,
     samples: tuple[Floats, Floats, Floats, Floats],
 ) -> CurveError:
-    """The error that the samples of one curve share; `drift` [N] is that in the air, `samples` as in CurveError."""
+    """The error that the samples of one curve share; `drift` [N] is that in the air, `end` the first sample after an
+    indentation's contact, `samples` as in CurveError."""
     largest = float(np.abs(force).max()) or 1.0
     if kind == "compression":
         return CurveError(np.full(len(force), largest), path_fraction, np.zeros((len(force), 0)), *samples)
     in_air = np.abs(force) < 4 * seen.noise + 1e-3 * largest
     if seen.pull_off is None and seen.snap_in is None:
         in_air &= displacement < displacement[np.argmax(displacement)]
-    scale = np.maximum(np.abs(force), np.where(in_air, _IN_THE_AIR, _AT_CONTACT) * largest)
-    zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
     # Without times, a constant sampling rate is assumed: drift follows the order of samples, not the travel.
     counts = samples[0]
     order = np.cumsum(counts) - counts / 2
+    in_air |= order > end
+    scale = np.maximum(np.abs(force), np.where(in_air, _IN_THE_AIR, _AT_CONTACT) * largest)
+    zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
     size = max(USUAL_DRIFT * largest, drift) if seen.has_air else 0.0
     columns = instrument_columns(displacement, order if time is None else time, zero, size)
     return CurveError(scale, path_fraction, columns, *samples)

@@ -302,7 +302,8 @@ class CurveScreening:
         contact = explanation.point.fit[model.contact_points][recording]
         travel = np.concatenate([curve.displacement_mm for curve in curves]) - contact
         time = np.concatenate([times_of(curve) for curve in curves])
-        return Samples([curves[index].id for index in recording], 1e-3 * travel[None, :, None], time[:, None])
+        still = np.zeros((len(time), 1))  # single samples, of which no law of an axis reads the speed
+        return Samples([curves[index].id for index in recording], 1e-3 * travel[None, :, None], time[:, None], still)
 
     @staticmethod
     def _changes(law: CurveLaw, samples: Samples, force: Floats, stiffness: Floats) -> Floats:

@@ -1,6 +1,5 @@
 """The mechanism `contact_creep`."""
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
@@ -10,7 +9,7 @@ from underskin.autodiff import exp
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.recordings.campaign import CompressionConditions, Conditions, CurveConditions, IndentationConditions
 from underskin.recordings.curve_course import presses_again
 from underskin.units import Floats
@@ -20,52 +19,64 @@ _TURNED_BACK = 0.02  # of the span
 _UNEVEN = 0.1  # of the duration
 _LIKE_SPEEDS = 1.5
 _FRACTION = "from a few percent in a well cured silicone to most of the modulus in a gel"
-_CURVE_TIME = "mean of the logarithms; no shorter than the time between two samples; an instrument sees up to hours"
+_CURVE_TIME = "no shorter than the time between two samples; an instrument sees up to hours"
 _SHORTEST = 1e-3  # s, where the recordings have no times
-_SPREAD = "logarithm of the ratio of the two times: 0 is one pair; two times seldom lie a factor of 100 apart"
-_SHARE = "of the faster pair in the relaxed fraction"
+_EXPONENT = "0.10 to 0.18 of gels, acrylic tapes and natural rubber over decades of time; 0 of a well cured silicone"
 _TIME = "what a bench can see lies between seconds and an hour; 40 s within a factor of 4.5"
+_PLAIN_EXPONENT = 5e-3  # below which a power law falls by a percent in a decade
+_LARGEST_EXPONENT = 0.5  # beyond it a body flows more than it resists
 
-_ONE_PAIR = (
+_FRF = (
     Parameter("relaxed_fraction", "-", 0.0, 0.9, Uniform(), "linear", limit=0.0, shown=0.4, reason=_FRACTION),
     Parameter("relaxation_time", "s", 0.05, 5e4, Normal(3.7, 1.5), "log", limit=None, shown=40.0, reason=_TIME),
 )
-_TWO_PAIRS = (
-    Parameter("relaxed_fraction", "-", 0.0, 0.95, Uniform(), "linear", limit=0.0, shown=0.4, reason=_FRACTION),
+_POWER = Parameter(
+    "relaxation_exponent",
+    "-",
+    0.0,
+    _LARGEST_EXPONENT,
+    HeavyTailed(0.0, 0.1),
+    "linear",
+    limit=0.0,
+    shown=0.1,
+    starts=(0.0, 0.15),
+    reason=_EXPONENT,
+)
+_COMPRESSION = (*_FRF, _POWER)
+_INDENTATION = (
+    replace(_FRF[0], high=0.95, starts=(0.0, 0.35)),
     Parameter(
         "relaxation_time", "s", _SHORTEST, 5e4, Normal(2.0, 2.5), "log", limit=None, shown=40.0, reason=_CURVE_TIME
     ),
-    Parameter(
-        "time_spread", "-", 0.0, 6.0, Normal(0.0, 1.5), "linear", limit=None, shown=0.0, reason=_SPREAD, closed=(0.0,)
-    ),
-    Parameter(
-        "first_share", "-", 0.05, 0.95, Uniform(), "linear", limit=None, shown=0.5, reason=_SHARE, closed=(0.05, 0.95)
-    ),
+    _POWER,
 )
+_STARTS = (0.02, 0.1, 0.4)  # of the longest recording, where fits of its time begin
 
 
 class ContactCreep(Mechanism):
-    """Viscoelastic relaxation of the skin, one Prony pair or, of indentations, two."""
+    """Viscoelastic relaxation of the skin: a Prony pair; of curves also a power law, or both."""
 
     name = "contact_creep"
     plain = """The skin slowly gives way under the preload, so the contact grows and the response changes with the time
     for which the preload has been held."""
-    law = """E(t) = E (1 − g (1 − e^(−t/τ))). FRFs: the preload held for t creeps with that solid's compliance J(t) = (1
-    + g/(1 − g) (1 − e^(−(1 − g) t/τ)))/E; a³ ∝ J(t), L ∝ J(t). Indentations: E(t) = E (1 − g s (1 − e^(−t/τ₁)) − g (1 −
-    s) (1 − e^(−t/τ₂))), with s the first share, ln τ = s ln τ₁ + (1 − s) ln τ₂ and ln(τ₂/τ₁) the time spread."""
-    assumptions = """one Prony pair (two of indentations), the declared E is the instantaneous one. FRFs: an elastic
-    layer of modulus 1/J(t) at each instant, exact for a sphere on a half space whose force rises at once and then
-    stays. A held oscillation is felt through the contact radius alone, since transmission through a linear layer
-    under force control has no modulus in it, and a contact's stiffness against an oscillation much faster than τ is
-    the instantaneous modulus' at that radius. Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic
-    force, e = E(t)/E, and t1 = t while the contact grows; while it shrinks t1 is when it last was as large,
+    law = """Curves: E(t) = E (1 − g (1 − e^(−t/τ))) (t/1 s)^(−n): at n = 0 a solid with one time, of modulus E at once
+    and E (1 − g) in the end; at g = 0 a power law, of modulus E after 1 s. FRFs: n = 0, and the preload held for t
+    creeps with that solid's compliance J(t) = (1 + g/(1 − g) (1 − e^(−(1 − g) t/τ)))/E; a³ ∝ J(t), L ∝ J(t)."""
+    assumptions = """linear viscoelasticity; the declared E is the instantaneous one, and with a power law that at 1 s.
+    FRFs: an elastic layer of modulus 1/J(t) at each instant, exact for a sphere on a half space whose force rises at
+    once and then stays. A held oscillation is felt through the contact radius alone, since transmission through a
+    linear layer under force control has no modulus in it, and a contact's stiffness against an oscillation much faster
+    than τ is the instantaneous modulus' at that radius. Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the
+    elastic force, e = E(t)/E, and t1 = t while the contact grows; while it shrinks t1 is when it last was as large,
     ∫_{t1}^{t} e(t−s) dδ(s) = 0 (Ting's theory, exact for one growing and one shrinking of the contact, with holds
     between). With adhesion the edge lets go where it carries the stretch ℓ of JKR's contact at the instantaneous
-    modulus. Where the modulus stiffens too, all of the force is multiplied by its ratio at the contact radius of the
-    moment. A stage gives by the relaxed force. A sphere that presses again after it was drawn back meets a surface
-    that has not recovered: refused. A cylinder: F(t) = ∫₀^t e(t−s) du(s)."""
+    modulus, of a power law that within a fifth of the shortest time between two samples. Where the modulus stiffens
+    too, all of the force is multiplied by its ratio at the contact radius of the moment. A stage gives by the relaxed
+    force. A sphere that presses again after it was drawn back meets a surface that has not recovered: refused. A
+    cylinder: F(t) = ∫₀^t e(t−s) du(s)."""
     source = """Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; Greenwood & Johnson,
-    Phil. Mag. A 43 (1981) 697 (the modulus that a moving edge sees)."""
+    Phil. Mag. A 43 (1981) 697 (the modulus that a moving edge sees); Bonfanti, Kaplan, Charras & Kabla, Soft Matter 16
+    (2020) 6002 (power laws)."""
     stage = Stage.MATERIAL
     order = 30
     kinds = ("frf", "indentation", "compression")
@@ -73,27 +84,20 @@ class ContactCreep(Mechanism):
     needs = """frf: dwell_s of every recording, not all the same; curves: time_s, and two speeds, a hold or a way back;
     indentations: one way in and one back"""
     reads = ("dwell_s",)
-    parameters_stated = _ONE_PAIR
+    parameters_stated = _FRF
 
     def parameters(
         self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
-        """One Prony pair, or for indentations two: sum of the fractions, mean time, ratio of the times, and share of
-        the first."""
+        """One Prony pair; of curves also the exponent of a power law."""
         if kind != "indentation":
-            return _ONE_PAIR
-        fraction, time, *shares = _TWO_PAIRS
+            return _FRF if kind == "frf" else _COMPRESSION
+        fraction, time, exponent = _INDENTATION
         intervals = [np.median(np.diff(times)) for times in _times(conditions)]
-        return fraction, replace(time, low=max(float(min(intervals, default=0.0)), _SHORTEST)), *shares
-
-    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
-        """Times that the recordings show, from a fiftieth of the longest to all of it."""
-        if kind != "indentation":
-            return ()
+        time = replace(time, low=max(float(min(intervals, default=0.0)), _SHORTEST))
         longest = max((float(np.ptp(times)) for times in _times(conditions)), default=0.0)
-        if not longest > 0:
-            return ()
-        return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
+        starts = {float(np.clip(share * longest, time.low, time.high)) for share in _STARTS}
+        return fraction, replace(time, starts=tuple(sorted(starts))), exponent
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times must be independent of the loads: dwell_s that differ, or time_s that does not follow displacement."""
@@ -106,7 +110,7 @@ class ContactCreep(Mechanism):
             lacking = [recording.id for recording in curves if recording.time_s is None]
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
-            if _time_runs_with_displacement(curves):
+            if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
             return _repeated_press(conditions)
         dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
@@ -122,26 +126,17 @@ class ContactCreep(Mechanism):
             unrelaxed = 1.0 - fraction
             state.relaxed = 1.0 / (1.0 + fraction / unrelaxed * (1.0 - exp(-state.dwell * unrelaxed / time)))
             state.modulus = state.modulus * state.relaxed
-        elif "time_spread" not in values:
-            state.relaxation = ((fraction, time),)
         else:
-            spread, share = values["time_spread"], values["first_share"]
-            fast, slow = time * exp(-spread * (1.0 - share)), time * exp(spread * share)
-            state.relaxation = (fraction * share, fast), (fraction * (1.0 - share), slow)
+            state.relaxation, state.power_exponent = ((fraction, time),), values.get("relaxation_exponent")
 
 
 def meaning(values: Mapping[str, float]) -> str:
-    """For two pairs the relaxed percentage and time of each; of both together where the times are equal."""
-    if "time_spread" not in values:
+    """Of a power law, how much the force falls from 1 s to 10 s, and to which time E belongs."""
+    exponent = values.get("relaxation_exponent", 0.0)
+    if exponent < _PLAIN_EXPONENT:
         return ""
-    fraction, share = values["relaxed_fraction"], values["first_share"]
-    time, spread = values["relaxation_time"], values["time_spread"]
-    fast, slow = time * math.exp(-spread * (1.0 - share)), time * math.exp(spread * share)
-    if f"{fast:.2g}" == f"{slow:.2g}":
-        return f"The force relaxes by {100 * fraction:.2g} % with {time:.2g} s."
-    shares = (fraction * share, fast), (fraction * (1.0 - share), slow)
-    first, second = (f"{100 * part:.2g} % with {time:.2g} s" for part, time in shares)
-    return f"The force relaxes by {first} and by {second}."
+    falls = 100 * (1 - 10**-exponent)
+    return f"From each time to one ten times as long the force falls by {falls:.2g} % as a power law; E is that at 1 s."
 
 
 def _times(conditions: Conditions) -> list[Floats]:
@@ -162,7 +157,7 @@ def _repeated_press(conditions: Conditions) -> str | None:
     return None
 
 
-def _time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
+def time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:
     """Whether no law of time can be identified: all curves move one way at the same constant speed.
 
     Recordings without time_s are ignored.

@@ -1,7 +1,9 @@
 """A force curve as mechanisms change it: the elastomer, the stage, and relaxation. SI.
 
-Relaxation with fading memory: E(t)/E(0) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs. u(t) is the force of the
-elastic body; F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading memories
+Relaxation with fading memory: E(t)/E(0) = 1 − Σ g (1 − e^(−t/τ)) over the Prony pairs. A power law (t/1 s)^(−n) is
+the sum of the pairs of 1/Γ(n) ∫ τ^(−n) e^(−t/τ) d ln τ by the trapezoidal rule, to 0.3 % for n up to 0.5; times longer
+and shorter than those of a recording count as one constant and one dashpot. u(t) is the force of the elastic body;
+F(t) = ∫ E(t−s)/E(0) du(s) = (1 − Σ g) u(t) + Σ g Y(t) with the fading memories
 Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for which the step is exact (Fung, Biomechanics,
 1993, section 7.6). Memories have the pairs on a last axis of their own.
 """
@@ -10,18 +12,53 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.special import gamma
 
 from underskin.autodiff import Differentiated, contiguous
 from underskin.mechanisms.models.sphere_kernels import memory_rows
 from underskin.units import Floats
 
+_POWER_STEP = 1.5  # of ln τ
+_SLOWER, _FASTER = 30.0, 0.2  # times the longest and the shortest time of a recording: the range of τ
+
 
 @dataclass(frozen=True)
 class Relaxation:
-    """The Prony pairs: g and τ [s], (points, 1, 1, pairs)."""
+    """The Prony pairs: g and τ [s], (points, 1, 1, pairs); `at_rest`, E(0) over the stated modulus (points, 1, 1)."""
 
     fraction: Floats
     time: Floats
+    at_rest: Floats | float = 1.0
+
+    @classmethod
+    def of_power_law(cls, exponent: Floats, times: tuple[float, float]) -> "Relaxation":
+        """(t/1 s)^(−n) for exponents n (points, 1, 1) from 0 to 0.5 and between the shortest and the longest times
+        [s]; E(0), which the power law does not have, is that of the shortest."""
+        low, high = np.log(_FASTER * times[0]), np.log(_SLOWER * times[1])
+        count = int(np.ceil((high - low) / _POWER_STEP)) + 1
+        log_time = high - _POWER_STEP * np.arange(count)
+        n = exponent[..., None]
+        density = np.exp(-n * log_time) / gamma(1.0 + n)  # over n h, of each τ
+        weight = n * _POWER_STEP * density
+        faster = np.exp(-(1.0 - n) * _POWER_STEP)
+        weight[..., -1:] /= 1.0 - faster
+        step = n * _POWER_STEP
+        slower = density[..., :1] * np.where(step > 0, step / np.expm1(np.maximum(step, 1e-300)), 1.0)
+        at_rest = (slower + weight.sum(axis=-1, keepdims=True))[..., 0]
+        return cls(weight / at_rest[..., None], np.exp(log_time) + np.zeros_like(weight), at_rest)
+
+    def times(self, other: "Relaxation") -> "Relaxation":
+        """The product of two relaxations."""
+        mine, others = self.fraction[..., :, None], other.fraction[..., None, :]
+        both = 1.0 / (1.0 / self.time[..., :, None] + 1.0 / other.time[..., None, :])
+        shape = (*both.shape[:-2], -1)
+        fractions = self.fraction * other.unrelaxed[..., None], other.fraction * self.unrelaxed[..., None]
+        return Relaxation(
+            np.concatenate([*fractions, (mine * others).reshape(shape)], axis=-1),
+            np.concatenate([self.time, other.time, both.reshape(shape)], axis=-1),
+            self.at_rest * other.at_rest,
+        )
 
     @property
     def unrelaxed(self) -> Floats:
@@ -55,14 +92,37 @@ def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
     return memory
 
 
+_FEW, _MORE = 3, 7  # samples whose straight line gives a speed; more where the displacement is noisy
+_STEADY = 0.05  # of the largest speed: scatter of a steady speed, by noise of the displacement
+
+
+def speeds(displacement: Floats, time: Floats) -> Floats:
+    """The speed at each sample (curves, samples) of displacements at times: the slope of the straight line through it
+    and its neighbours, few so that it turns as fast as the motion does."""
+    few, more = _slopes(displacement, time, _FEW), _slopes(displacement, time, _MORE)
+    scatter = np.median(np.abs(few - more), axis=-1, keepdims=True)
+    return np.where(scatter > _STEADY * np.abs(more).max(axis=-1, keepdims=True), more, few)
+
+
+def _slopes(displacement: Floats, time: Floats, count: int) -> Floats:
+    """Slopes of the lines through `count` samples around each, fewer where there are no more."""
+    count = min(count, displacement.shape[-1])
+    places, times = (sliding_window_view(column, count, axis=-1) for column in (displacement, time))
+    places, times = (part - part.mean(axis=-1, keepdims=True) for part in (places, times))
+    slope = (times * places).sum(axis=-1) / np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny)
+    first = np.clip(np.arange(displacement.shape[-1]) - count // 2, 0, slope.shape[-1] - 1)
+    return np.asarray(slope[..., first])
+
+
 @dataclass(frozen=True)
 class Samples:
-    """The samples before any law: `travel` from the contact point [m] (points, curves, samples), `time` [s] (curves,
-    samples), and the recordings' `ids`."""
+    """The samples before any law: `travel` from the contact point [m] (points, curves, samples), `time` [s] and
+    `speed` of the travel [m/s] (curves, samples), and the recordings' `ids`."""
 
     ids: Sequence[str]
     travel: Floats
     time: Floats
+    speed: Floats
 
     def along(self, axis: str, force: Floats, origins: Mapping[str, float]) -> Floats:
         """An axis of laws of curves: the depth beyond the contact point [mm], the contact force [N], or the time since
@@ -113,17 +173,28 @@ class Curve:
     foam: Callable[[Floats], Floats] | None = None  # of a compression that does not widen: stress over E of strains
     softening: Callable[[Floats], Floats] | None = None  # of a compression: factor on the stress, of all strains
     relaxation: tuple[tuple[Differentiated, Differentiated], ...] = ()  # g and τ [s] of each Prony pair
+    power_exponent: Differentiated | None = None  # n of the power law by which the modulus falls too
+    times: tuple[float, float] = (1.0, 1.0)  # the shortest time between samples and the longest in a recording [s]
     stage_stiffness: Differentiated | None = None  # [N/m]
     platen_friction: Differentiated | None = None  # 0 to 1
     laws: list[SampleLaw] = field(default_factory=list)
 
     @property
-    def prony_pairs(self) -> Relaxation | None:
-        """The Prony pairs, (points, 1, 1, pairs); None without relaxation."""
+    def relaxes(self) -> Relaxation | None:
+        """The Prony pairs, times the power law; None without relaxation."""
         if not self.relaxation:
             return None
         fraction, time = (np.stack([numbers(pair[part]) for pair in self.relaxation], axis=-1) for part in range(2))
-        return Relaxation(fraction, time)
+        pairs = Relaxation(fraction, time)
+        if self.power_exponent is None:
+            return pairs
+        return pairs.times(Relaxation.of_power_law(numbers(self.power_exponent), self.times))
+
+    @property
+    def modulus_at_rest(self) -> Floats:
+        """E(0) [Pa] (points, 1, 1)."""
+        relaxation = self.relaxes
+        return numbers(self.modulus) * (1.0 if relaxation is None else relaxation.at_rest)
 
 
 def numbers(quantity: Differentiated) -> Floats:

@@ -72,6 +72,8 @@ class CurveModel(ABC):
             [to_si("displacement_mm", recording.displacement_mm) for recording in recordings]
         )
         self.time = self._arranged([times_of(recording) for recording in recordings])
+        intervals = np.diff(self.time, axis=-1)
+        self.times = float(intervals[intervals > 0].min(initial=1.0)), float(np.ptp(self.time, axis=-1).max()) or 1.0
         count = len(self.parameters) - len(recordings)
         self.contact_points = np.arange(count, len(self.parameters))
         # What moves together in the differences: each shared parameter, then all contact points.
@@ -175,15 +177,19 @@ class CompressionModel(CurveModel):
 
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
-        curve = Curve(modulus=modulus, poisson_ratio=constant(INCOMPRESSIBLE, 0, modulus.value.shape[:-1]))
+        curve = Curve(
+            modulus=modulus,
+            poisson_ratio=constant(INCOMPRESSIBLE, 0, modulus.value.shape[:-1]),
+            times=self.times,
+        )
         for mechanism in self._mechanisms:
             mechanism.act(curve, values[mechanism.name])
         return curve
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         strain = (self.displacement - contact) / self._height
-        force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
-        relaxation = curve.prony_pairs
+        force = curve.modulus_at_rest * self._area * self._relative_stress(curve, strain)
+        relaxation = curve.relaxes
         if relaxation is not None:
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
         all_samples = np.ones(force.shape, dtype=bool)

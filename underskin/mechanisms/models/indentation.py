@@ -59,7 +59,7 @@ from underskin.mechanisms.models.composition import (
     required_modulus,
     thickness_parameter,
 )
-from underskin.mechanisms.models.curve_state import Curve, Relaxation, Samples, memories, numbers
+from underskin.mechanisms.models.curve_state import Curve, Relaxation, Samples, memories, numbers, speeds
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
 from underskin.mechanisms.models.sphere_kernels import (
     contact_rows,
@@ -439,6 +439,7 @@ class IndentationModel(CurveModel):
         nuisances = _nuisances(recordings, conditions.skin, sticks)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
         self._ids = [recording.id for recording in recordings]
+        self._speed = speeds(self.displacement, self.time)
         stiffnesses = [recording.stage_stiffness_n_per_mm for recording in recordings]
         self._stage_compliance = np.array([0.0 if stage is None else 1e-3 / stage for stage in stiffnesses])[
             :, None
@@ -468,6 +469,7 @@ class IndentationModel(CurveModel):
             poisson_ratio=constant(self._skin.poisson_ratio, 0, modulus.value.shape[:-1]),
             strain_share=nuisances[STRAIN_SHARE.name],
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
+            times=self.times,
         )
         for mechanism in self._mechanisms:
             mechanism.act(curve, values[mechanism.name])
@@ -475,7 +477,7 @@ class IndentationModel(CurveModel):
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         travel = self.displacement - contact
-        samples = Samples(self._ids, travel, self.time)
+        samples = Samples(self._ids, travel, self.time, self._speed)
         for law in curve.laws:
             travel = law.pressed_travel(samples, travel)
         force, contact_mask, inside = self._force_at(curve, travel, contact_mask)
@@ -485,7 +487,7 @@ class IndentationModel(CurveModel):
 
     def _force_at(self, curve: Curve, travel: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         sphere, adhesion = self._sphere(curve), _adhesion(curve)
-        relaxation = curve.prony_pairs
+        relaxation = curve.relaxes
         if relaxation is not None:
             relaxing_force = relaxing if curve.stage_stiffness is None else relaxing_on_stage
             return self._relaxing(
@@ -550,7 +552,7 @@ class IndentationModel(CurveModel):
             layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in distinct])
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
         compliance = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
-        reduced = numbers(curve.modulus) / (1 - poisson_ratio**2)
+        reduced = curve.modulus_at_rest / (1 - poisson_ratio**2)
         assert curve.strain_share is not None
         return Sphere(reduced, self._radius, layers, stiffening, compliance, self._deep, numbers(curve.strain_share))
 
