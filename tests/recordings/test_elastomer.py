@@ -148,3 +148,23 @@ def test_a_steel_sphere_in_a_well(well: str, modulus_mpa: float) -> None:
     values = np.array([[float(cell) for cell in row] for row in rows[1:]])
     found = indentation_modulus(-values[:, 1] * 1e-3, -values[:, 3], 2.5e-3, 0.5)
     assert found.modulus == pytest.approx(1e6 * modulus_mpa, rel=0.01)
+
+
+@pytest.mark.parametrize(("pulled", "largest"), [(True, (0.3, 1.5)), (False, (0.08, 0.35))])
+def test_interval_of_neo_hookean_samples(pulled: bool, largest: tuple[float, float]) -> None:
+    """The 95 % interval of E holds that of strips and blocks with an unknown zero, slack and 0.1 to 2 % noise."""
+    random = np.random.default_rng(2)
+    inside = []
+    for number in range(40):
+        strain = np.linspace(0, random.uniform(*largest), random.integers(30, 300))
+        slack = random.uniform(0, 0.1) * strain[-1] * (number % 2)
+        stretch = 1 + (1 if pulled else -1) * np.maximum(strain - slack, 0)
+        stress = 1e6 / 3 * (stretch - stretch**-2)
+        top = float(np.abs(stress).max())
+        zero, noise = top * random.uniform(-0.03, 0.03) * (number % 4 > 1), top * np.exp(random.uniform(-6.9, -3.9))
+        force = np.pi / 4 * DIAMETER**2 * (stress + zero + noise * random.standard_normal(len(stress)))
+        displacement = (-1 if pulled else 1) * strain * HEIGHT
+        found = compression_modulus(displacement, -force, HEIGHT, DIAMETER)
+        inside.append(abs(found.modulus - 1e6) < 1.96 * found.uncertainty)
+        assert found.uncertainty < 0.06e6
+    assert sum(inside) >= 35  # fewer with probability 0.014

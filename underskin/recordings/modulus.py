@@ -53,7 +53,11 @@ _LEAVES = 0.02  # departure, of the stress, beyond which the curve no longer fol
 _EARLY = 0.1  # the part starts below this share of the stress at its end
 _POINTS = 400
 _LEAST_STRETCH = 0.05  # least λ
-_FOOT_ROUNDS = 2  # iterations for the foot of the curve, from which strain counts
+_FOOT_ROUNDS = 3  # iterations for the foot of the curve, from which strain counts
+_FOOT_RANGE, _FEET = 0.5, 41  # of the strain of a part: where its foot is sought; feet tried
+_STEP = 1e-4  # of the range of strain, for a derivative
+ZERO_SD = 0.02  # of the largest force: a cell's zero, 0.1 % of its range where a sample uses a twentieth of that
+_OTHER_SIGN = 0.1  # of the largest force, below which forces of the other sign are noise or a zero
 _FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
 _SMOOTH = 5  # degree of the polynomial that represents a curve of few points
 _LONGER = 1.15  # ratio of strain ranges beyond which the law of the longer range is chosen
@@ -79,6 +83,7 @@ class CompressionModulus:
     leaves_at_stress: float | None
     is_straight: bool
     departure: float
+    foot: float  # displacement [m] at which the sample is unloaded
 
     @property
     def statement(self) -> str:
@@ -127,40 +132,108 @@ def _by_law(
     along: Floats, stress: Floats, height: float, sign: float, noise: float, foot: float, *, straight: bool
 ) -> CompressionModulus:
     """The modulus by one law; `foot`: displacement where the stress is about 0; `sign`: 1 where the stress rises."""
-    for _ in range(_FOOT_ROUNDS):
+    law = _hooke if straight else _Block(sign, is_slack=is_one_sided(stress))
+    for _ in range(1 if straight else _FOOT_ROUNDS):
         strain, binned = _thinned(sign * (along - foot) / height, sign * stress)
-        stretched = strain if straight else sign * _neo_hookean(sign * strain)
-        first, last = _first_straight(stretched, binned, noise)
+        first, last = _first_straight(law(strain), binned, noise)
         part = slice(first, last + 1)
-        slope, level = (float(value) for value in np.polyfit(stretched[part], binned[part], 1))
-        if not slope > 0 or straight:
-            break
-        foot -= sign * height * level / slope
-    middle = (first + last + 1) // 2
-    halves = [
-        np.polyfit(stretched[half], binned[half], 1)[0] for half in (slice(first, middle), slice(middle, last + 1))
-    ]
-    span = stretched[part] - stretched[part].mean()
+        moved = 0.0 if straight else _foot(law, strain[part], binned[part], noise)
+        foot, strain = foot + sign * height * moved, strain - moved
+    stretched = law(strain)
+    zero = max(ZERO_SD * float(np.abs(binned).max()), 1e-300)
+    columns = np.column_stack([stretched[part], np.ones(last + 1 - first)])
+    slope, level = (float(value) for value in np.linalg.lstsq(columns, binned[part], rcond=None)[0])
+    if not straight:
+        slope, level = _with_zero(columns, binned[part], noise / zero)[0]
+        step = _STEP * float(np.ptp(strain))
+        columns = np.column_stack([columns, slope * (law(strain - step) - law(strain + step))[part] / (2 * step)])
     rest = binned[part] - level - slope * stretched[part]
-    by_noise = noise / np.sqrt(span @ span)
+    freedom = max(len(rest) - columns.shape[1], 1)
+    deviation = max(noise, float(np.sqrt(rest @ rest / freedom * _correlation_factor(rest))))
     leaves = _leaves(stretched, binned, slope, level, last, noise)
     foot_strain = -level / slope if straight and slope else 0.0  # else counted from there already
+    first_strain = float(strain[first] - foot_strain)
     return CompressionModulus(
         modulus=slope,
-        uncertainty=float(np.hypot(by_noise, (halves[1] - halves[0]) / np.sqrt(12))),
-        first_strain=float(strain[first] - foot_strain),
+        uncertainty=float(np.hypot(_deviation(columns, deviation, zero), _change(stretched[part], binned[part], noise))),
+        first_strain=first_strain if straight else max(first_strain, 0.0),  # before that the sample is slack
         last_strain=float(strain[last] - foot_strain),
         leaves_at_strain=None if leaves is None else float(strain[leaves] - foot_strain),
         leaves_at_stress=None if leaves is None else float(binned[leaves]),
         is_straight=straight,
         departure=float(np.sqrt(np.mean(rest**2)) / max(float(np.ptp(binned[part])), 1e-300)),
+        foot=foot + sign * height * foot_strain,
     )
 
 
-def _neo_hookean(strain: Floats) -> Floats:
-    """Nominal stress over E of strains, compression positive."""
-    stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
-    return np.asarray((stretch**-2 - stretch) / 3)
+def is_one_sided(force: Floats) -> bool:
+    """Whether a sample is only pressed or only pulled: before that it is slack, and its force 0."""
+    low, high = float(np.min(force)), float(np.max(force))
+    return min(high, -low) < _OTHER_SIGN * max(high, -low)
+
+
+def _hooke(strain: Floats) -> Floats:
+    return strain
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Nominal stress over E of the neo-Hookean solid at strains that are positive as it is loaded; `sign`: 1 in
+    compression, −1 in tension. `is_slack`: without stress before."""
+
+    sign: float
+    is_slack: bool
+
+    def __call__(self, strain: Floats) -> Floats:
+        if self.is_slack:
+            strain = np.maximum(strain, 0.0)
+        stretch = np.maximum(1.0 - self.sign * strain, _LEAST_STRETCH)
+        return np.asarray(self.sign * (stretch**-2 - stretch) / 3)
+
+
+def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise: float) -> float:
+    """The strain at which the law begins, by least squares with a zero of the force that is known to `ZERO_SD`."""
+    weight = noise / max(ZERO_SD * float(np.abs(stress).max()), 1e-300)
+
+    def misfit(foot: float) -> float:
+        columns = np.column_stack([law(strain - foot), np.ones_like(strain)])
+        return _with_zero(columns, stress, weight)[1]
+
+    span = float(np.ptp(strain))
+    guesses = strain[0] + span * np.linspace(-_FOOT_RANGE, _FOOT_RANGE, _FEET)
+    best = int(np.argmin([misfit(float(guess)) for guess in guesses]))
+    around = float(guesses[max(best - 1, 0)]), float(guesses[min(best + 1, _FEET - 1)])
+    return float(minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-9 * span}).x)
+
+
+def _with_zero(columns: Floats, stress: Floats, weight: float) -> tuple[Floats, float]:
+    """The coefficients of two columns, the second with a prior around 0 of this weight, and the sum of squares."""
+    rows, values = np.vstack([columns, [0.0, weight]]), np.append(stress, 0.0)
+    fitted: Floats = np.linalg.lstsq(rows, values, rcond=None)[0].astype(np.float64)
+    rest = values - rows @ fitted
+    return fitted, float(rest @ rest)
+
+
+def _deviation(columns: Floats, noise: float, zero: float) -> float:
+    """The standard deviation of the slope, the first column's factor, under noise; `zero`: that of the level, the
+    second's, before the fit."""
+    prior = np.zeros((1, columns.shape[1]))
+    prior[0, 1] = noise / zero
+    normal = np.vstack([columns, prior])
+    size = np.linalg.norm(normal, axis=0)
+    return noise * float(np.sqrt(np.linalg.pinv((normal / size).T @ (normal / size))[0, 0])) / float(size[0])
+
+
+def _change(stretched: Floats, stress: Floats, noise: float) -> float:
+    """The standard deviation of a slope that changes evenly between those of the halves, beyond what noise gives."""
+    middle = (len(stress) + 1) // 2
+    slopes, variances = [], []
+    for half in (slice(0, middle), slice(middle, None)):
+        about = stretched[half] - stretched[half].mean()
+        square = float(about @ about)
+        slopes.append(float(about @ stress[half]) / square if square > 0 else 0.0)
+        variances.append(noise**2 / square if square > 0 else 0.0)
+    return float(np.sqrt(max((slopes[1] - slopes[0]) ** 2 - sum(variances), 0.0) / 12))
 
 
 def _thinned(strain: Floats, stress: Floats) -> tuple[Floats, Floats]:
