@@ -155,7 +155,9 @@ def _by_law(
     first_strain = float(strain[first] - foot_strain)
     return CompressionModulus(
         modulus=slope,
-        uncertainty=float(np.hypot(_deviation(columns, deviation, zero), _change(stretched[part], binned[part], noise))),
+        uncertainty=float(
+            np.hypot(_deviation(columns, deviation, zero), _change(stretched[part], binned[part], noise))
+        ),
         first_strain=first_strain if straight else max(first_strain, 0.0),  # before that the sample is slack
         last_strain=float(strain[last] - foot_strain),
         leaves_at_strain=None if leaves is None else float(strain[leaves] - foot_strain),
