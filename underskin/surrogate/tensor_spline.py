@@ -128,8 +128,10 @@ class TensorSpline:
         if not all(axis.nodes[0] <= x <= axis.nodes[-1] for axis, x in zip(self.axes, point, strict=True)):
             return math.nan, (0,) * len(point)
         cells = [int(np.searchsorted(axis.nodes[1:-1], x, "right")) for axis, x in zip(self.axes, point, strict=True)]
-        first = (int(axis.first[cell]) for axis, cell in zip(self.axes, cells, strict=True))
-        value = self.coefficients[(*(0,) * (4 - len(point)), *(slice(low, low + _DEGREE + 1) for low in first))]
+        value = self.coefficients[(0,) * (4 - len(point))]
+        for number, (axis, cell) in enumerate(zip(self.axes, cells, strict=True)):
+            low = int(axis.first[cell])
+            value = np.take(value, range(low, low + _DEGREE + 1), axis=number)
         for axis, cell, x in reversed([*zip(self.axes, cells, point, strict=True)]):
             u, (c0, c1, c2, c3) = x - axis.lower[cell], axis.cubics[cell]
             terms = value * (c0 + u * (c1 + u * (c2 + u * c3)))

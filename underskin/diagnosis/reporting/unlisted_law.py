@@ -19,7 +19,6 @@ from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.numbers import (
-    SDS_OF_95,
     covariance_of,
     law_shares,
     parameters_of,
@@ -31,6 +30,7 @@ from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.unlisted_search import law_of
 from underskin.diagnosis.validation import cross_validation
 from underskin.findings.formatting import in_percent
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.unlisted.axes import Axis
 from underskin.mechanisms.unlisted.expressions import CurveLaw, change_along, expression, wave
 from underskin.mechanisms.unlisted.forms import EVERYWHERE
