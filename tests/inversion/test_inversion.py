@@ -105,7 +105,7 @@ def test_campaign_nothing_used_says_exceeds(table: SigmaTable) -> None:
     assert said.startswith(
         "none of the 2 recordings can be used: recording r0: F = 1000 N, R = 4 mm, E = 16 MPa, L = 3.9"
     )
-    assert "L = 3.91 exceeds 0.1: at most 25.6 N with this sphere; is the preload in mN?" in said
+    assert "L = 3.91 exceeds 0.1: at most 25.6 N with this sphere; is the preload in mN or gf?" in said
     assert "mN?; recording r1: F = 50 N" in said
     assert said.endswith("L = 0.195 exceeds 0.1: at most 25.6 N with this sphere")
     compressible = replace(campaign, skin=replace(campaign.skin, poisson_ratio=0.4))

@@ -199,7 +199,7 @@ def test_mains_lines_left_out_not_end() -> None:
     assert np.median(mean) == pytest.approx(np.median(level), rel=0.03)
 
 
-FILTERS: dict[str, Callable[[Floats], Complexes]] = {
+FILTERS: dict[str, Callable[[Floats], Any]] = {
     "high-pass": lambda f: 1j * f / (80 + 1j * f),
     "two high-passes": lambda f: (1j * f / (20 + 1j * f)) ** 2,
     "Butterworth's high-pass": lambda f: -((f / 50) ** 2) / (1 - (f / 50) ** 2 + 1.41421356j * f / 50),
@@ -224,7 +224,7 @@ def test_filter_bends_no_mains_line_and_loses_what_is_said(name: str, grid: Floa
     assert stated == pytest.approx(1 - abs(float(np.median(level))) / 7e-12, abs=0.02)
     at = int(np.argmin(np.abs(grid - 50)))
     values[:, at] += 0.1 * np.abs(values[:, at]) * np.exp(2j * np.pi * random.random(3))
-    assert mains_lines(stacked([Frf(grid, row) for row in values])) == (pytest.approx(grid[at]),)
+    assert mains_lines(stacked([Frf(grid, row) for row in values])) == (round(float(grid[at]), 6),)
 
 
 def test_dead_sensors_single_recordings() -> None:

@@ -528,13 +528,15 @@ class _Curve:
         from scipy.optimize import minimize  # takes 0.3 s to load, which few need
 
         names = [name for name in ("high_hz", "low_hz") if 0 < getattr(filters, name) < np.inf]
-        start = np.log([getattr(filters, name) for name in names])
+        start: Floats = np.log(np.array([getattr(filters, name) for name in names], dtype=np.float64))
 
         def moved(corners: Floats) -> Filters:
             return replace(filters, **dict(zip(names, np.exp(corners).tolist(), strict=True)))
 
-        found = minimize(lambda corners: self.fitted(moved(corners))[0], start, method="Nelder-Mead")
-        return moved(found.x)
+        def misfit(corners: Floats) -> float:
+            return self.fitted(moved(corners))[0]
+
+        return moved(np.asarray(minimize(misfit, start, method="Nelder-Mead").x, dtype=np.float64))
 
 
 def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:
