@@ -212,6 +212,7 @@ def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise
 
 def _with_zero(columns: Floats, stress: Floats, weight: float) -> tuple[Floats, float]:
     """The coefficients of two columns, the second with a prior around 0 of this weight, and the sum of squares."""
+    weight = float(np.hypot(weight, _STRAIGHT / ZERO_SD))  # nor is the law better known than by its departure
     rows, values = np.vstack([columns, [0.0, weight]]), np.append(stress, 0.0)
     fitted: Floats = np.linalg.lstsq(rows, values, rcond=None)[0].astype(np.float64)
     rest = values - rows @ fitted
