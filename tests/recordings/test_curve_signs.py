@@ -10,7 +10,8 @@ from tests.support.blocks import block
 from underskin import InvalidInput
 from underskin.inversion import elastomer
 from underskin.recordings import curve_preparation, plausibility
-from underskin.recordings.campaign import Campaign, IndentationRecording, from_dict, samples_of
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, from_dict, samples_of
+from underskin.recordings.modulus import CompressionModulus
 
 SIGNS = list(product((1, -1), (1, -1)))
 NAMES = ("force_n", "displacement_mm")
@@ -91,3 +92,23 @@ def test_no_modulus_is_negative(make: object, force: int, travel: int) -> None:
     assert callable(make)
     (found,) = elastomer.of_campaign(make(force, travel))
     assert isinstance(found.result, InvalidInput) or found.result.modulus > 0
+
+
+@pytest.mark.parametrize(("force", "travel"), SIGNS)
+@pytest.mark.parametrize("way", [1, -1])
+def test_pulled_and_pressed_in_one_table(force: int, travel: int, way: int) -> None:
+    """From 100 % of extension to 40 % of compression, or back: the law tells the signs, and so do the words."""
+    strain = np.linspace(1.0, -0.4, 60)[::way]
+    load_n = np.pi / 4 * 25 / 3 * ((1 + strain) - (1 + strain) ** -2)
+    load_n += 0.005 * np.abs(load_n).max() * np.random.default_rng(0).standard_normal(60)
+    strip = CompressionRecording("strip", 30.0, 5.0, -travel * 30 * strain, force_n=-force * load_n)
+    campaign = replace(pressed_block(1, 1), recordings=(strip,))
+    result = elastomer.of_campaign(campaign)[0].result
+    assert isinstance(result, CompressionModulus)
+    assert result.modulus == pytest.approx(1e6, rel=0.02)
+    ends = ("pulled by", "pressed by")[::way]
+    assert result.statement.index(ends[0]) < result.statement.index(ends[1])
+    negative = [name for name, sign in zip(NAMES, (force, travel), strict=True) if sign < 0]
+    findings = [finding.arguments for finding in curve_preparation.prepared(campaign).findings]
+    assert [finding["fields"] for finding in findings] == ([negative] if negative else [])
+    assert not any(finding["may_be_pulled"] for finding in findings)

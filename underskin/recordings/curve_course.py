@@ -43,6 +43,15 @@ def roughness(force: Floats) -> float:
     return float(np.hypot(noise, quantum / np.sqrt(12.0))) if coarse else noise
 
 
+_OTHER_SIGN = 0.1  # of the largest force, below which forces of the other sign are noise or an error of the zero
+
+
+def is_one_sided(force: Floats) -> bool:
+    """Whether a cylinder is only compressed or only pulled."""
+    low, high = float(np.min(force)), float(np.max(force))
+    return min(high, -low) < _OTHER_SIGN * max(high, -low)
+
+
 def hidden_samples(displacement: Floats) -> int:
     """The number of samples, at least 1, over which the displacement moves by twice the noise of their mean.
 

@@ -4,7 +4,8 @@ Compression and depth are positive. The signs of a sphere's channels follow from
 recording begins and in whatever order its rows stand: force grows with depth except at jumps, and its slope grows with
 depth, so the stiffest of all turning points and ends of the travel is the deepest. A pull-off, a lift before loading or
 the first row give no information. A block may be compressed or pulled: its curve shows only that force and displacement
-have one sign; the sign of the force shows which.
+have one sign; the sign of the force shows which. One that is pulled and compressed is stiffer in compression over equal
+strains of both, as incompressible solids are, which shows the signs of both columns.
 
 Columns are taken for exchanged where the "force" moves steadily like a stage while the "displacement" first stands
 still or lags like a force (a block needs both, since its displacement may begin late by play of the extensometer). No
@@ -14,7 +15,7 @@ material does that: by Hertz depth grows as F^(2/3), never with an exponent abov
 as it is: it may be in tension.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +31,7 @@ from underskin.recordings.campaign import (
     Recording,
     samples_of,
 )
-from underskin.recordings.curve_course import roughness
+from underskin.recordings.curve_course import is_one_sided, roughness
 from underskin.units import Floats, Indices, Mask
 
 FORCE, TRAVEL = "force_n", "displacement_mm"
@@ -43,7 +44,6 @@ _SAMPLED = 20_000  # samples among which turns are sought
 _NEAR = 0.15  # of the range of travel, over which the stiffness at a turn is computed
 _HELD = 0.02  # of that distance from the turn: samples within it are a hold, of which one counts
 _STIFFER = 1.15  # least ratio of stiffness of the deep end to the other
-_OTHER_SIGN = 0.1  # of the largest force: forces of the other sign below it are ignored
 _LONGEST = 0.9  # of a block's height: a larger displacement is no compression
 _BOW = 0.02  # of the range of force, by which a softening curve lies above its chord on average
 
@@ -54,11 +54,13 @@ class Orientation:
 
     `turns` are the samples at which the travel turns, with the first and the last. `is_deep_end_known` is whether the
     deep end follows from the stiffness, rather than being assumed from the direction of the first movement.
+    `may_be_pulled`: both columns of a block are negative, which is right for tension.
     """
 
     negative: tuple[str, ...]
     turns: Indices
     is_deep_end_known: bool
+    may_be_pulled: bool = False
 
 
 _UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_deep_end_known=False)
@@ -75,8 +77,8 @@ def orientation(recording: CurveRecording) -> Orientation:
     if isinstance(recording, IndentationRecording):
         return _oriented(force, travel, sphere=True)
     oriented = _oriented(force, travel, sphere=False)
-    is_pulled = len(oriented.negative) > 1 and np.nanmax(np.abs(travel)) > _LONGEST * recording.sample_height_mm
-    return replace(oriented, negative=()) if is_pulled else oriented
+    is_pulled = oriented.may_be_pulled and np.nanmax(np.abs(travel)) > _LONGEST * recording.sample_height_mm
+    return replace(oriented, negative=(), may_be_pulled=False) if is_pulled else oriented
 
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
@@ -96,7 +98,9 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
     if not relative_sign:
         return Orientation((), turns, is_deep_end_known=False)
     if not sphere:
-        return Orientation(_of_block(force, travel, relative_sign), turns, is_deep_end_known=True)
+        negative = _of_block(force, travel, relative_sign)
+        may_be_pulled = len(negative) > 1 and is_one_sided(force)
+        return Orientation(negative, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled)
     deep = _deep_side(force, travel, turns, relative_sign)
     side = deep or _first_movement(travel)
     negative = ((FORCE, relative_sign * side < 0), (TRAVEL, side < 0))
@@ -106,13 +110,23 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
 def _of_block(force: Floats, travel: Floats, relative_sign: int) -> tuple[str, ...]:
     """The negative columns of a block: the force where it is only pulled, the displacement where it opposes the force.
 
-    Both may be right for a sample in tension, and are where it softens with strain, as rubber in tension does.
+    Both may be right for a sample in tension, and are where it softens with strain, as rubber in tension does. A block
+    of both signs of strain is compressed where it is stiffer.
     """
-    low, high = float(force.min()), float(force.max())
-    pulled = low < 0 and high < _OTHER_SIGN * -low
+    if not is_one_sided(force):
+        softens = _softens_across(force, relative_sign * travel)
+        return tuple(name for name, falls in ((FORCE, softens), (TRAVEL, softens == (relative_sign > 0))) if falls)
+    pulled = -float(force.min()) > float(force.max())
     if relative_sign > 0:
         return (FORCE, TRAVEL) if pulled and not _softens(-force, -travel) else ()
     return (FORCE,) if pulled else (TRAVEL,)
+
+
+def _softens_across(force: Floats, strain: Floats) -> bool:
+    """Whether a block of both signs of strain softens as these grow, over equal strains of both signs."""
+    strain = strain - strain[np.abs(force).argmin()]
+    both = np.abs(strain) <= min(float(strain.max()), -float(strain.min()))
+    return int(both.sum()) >= _LEAST_TELLING and _softens(force[both], strain[both])
 
 
 def _softens(force: Floats, strain: Floats) -> bool:
@@ -205,21 +219,23 @@ def _first_movement(travel: Floats) -> int:
 
 def findings(campaign: Campaign) -> list[Finding]:
     """One finding for the first curve of each kind and set of negative columns, with the number of further ones."""
-    by_fields: dict[tuple[str, tuple[str, ...]], list[str]] = {}
-    for recording in _curves(campaign).values():
-        by_fields.setdefault((recording.kind, counted_negative(recording)), []).append(recording.id)
-    return [finding(kind, fields, ids) for (kind, fields), ids in by_fields.items() if fields]
+    return _counted((curve, orientation(curve)) for curve in _curves(campaign).values())
 
 
-def finding(kind: str, fields: tuple[str, ...], ids: Sequence[str]) -> Finding:
-    """The finding on curves of one kind whose columns `fields` are counted negative."""
-    arguments = {"fields": list(fields), "more": len(ids) - 1, "may_be_pulled": may_be_pulled(kind, fields)}
-    return Finding(Reason.CURVE_COUNTED_NEGATIVE, ids[0], fields[0], arguments)
-
-
-def may_be_pulled(kind: str, fields: tuple[str, ...]) -> bool:
-    """Whether negative columns may be right: both columns of a block (tension)."""
-    return kind == "compression" and len(fields) > 1
+def _counted(curves: Iterable[tuple[CurveRecording, Orientation]]) -> list[Finding]:
+    alike: dict[tuple[str, tuple[str, ...], bool], list[str]] = {}
+    for curve, oriented in curves:
+        alike.setdefault((curve.kind, oriented.negative, oriented.may_be_pulled), []).append(curve.id)
+    return [
+        Finding(
+            Reason.CURVE_COUNTED_NEGATIVE,
+            ids[0],
+            fields[0],
+            {"fields": list(fields), "more": len(ids) - 1, "may_be_pulled": may_be_pulled},
+        )
+        for (_, fields, may_be_pulled), ids in alike.items()
+        if fields
+    ]
 
 
 def turned(campaign: Campaign) -> tuple[Campaign, int]:
@@ -564,7 +580,7 @@ class PreparedCurves:
 def prepared(campaign: Campaign) -> PreparedCurves:
     """The campaign with its curves prepared; other recordings are unchanged."""
     findings: list[Finding] = []
-    negative: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    oriented_curves: list[tuple[CurveRecording, Orientation]] = []
     recordings: list[Recording] = []
     for recording in campaign.recordings:
         if isinstance(recording, FrfRecording) or are_exchanged(recording):
@@ -572,18 +588,18 @@ def prepared(campaign: Campaign) -> PreparedCurves:
             continue
         curve, curve_findings = _without_saturation(recording)
         oriented = orientation(curve)
-        negative.setdefault((curve.kind, oriented.negative), []).append(curve.id)
+        oriented_curves.append((curve, oriented))
         for step in (_turned, _forwards, _without_periodic_error):
             curve, step_findings = step(curve, oriented)
             curve_findings += step_findings
         recordings.append(curve)
         findings += curve_findings
-    counted = [finding(kind, fields, ids) for (kind, fields), ids in negative.items() if fields]
+    counted = _counted(oriented_curves)
     return PreparedCurves(replace(campaign, recordings=tuple(recordings)), (*counted, *findings))
 
 
 def _turned(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
-    if may_be_pulled(curve.kind, oriented.negative):
+    if oriented.may_be_pulled:
         return curve, []
     return with_turned(curve, oriented.negative), []
 

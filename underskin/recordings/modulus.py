@@ -21,7 +21,7 @@ from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.physics.sphere_law import PARABOLOID, Softening, SphereLaw
 from underskin.recordings.campaign import CompressionRecording, IndentationRecording
-from underskin.recordings.curve_course import roughness
+from underskin.recordings.curve_course import is_one_sided, roughness
 from underskin.units import Floats, to_lab, to_si
 
 FEWEST = 8  # samples
@@ -53,11 +53,10 @@ _LEAVES = 0.02  # departure, of the stress, beyond which the curve no longer fol
 _EARLY = 0.1  # the part starts below this share of the stress at its end
 _POINTS = 400
 _LEAST_STRETCH = 0.05  # least λ
-_FOOT_ROUNDS = 3  # iterations for the foot of the curve, from which strain counts
+_ROUNDS = 2  # iterations for the foot of the curve, from which strain counts
 _FOOT_RANGE, _FEET = 0.5, 41  # of the strain of a part: where its foot is sought; feet tried
 _STEP = 1e-4  # of the range of strain, for a derivative
 ZERO_SD = 0.02  # of the largest force: a cell's zero, 0.1 % of its range where a sample uses a twentieth of that
-_OTHER_SIGN = 0.1  # of the largest force, below which forces of the other sign are noise or a zero
 _FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
 _SMOOTH = 5  # degree of the polynomial that represents a curve of few points
 _LONGER = 1.15  # ratio of strain ranges beyond which the law of the longer range is chosen
@@ -84,13 +83,17 @@ class CompressionModulus:
     is_straight: bool
     departure: float
     foot: float  # displacement [m] at which the sample is unloaded
+    is_pressed: bool  # whether it ends in compression
 
     @property
     def statement(self) -> str:
         """The law and its range in words."""
         law = "straight" if self.is_straight else "neo-Hookean"
         first = 0.0 if abs(self.first_strain) < _FOOT * self.last_strain else self.first_strain
+        begins, ends = ("pulled", "pressed") if self.is_pressed else ("pressed", "pulled")
         follows = f"{law} from {100 * first:.3g} to {100 * self.last_strain:.3g} % strain"
+        if first < 0 < self.last_strain:
+            follows = f"{law} from {begins} by {-100 * first:.3g} to {ends} by {100 * self.last_strain:.3g} %"
         if self.leaves_at_strain is None or self.leaves_at_stress is None:
             return f"{follows}, and not seen to leave the {'line' if self.is_straight else 'law'}"
         stress = float(to_lab("mean_stress_mpa", self.leaves_at_stress))
@@ -132,12 +135,17 @@ def _by_law(
     along: Floats, stress: Floats, height: float, sign: float, noise: float, foot: float, *, straight: bool
 ) -> CompressionModulus:
     """The modulus by one law; `foot`: displacement where the stress is about 0; `sign`: 1 where the stress rises."""
-    law = _hooke if straight else _Block(sign, is_slack=is_one_sided(stress))
-    for _ in range(1 if straight else _FOOT_ROUNDS):
+    law: Callable[[Floats], Floats] = _hooke
+    laws = [law] if straight else [_Block(sign, is_slack=False), *_ROUNDS * [_Block(sign, is_one_sided(stress))]]
+    for law, following in zip(laws, [*laws[1:], None], strict=True):
         strain, binned = _thinned(sign * (along - foot) / height, sign * stress)
         first, last = _first_straight(law(strain), binned, noise)
         part = slice(first, last + 1)
-        moved = 0.0 if straight else _foot(law, strain[part], binned[part], noise)
+        if straight:
+            break
+        # Only all samples show which of the first ones are slack
+        fitted = part if following in (law, None) else slice(0, last + 1)
+        moved = _foot(following or law, strain[fitted], binned[fitted], noise)
         foot, strain = foot + sign * height * moved, strain - moved
     stretched = law(strain)
     zero = max(ZERO_SD * float(np.abs(binned).max()), 1e-300)
@@ -150,28 +158,22 @@ def _by_law(
     rest = binned[part] - level - slope * stretched[part]
     freedom = max(len(rest) - columns.shape[1], 1)
     deviation = max(noise, float(np.sqrt(rest @ rest / freedom * _correlation_factor(rest))))
+    change = _change(stretched[part], binned[part], noise)
     leaves = _leaves(stretched, binned, slope, level, last, noise)
     foot_strain = -level / slope if straight and slope else 0.0  # else counted from there already
     first_strain = float(strain[first] - foot_strain)
     return CompressionModulus(
         modulus=slope,
-        uncertainty=float(
-            np.hypot(_deviation(columns, deviation, zero), _change(stretched[part], binned[part], noise))
-        ),
-        first_strain=first_strain if straight else max(first_strain, 0.0),  # before that the sample is slack
+        uncertainty=float(np.hypot(_deviation(columns, deviation, zero), change)),
+        first_strain=first_strain if straight or not is_one_sided(stress) else max(first_strain, 0.0),  # else slack
         last_strain=float(strain[last] - foot_strain),
         leaves_at_strain=None if leaves is None else float(strain[leaves] - foot_strain),
         leaves_at_stress=None if leaves is None else float(binned[leaves]),
         is_straight=straight,
         departure=float(np.sqrt(np.mean(rest**2)) / max(float(np.ptp(binned[part])), 1e-300)),
         foot=foot + sign * height * foot_strain,
+        is_pressed=sign > 0,
     )
-
-
-def is_one_sided(force: Floats) -> bool:
-    """Whether a sample is only pressed or only pulled: before that it is slack, and its force 0."""
-    low, high = float(np.min(force)), float(np.max(force))
-    return min(high, -low) < _OTHER_SIGN * max(high, -low)
 
 
 def _hooke(strain: Floats) -> Floats:
@@ -194,7 +196,7 @@ class _Block:
 
 
 def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise: float) -> float:
-    """The strain at which the law begins, by least squares with a zero of the force that is known to `ZERO_SD`."""
+    """The strain at which the sample is unloaded, by least squares with a zero of the force known to `ZERO_SD`."""
     weight = noise / max(ZERO_SD * float(np.abs(stress).max()), 1e-300)
 
     def misfit(foot: float) -> float:
@@ -202,7 +204,7 @@ def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise
         return _with_zero(columns, stress, weight)[1]
 
     span = float(np.ptp(strain))
-    guesses = strain[0] + span * np.linspace(-_FOOT_RANGE, _FOOT_RANGE, _FEET)
+    guesses = span * np.linspace(-_FOOT_RANGE, _FOOT_RANGE, _FEET)
     best = int(np.argmin([misfit(float(guess)) for guess in guesses]))
     around = float(guesses[max(best - 1, 0)]), float(guesses[min(best + 1, _FEET - 1)])
     return float(minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-9 * span}).x)
@@ -210,6 +212,7 @@ def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise
 
 def _with_zero(columns: Floats, stress: Floats, weight: float) -> tuple[Floats, float]:
     """The coefficients of two columns, the second with a prior around 0 of this weight, and the sum of squares."""
+    weight = float(np.hypot(weight, _STRAIGHT / ZERO_SD))  # nor is the law better known than by its departure
     rows, values = np.vstack([columns, [0.0, weight]]), np.append(stress, 0.0)
     fitted: Floats = np.linalg.lstsq(rows, values, rcond=None)[0].astype(np.float64)
     rest = values - rows @ fitted
@@ -223,6 +226,9 @@ def _deviation(columns: Floats, noise: float, zero: float) -> float:
     prior[0, 1] = noise / zero
     normal = np.vstack([columns, prior])
     size = np.linalg.norm(normal, axis=0)
+    if not size[0] > 0:
+        return np.inf
+    size = np.where(size > 0, size, 1.0)
     return noise * float(np.sqrt(np.linalg.pinv((normal / size).T @ (normal / size))[0, 0])) / float(size[0])
 
 

@@ -61,7 +61,11 @@ def statement(facts: Facts) -> str:
     slips = [*_clauses(facts.findings, _SLIPS), numbers.outlying_sensors(facts.problem, facts.shown)]
     slips = [words for words in slips if words]
     decides = [*(contradiction["statement"] for contradiction in facts.contradictions), *slips]
-    open_questions = [*_clauses(facts.findings, _RESERVES), *facts.untried]
+    apart = bool(decides)
+    # A mechanism that was not tried may be what is missing: that comes first
+    of_tried = verdict == "unexplained" and bool(facts.untried)
+    decides += facts.untried if of_tried else []
+    open_questions = [*_clauses(facts.findings, _RESERVES), *([] if of_tried else facts.untried)]
     quoted = [
         kinds.moduli_clause(facts.joined, facts.by_kind),
         _depths_clause(facts),
@@ -70,7 +74,8 @@ def statement(facts: Facts) -> str:
     ]
     model, of_curves = SIMPLEST[facts.problem.kind], "youngs_modulus" in fit["before"]
     if facts.leading is not None and facts.law is not None:
-        first = f"no known mechanism describes this (probability {in_percent(facts.leader.probability)})"
+        which = "none of the other mechanisms" if of_tried else "no known mechanism"
+        first = f"{which} describes this (probability {in_percent(facts.leader.probability)})"
         second, further = _law_clauses(facts, facts.leading, facts.law)
         last = [*further, _misfit_clause(fit, model, "this law") if of_curves else "", *quoted]
     else:
@@ -83,6 +88,7 @@ def statement(facts: Facts) -> str:
             idle=facts.idle,
             bounds=tuple(facts.bounds),
             all_used=not slips,
+            all_tried=not of_tried,
         )
         last = quoted
         if verdict in ("explained", "no_mismatch"):
@@ -98,7 +104,7 @@ def statement(facts: Facts) -> str:
         second += facts.meanings
         if verdict == "no_mismatch":
             second, last = [*second, *last], [_power_clause(facts.power, facts.problem.kind)]
-    return of_clauses([*decides, f"apart from that, {first}" if decides else first, *open_questions], second, last)
+    return of_clauses([*decides, f"apart from that, {first}" if apart else first, *open_questions], second, last)
 
 
 def insufficient_statement(what: Lacking | None, findings: Sequence[Mapping[str, str]]) -> str:
@@ -130,11 +136,13 @@ def answer_clauses(
     bounds: Sequence[str] = (),
     *,
     all_used: bool = True,
+    all_tried: bool = True,
 ) -> list[str]:
     """The verdict as a clause, and further clauses on its meaning.
 
     `presence` and `mechanisms` are the report's, `idle` the mechanisms that may as well have no effect, `bounds` the
-    parameters at a bound of their search; `all_used` says that no recording was left out or corrected.
+    parameters at a bound of their search; `all_used` says that no recording was left out or corrected, `all_tried` that
+    no mechanism that might explain what is left was not tried.
     """
     leader = answers[0]
     percent = in_percent(leader.probability)
@@ -149,7 +157,8 @@ def answer_clauses(
             return [f"{agree}, and nothing needs to be added{'' if all_used else ' for those that were used'}"]
         return [f"{agree}, but they do not rule out: {listed}", _law(mentioned)]
     if verdict == "unexplained":
-        return [f"something is missing that none of the known mechanisms describes (probability {percent})"]
+        which = "known mechanisms" if all_tried else "mechanisms that were tried"
+        return [f"something is missing that none of the {which} describes (probability {percent})"]
     by_sets = f"by sets: {_answers_in_words([leader, *rivals])}" if rivals else ""
     if verdict == "explained":
         missing, by_mechanism = _lacking(leader, presence, mechanisms)

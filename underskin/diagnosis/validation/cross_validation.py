@@ -28,6 +28,7 @@ from underskin.findings.finding import Finding
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, in_plain_words
 from underskin.recordings.campaign import curves_of, frf_of
+from underskin.recordings.curve_course import is_one_sided
 from underskin.units import Floats, Indices, Mask
 
 _STRETCHES = 9  # of a curve
@@ -104,6 +105,8 @@ def _curve_parts(lines: Lines) -> dict[str, Mask]:
     unloading, hold = np.zeros(len(force), dtype=bool), np.zeros(len(force), dtype=bool)
     for span, recording in zip(lines.spans, curves_of(lines.campaign), strict=True):
         first, end = span.start, span.stop
+        if lines.kind == "compression" and not is_one_sided(lines.value.real[span]):
+            continue  # from tension to compression or back: neither a way back nor a hold
         travel = recording.displacement_mm - recording.displacement_mm[0]
         if lines.kind == "compression" and -travel.min() > travel.max():  # pulled
             travel = -travel
