@@ -373,12 +373,15 @@ def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     stuck = np.where(travel > -5e-5, (1.7e-4 - travel) / 2.2e-4, np.exp((travel + 5e-5) / 3e-5))
     force += drag * np.gradient(travel, time) - 0.1 * largest * np.where(back, np.clip(stuck, 0.0, 1.0), 0.0)
     force += 3e-3 * largest * np.random.default_rng(4).normal(size=len(time))
-    recording = IndentationRecording("gel", 0.010, travel, force, time_s=time)
+    recording = IndentationRecording("gel", 0.010, travel, force, time_s=np.asarray(time, dtype=np.float64))
     measured = Campaign("gel", SkinDescription(poisson_ratio=0.5), (recording,), units_checked=True)
     report = underskin.diagnose(measured, without=beside("liquid_drag", "instrument_compliance"))
     assert report.verdict == "explained", report.statement
     assert [mechanism.name for mechanism in report.mechanisms] == ["liquid_drag"]
     assert report.fit is not None
     modulus, (found,) = report.fit.after.youngs_modulus, report.mechanisms[0].parameters
+    assert modulus is not None
+    assert modulus.low is not None
+    assert modulus.high is not None
     assert modulus.low <= 0.015 <= modulus.high < 1.5 * modulus.low
     assert found.low <= drag <= found.high

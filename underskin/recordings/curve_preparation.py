@@ -98,9 +98,9 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
     if not relative_sign:
         return Orientation((), turns, is_deep_end_known=False)
     if not sphere:
-        negative = _of_block(force, travel, relative_sign)
-        may_be_pulled = len(negative) > 1 and is_one_sided(force)
-        return Orientation(negative, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled)
+        reversed_columns = _of_block(force, travel, relative_sign)
+        may_be_pulled = len(reversed_columns) > 1 and is_one_sided(force)
+        return Orientation(reversed_columns, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled)
     deep = _deep_side(force, travel, turns, relative_sign)
     side = deep or _first_movement(travel)
     negative = ((FORCE, relative_sign * side < 0), (TRAVEL, side < 0))

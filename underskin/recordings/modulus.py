@@ -135,8 +135,9 @@ def _by_law(
     along: Floats, stress: Floats, height: float, sign: float, noise: float, foot: float, *, straight: bool
 ) -> CompressionModulus:
     """The modulus by one law; `foot`: displacement where the stress is about 0; `sign`: 1 where the stress rises."""
-    law: Callable[[Floats], Floats] = _hooke
-    laws = [law] if straight else [_Block(sign, is_slack=False), *_ROUNDS * [_Block(sign, is_one_sided(stress))]]
+    laws: list[Callable[[Floats], Floats]] = [_hooke]
+    if not straight:
+        laws = [_Block(sign, is_slack=False), *_ROUNDS * [_Block(sign, is_one_sided(stress))]]
     for law, following in zip(laws, [*laws[1:], None], strict=True):
         strain, binned = _thinned(sign * (along - foot) / height, sign * stress)
         first, last = _first_straight(law(strain), binned, noise)

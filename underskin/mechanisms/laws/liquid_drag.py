@@ -13,8 +13,8 @@ from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
 
 _REASON = (
-    "Stokes' 6πηR of the sphere in water and of a cantilever twenty times as wide: 4e-6 N·s/m under a tip of 10 µm "
-    "(5e-6 measured); within a factor of 12, as liquids are up to a thousand times as viscous"
+    "Stokes' 6πηR of the sphere in water and of a cantilever twenty times as wide: 4e-6 N·s/m under a tip of 10 µm; "
+    "within a factor of 12, as liquids are up to a thousand times as viscous"
 )
 _OF_RADIUS, _USUAL_RADIUS_MM = 4e-7, 0.01  # N·s/mm for each mm
 _SD = 2.5

@@ -73,7 +73,8 @@ class CurveModel(ABC):
         )
         self.time = self._arranged([times_of(recording) for recording in recordings])
         intervals = np.diff(self.time, axis=-1)
-        self.times = float(intervals[intervals > 0].min(initial=1.0)), float(np.ptp(self.time, axis=-1).max()) or 1.0
+        longest = float(np.ptp(self.time, axis=-1).max()) or 1.0
+        self.times = float(intervals[intervals > 0].min(initial=longest)), longest
         count = len(self.parameters) - len(recordings)
         self.contact_points = np.arange(count, len(self.parameters))
         # What moves together in the differences: each shared parameter, then all contact points.
