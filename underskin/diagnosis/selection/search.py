@@ -142,10 +142,11 @@ class _Sets:
         if size == 2:
             requests += self._pairs([name for name in self.names if mechanisms[name].stage in _PAIRED])
         if size == 3 and self.contact:
+            best = max(self.explanations.values(), key=self.search.log_weight)
             requests += [
-                Request(self.ordered(self.contact | {name}), never_pruned=mechanisms[name].stage in _PAIRED)
+                Request(self.ordered(self.contact | {name}), never_pruned=True)
                 for name in self.names
-                if name not in self.contact
+                if name not in self.contact and (name in best.names or mechanisms[name].stage in _PAIRED)
             ]
         self.explain(requests)
 
