@@ -123,7 +123,10 @@ def test_a_campaign_that_tells_nothing_says_why(palm: Campaign, tmp_path: Path) 
     (tmp_path / "hard.json").write_text(json.dumps(document))
     answer = run("d33", str(tmp_path / "hard.json"))
     assert answer.returncode == 2
-    assert "no d33: none of the 36 recordings can be used: recording r0: F = 500 N" in answer.stdout
+    assert (
+        "no d33: preload_n: no preload is below 500 N: they look 1000 × too large; were they given in mN?"
+        in answer.stdout
+    )
     for recording in document["recordings"]:
         recording["preload_n"] = -1
     (tmp_path / "refused.json").write_text(json.dumps(document))

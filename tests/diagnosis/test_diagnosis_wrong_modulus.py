@@ -77,7 +77,7 @@ def test_campaign_no_contact_lies(table: SigmaTable) -> None:
     assert report["verdict"] != "insufficient_data"
     assert report["verdict"] == "ambiguous"
     assert ["modulus_error"] in [entry["mechanisms"] for entry in report["alternatives"] if entry["probability"] > 0.1]
-    assert sum(entry["code"] == "out_of_domain" for entry in report["findings"]) == 32
+    assert "out_of_domain" in codes(report)
 
 
 def test_modulus_right_contacts_beyond_tables(table: SigmaTable) -> None:

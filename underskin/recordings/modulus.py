@@ -144,9 +144,13 @@ def _by_law(
         part = slice(first, last + 1)
         if straight:
             break
-        # Only all samples show which of the first ones are slack
-        fitted = part if following in (law, None) else slice(0, last + 1)
-        moved = _foot(following or law, strain[fitted], binned[fitted], noise)
+        if is_one_sided(stress):
+            # Only all samples show which of the first ones are slack
+            fitted = part if following in (law, None) else slice(0, last + 1)
+            moved = _foot(following or law, strain[fitted], binned[fitted], noise)
+        else:  # the curve itself shows where the stress is 0
+            slope, level = np.polyfit(law(strain)[part], binned[part], 1)
+            moved = -float(level / slope) if slope > 0 else 0.0
         foot, strain = foot + sign * height * moved, strain - moved
     stretched = law(strain)
     zero = max(ZERO_SD * float(np.abs(binned).max()), 1e-300)

@@ -114,7 +114,7 @@ def test_import_tells_what_the_files_are_worth(server: Server, tmp_path: Path) -
     done = server.place.command("import", *files, "--url", str(server.http.base_url))
     lines = done.stdout.splitlines()
     assert done.returncode == 0, done.stderr
-    assert "6 recordings: no d33: none of the 6 recordings can be used: recording " in lines[0]
+    assert "6 recordings: no d33: preload_n: no preload is below 500 N: they look 1000 × too large" in lines[0]
     assert "6 recordings: d33 -13." in lines[1]
     assert "look at: d33 of the array is -13." in lines[2]
     assert "negative: is the sign of charge or force turned?" in lines[2]

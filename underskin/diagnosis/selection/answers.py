@@ -169,11 +169,15 @@ class Search:
         return {frozenset(fitted.names): fitted.log_evidence for fitted in (*self.explanations, *self.laws)}
 
     def is_supported(self, explanation: Explanation) -> bool:
-        """Whether each mechanism of a set shows: without it, evidence is lost."""
+        """Whether each mechanism of a set shows: without it, or all that are no guesses, evidence is lost."""
         names = frozenset(explanation.names)
+        parts = [frozenset([name]) for name in names]
+        parts.append(names & even_laws(names, explanation.best.hypothesis.lines))  # any of these may need another
         return all(
-            explanation.log_evidence > self._log_evidence.get(names - {name}, -math.inf) + must_gain(explanation, name)
-            for name in names
+            explanation.log_evidence
+            > self._log_evidence.get(names - part, -math.inf) + max(must_gain(explanation, name) for name in part)
+            for part in parts
+            if part
         )
 
     @cached_property
