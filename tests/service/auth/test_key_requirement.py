@@ -86,8 +86,10 @@ def test_running_server_stays_closed(place: Place, tmp_path: Path) -> None:
         assert not there.exists()
         make_key(place)
         assert status_in_time(server, 401) == 401
-        there.rename(aside)
-        there.symlink_to("x" * 300)  # a name that is too long
+        shutil.copy2(there, aside)
+        link = tmp_path / "link"
+        link.symlink_to("x" * 300)  # a name that is too long
+        link.replace(there)  # in one step, as below
         time.sleep(1.5)
         aside.replace(there)  # at once, or the server may look while there is none
         there.write_text("{")
