@@ -14,6 +14,8 @@ from underskin.figures.traces import raw_traces
 from underskin.recordings.channels import Channel
 from underskin.recordings.frf.flat_zone import FrfLines, FrfSpread
 
+SDS_OF_95 = 1.959963984540054  # half the width of a 95 % interval of a normal distribution
+
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])
 REASONS = ("", "", "weak: 21 % of the array's d33")
@@ -32,9 +34,7 @@ def test_frf_against_preload_points_line() -> None:
     assert points["R 4 mm, measured"].marker.color != points["R 10 mm, measured"].marker.color
     assert {points[f"R {size} mm, model"].line.dash for size in (4, 10)} == {PAPER}
     assert points["R 4 mm, model"].line.color == points["R 4 mm, measured"].marker.color
-    np.testing.assert_allclose(
-        points["R 4 mm, measured"].error_y.array, 1.96 * 0.1 * points["R 4 mm, measured"].y, rtol=1e-4
-    )
+    np.testing.assert_allclose(points["R 4 mm, measured"].error_y.array, SDS_OF_95 * 0.1 * points["R 4 mm, measured"].y)
 
 
 def test_response_sensor_interval_arrays() -> None:
@@ -123,7 +123,7 @@ def test_intervals_long_history_faint_keep() -> None:
     def line(days: int) -> go.Scatter:
         times = [f"2026-{1 + day // 28:02d}-{1 + day % 28:02d}T09:00:00Z" for day in range(days)]
         (trace,) = d33_history([SensorPoints("s01", times, [14.0] * days, [0.1] * days, "")]).data
-        np.testing.assert_allclose(trace.error_y.array, 0.196, rtol=1e-4)
+        np.testing.assert_allclose(trace.error_y.array, 0.1 * SDS_OF_95)
         return trace
 
     few, many = line(60), line(61)
@@ -154,10 +154,10 @@ def test_many_sensors_over_time_median_spread() -> None:
     assert written["s17"] == ("s17", "middle left", times[1], 9.0)  # within the axes, as the last of them
     assert written["s21"] == ("s20, s21, s22 and 1 more", "middle right", times[0], 20.0)  # as they lie too close
     assert [written[name][0] for name in ("s20", "s22", "s23")] == [""] * 3
-    np.testing.assert_allclose(apart.error_y.array, 1.96 * 0.2, rtol=1e-4)
+    np.testing.assert_allclose(apart.error_y.array, 0.2 * SDS_OF_95)
     *_, chosen = d33_history(sensors, "s03").data
     assert (chosen.name, list(chosen.y)) == ("s03", d33[3].tolist())
-    np.testing.assert_allclose(chosen.error_y.array, 1.96 * 0.2, rtol=1e-4)
+    np.testing.assert_allclose(chosen.error_y.array, 0.2 * SDS_OF_95)
     (alone,) = d33_history(sensors[:5], "s03").data
     assert alone.name == "s03"
     few = d33_history(sensors[:5])

@@ -16,10 +16,7 @@ from underskin.recordings.plausibility import moment, pitch_mm
 from underskin.units import Floats, unit_guess, unusual
 
 UNUSED_FOR_D33 = ("frequency_hz", "coherence")
-_PRELOADS_N = (
-    0.01,
-    150.0,
-)  # of stages and load cells: least for the highest preload of a campaign, most for the lowest
+_PRELOADS_N = (0.01, 150.0)  # of stages: least for the highest preload of a campaign, most for the lowest
 _FREQUENCIES_HZ = (0.5, 2e4)  # of shakers and charge amplifiers: range of the highest line of a campaign
 _LEAST_PAUSE_S = 5.0  # no sweep takes less
 _SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency

@@ -554,11 +554,10 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
                 continue
             size = np.abs(stack.values[row]) / abs(level[number])
             for bin_index in np.unique(bins[stack.used[row]]).tolist():
-                of_bin = size[stack.used[row] & (bins == bin_index)]
+                chosen = stack.used[row] & (bins == bin_index)
+                of_bin = size[chosen]
                 ratios[bin_index].append(float(np.median(of_bin)))
-                lines_of_bins[bin_index].append(
-                    float(np.median(stack.frequency[stack.used[row] & (bins == bin_index)]))
-                )
+                lines_of_bins[bin_index].append(float(np.median(stack.frequency[chosen])))
                 bin_scatters[bin_index].append((float(np.std(of_bin)), len(of_bin)))
     filled_bins = [bin_index for bin_index, of_bin in enumerate(ratios) if of_bin and np.median(of_bin) > 0]
     middle = np.array([float(np.median(lines_of_bins[bin_index])) for bin_index in filled_bins])
