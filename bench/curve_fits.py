@@ -84,7 +84,7 @@ def fitted(document: Mapping[str, Any], names: tuple[str, ...], table: SigmaTabl
     lines = curve_lines(campaign, "indentation")
     (recording,) = campaign.recordings
     assert isinstance(recording, IndentationRecording)
-    (explanation,) = FittingProblem(lines, table).explain([Request(names)])
+    explanation = FittingProblem(lines, table).explain(Request(names))
     assert explanation is not None
     displacement, force = finite_samples(recording)[:2]
     about_zero = force - curve_landmarks(displacement, force).zero

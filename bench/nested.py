@@ -106,7 +106,7 @@ def _compared(effects: Effects) -> Compared:
 
 def _explained(problem: FittingProblem) -> list[Explanation]:
     # One by one, so that none is pruned because of the others.
-    results = [explanation for names in HYPOTHESES for explanation in problem.explain([Request(names)])]
+    results = [explanation for names in HYPOTHESES for explanation in [problem.explain(Request(names))]]
     return [fit for fit in results if fit is not None]
 
 

@@ -94,13 +94,13 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
     Raises Unsupported.
     """
     ordered = tuple(name for name in problem.lines.mechanisms.named if name in names)
-    (first,) = problem.explain([Request(ordered)])
+    first = problem.explain(Request(ordered))
     assert first is not None  # without alternatives, no fit is pruned
     requests = [Request(ordered, initial=with_true_values(first, effects))]
     if len(ordered) > 1:
-        single_fits = problem.explain([Request((name,)) for name in ordered])
+        single_fits = problem.explain_all([Request((name,)) for name in ordered])
         requests += [Request(ordered, parent) for parent in single_fits if parent is not None]
-    again = [problem.explain([request])[0] for request in requests]
+    again = [problem.explain(request) for request in requests]
     fits = [first, *(explanation for explanation in again if explanation is not None)]
     return max(fits, key=lambda explanation: explanation.log_evidence)
 

@@ -5,7 +5,6 @@ Only what physics and mechanisms need: arithmetic, a few functions, selecting ro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -83,30 +82,6 @@ class Differentiated:
             np.broadcast_to(self.slopes, (*self.slopes.shape[:-1], rows)),
         )
 
-    def at_points(self, subset: Indices | None) -> Differentiated:
-        """At some of several points (points, rows), at all for None."""
-        if subset is None or len(self.value) == 1:
-            return self
-        return Differentiated(self.value[subset], self.slopes[:, subset])
-
-    def times(self, factor: Differentiated | None, subset: Indices | None, points: int) -> Differentiated:
-        """Multiplied by a factor at some of the points; None stands for 1, and for all points."""
-        if factor is None:
-            return self
-        return self * factor if subset is None else self._with(subset, self.at_points(subset) * factor, points)
-
-    def plus(self, term: Differentiated, subset: Indices | None, points: int) -> Differentiated:
-        """With a term added at some of the points; None stands for all."""
-        return self + term if subset is None else self._with(subset, self.at_points(subset) + term, points)
-
-    def _with(self, subset: Indices, changed: Differentiated, points: int) -> Differentiated:
-        shape = points, max(self.value.shape[-1], changed.value.shape[-1])
-        dtype = np.result_type(self.value, changed.value)
-        value = np.broadcast_to(self.value, shape).astype(dtype)
-        slopes = np.broadcast_to(self.slopes, (len(self.slopes), *shape)).astype(dtype)
-        value[subset], slopes[:, subset] = changed.value, changed.slopes
-        return Differentiated(value, slopes)
-
 
 def exp(x: Differentiated) -> Differentiated:
     """e^x, with the derivative e^x x′."""
@@ -156,19 +131,6 @@ def constant(value: Array | float, parameters: int, points: tuple[int, ...] = ()
     rows = np.atleast_1d(np.asarray(value))
     ones = (1,) * len(points)
     return Differentiated(rows.reshape(*ones, -1), np.zeros((parameters, *ones, 1)))
-
-
-def stacked(parts: Sequence[Differentiated], points: Sequence[int]) -> Differentiated:
-    """Several with (points, rows), concatenated along the points; `points` is the number of each."""
-    if len(parts) == 1:
-        return parts[0]
-    rows = max(part.value.shape[-1] for part in parts)
-    shapes = [(count, rows) for count in points]
-    value = [np.broadcast_to(part.value, shape) for part, shape in zip(parts, shapes, strict=True)]
-    slopes = [
-        np.broadcast_to(part.slopes, (len(part.slopes), *shape)) for part, shape in zip(parts, shapes, strict=True)
-    ]
-    return Differentiated(np.concatenate(value), np.concatenate(slopes, axis=1))
 
 
 def as_columns(x: Differentiated) -> tuple[Array, Array]:

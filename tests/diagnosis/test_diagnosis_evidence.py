@@ -133,7 +133,7 @@ def test_evidence_with_positioning_scatter(
     """
     values = (2.0, 1.0) if names else ()
     made = Made(names, values, sensors=2, offsets_mm=offsets_mm, preloads_n=(0.3, 1.2, 2.4))
-    (explained,) = FittingProblem(lines(campaign(made, table)), table).explain([Request(names)])
+    explained = FittingProblem(lines(campaign(made, table)), table).explain(Request(names))
     assert explained is not None
     _, found = explained.fits[1]
     assert found.hypothesis.has_position_scatter

@@ -21,7 +21,7 @@ FEW, MANY = 100, 400  # sensors, of two recordings each
 def residual(sensors: int, table: SigmaTable) -> GainResidual:
     """Under the paper's model."""
     problem = FittingProblem(measured_lines(parse(campaign("array", sensors=sensors, lines=4)), {}), table)
-    (nothing,) = problem.explain([Request(())])
+    nothing = problem.explain(Request(()))
     assert nothing is not None
     return GainResidual(problem, nothing)
 

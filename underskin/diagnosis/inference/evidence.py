@@ -27,7 +27,7 @@ from underskin.diagnosis.noise import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Uniform
-from underskin.units import Floats, Indices
+from underskin.units import Floats
 
 _NEAR = 4.0  # standard deviations: bounds farther than this from the mean are left out
 # Largest numbers of polishing steps, of FRFs and of curves, and the gain in log posterior below which a point stops
@@ -54,7 +54,7 @@ class Evidence:
     @cached_property
     def fitter(self) -> Fitter:
         """Evaluates points of this hypothesis."""
-        return Fitter([self.hypothesis])
+        return Fitter(self.hypothesis)
 
     @cached_property
     def at(self) -> Evaluated:
@@ -103,40 +103,29 @@ class Evidence:
         return replace(self.prediction, pickup=on_rows).pickup_variance
 
 
-def laplace_at(fitter: Fitter, at: Evaluated) -> list[Evidence]:
-    """Laplace's approximation at most probable points, which are first polished until their whole gradients vanish."""
-    missing = np.flatnonzero(~fitter.has_log_slope_gradient(at))
-    if len(missing):
-        at = fitter.replaced(at, missing, fitter.with_log_slope_gradient(at[missing]))
-    active = np.arange(len(at))
+def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
+    """Laplace's approximation at a most probable point, which is first polished until its whole gradient vanishes."""
+    if not fitter.has_log_slope_gradient(at).all():
+        at = fitter.with_log_slope_gradient(at)
     for _ in range(_POLISHING_STEPS_OF_CURVES if fitter.lines.curves else _POLISHING_STEPS):
-        active, at = _polish(fitter, at, active)
-        if not len(active):
+        polished = _polished(fitter, at)
+        if polished is None:
             break
-    values, covariances = mean_integrals(fitter, at)
-    volumes = level_integrals(fitter, at)
-    evidence = []
-    for number, (value, covariance) in enumerate(zip(values + volumes, covariances, strict=True)):
-        hypothesis = fitter.hypotheses[at.points.owner[number]]
-        count = len(hypothesis.model.parameters)
-        point = FitPoint(at.points.fit[number, :count], at.points.covariance[number], at.points.sensor_log_gain[number])
-        log_slope_gradient = (
-            None if at.log_slope_gradient is None else at.log_slope_gradient[number : number + 1, :, :count]
-        )
-        evidence.append(
-            Evidence(float(value), hypothesis, point, float(at.cost[number]), covariance, log_slope_gradient)
-        )
-    return evidence
+        at = polished
+    (value,), (covariance,) = mean_integrals(fitter, at)
+    (volume,) = level_integrals(fitter, at)
+    point = FitPoint(at.points.fit[0], at.points.covariance[0], at.points.sensor_log_gain[0])
+    log_evidence, cost = float(value + volume), float(at.cost[0])
+    return Evidence(log_evidence, fitter.hypothesis, point, cost, covariance, at.log_slope_gradient)
 
 
 def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
     """Logarithms of the integrals over the mean parameters, with the covariance's held (points,), and the covariance of
     each quadratic (mean parameters, mean parameters)."""
     values, covariances = [], []
+    indices = np.flatnonzero(fitter.free)
     for number, (information, gradient) in enumerate(zip(*_equations(fitter, at), strict=True)):
-        owner = at.points.owner[number]
-        indices = np.flatnonzero(fitter.free[owner])
-        coordinates, low, high = at.points.fit[number, indices], fitter.low[owner, indices], fitter.high[owner, indices]
+        coordinates, low, high = at.points.fit[number, indices], fitter.low[indices], fitter.high[indices]
         information, gradient = _definite(information[np.ix_(indices, indices)]), gradient[indices]
         # A gradient towards a bound is kept. Elsewhere, a large one after polishing means a kink in the cost, where the
         # gain that the quadratic predicts does not exist.
@@ -191,40 +180,28 @@ def levels_covariance(hessian: Floats) -> Floats:
 def _equations(fitter: Fitter, at: Evaluated) -> tuple[Floats, Floats]:
     """Information on the mean parameters and the gradient of the cost."""
     information, ascent = fitter.posterior_equations(at)
-    owner = at.points.owner
-    span, diagonal = (fitter.high - fitter.low)[owner], np.arange(fitter.low.shape[1])
+    span, diagonal = fitter.high - fitter.low, np.arange(len(fitter.low))
     information[:, diagonal, diagonal] += np.where(span > 0, FLAT / np.where(span > 0, span, 1.0), 0.0) ** 2
     return information, -ascent
 
 
-def _polish(fitter: Fitter, at: Evaluated, active: Indices) -> tuple[Indices, Evaluated]:
-    """A Newton step of the active points with the whole gradient, within the bounds; and which of them gained."""
-    batch = at[active]
-    information, gradient = _equations(fitter, batch)
-    owner, coordinates = batch.points.owner, batch.points.fit
-    low, high = fitter.low[owner], fitter.high[owner]
-    free = fitter.free[owner] & ~(((coordinates <= low) & (gradient > 0)) | ((coordinates >= high) & (gradient < 0)))
-    free_pairs = free[:, :, None] & free[:, None, :]
-    matrix = np.where(free_pairs, information, 0.0)
-    diagonal = np.arange(coordinates.shape[1])
-    matrix[:, diagonal, diagonal] = np.where(free, matrix[:, diagonal, diagonal], 1.0)
-    step = -np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
-    candidates = np.flatnonzero(-0.5 * (gradient * step).sum(axis=1) >= _POLISHING_GAIN)
-    improved: list[Indices] = []
+def _polished(fitter: Fitter, at: Evaluated) -> Evaluated | None:
+    """One point after a Newton step with the whole gradient, within the bounds; None where none gains."""
+    (information,), (gradient,) = _equations(fitter, at)
+    (coordinates,), low, high = at.points.fit, fitter.low, fitter.high
+    free = fitter.free & ~(((coordinates <= low) & (gradient > 0)) | ((coordinates >= high) & (gradient < 0)))
+    matrix = np.where(free[:, None] & free, information, np.eye(len(free)))
+    gradient = np.where(free, gradient, 0.0)
+    step = -np.linalg.solve(matrix, gradient)
+    if -0.5 * gradient @ step < _POLISHING_GAIN:
+        return None
     for _ in range(5):
-        if not len(candidates):
-            break
-        shifted = np.clip(coordinates[candidates] + step[candidates], low[candidates], high[candidates])
-        trials = fitter.update_noise_levels(fitter.evaluate(replace(batch.points[candidates], fit=shifted)), 1)
-        better = trials.cost < batch.cost[candidates] - 0.2 * _POLISHING_GAIN
-        log_slope_gradient = None if batch.log_slope_gradient is None else batch.log_slope_gradient[candidates]
-        at = fitter.replaced(
-            at, active[candidates[better]], replace(trials, log_slope_gradient=log_slope_gradient)[better]
-        )
-        improved.append(active[candidates[better]])
-        candidates = candidates[~better]
+        shifted = np.clip(coordinates + step, low, high)
+        trial = fitter.update_noise_levels(fitter.evaluate(replace(at.points, fit=shifted[None])), 1)
+        if trial.cost[0] < at.cost[0] - 0.2 * _POLISHING_GAIN:
+            return replace(trial, log_slope_gradient=at.log_slope_gradient)
         step = step / 3
-    return np.sort(np.concatenate([*improved, np.zeros(0, dtype=np.intp)])), at
+    return None
 
 
 def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:
@@ -275,12 +252,12 @@ def _held_points(held: Fitter, fit: Evidence, index: int, values: Floats) -> Poi
     slopes = fit.covariance[:, mean_index] / fit.covariance[mean_index, mean_index]
     coordinates = np.tile(fit.point.fit, (len(values), 1))
     coordinates[:, mean] += slopes * (values[:, None] - fit.point.fit[index])
-    coordinates = np.clip(coordinates, held.low[0], held.high[0])
+    coordinates = np.clip(coordinates, held.low, held.high)
     coordinates[:, index] = values
     covariance, sensor_log_gain = (
         np.tile(level, (len(values), 1)) for level in (fit.point.covariance, fit.point.sensor_log_gain)
     )
-    return Points(np.zeros(len(values), dtype=np.intp), coordinates, covariance, sensor_log_gain)
+    return Points(coordinates, covariance, sensor_log_gain)
 
 
 _UNDETERMINED = 0.3  # standard deviation over the range, at least; a uniform distribution has 0.29
@@ -331,7 +308,7 @@ def _refit_at(evidence: Evidence, index: int, values: Floats) -> list[Evidence]:
     Values are visited away from the most probable one, and each fit begins at the extrapolation of the two nearest:
     on a straight line from the most probable point, samples lose their contact.
     """
-    held = Fitter([evidence.hypothesis], held=[index])
+    held = Fitter(evidence.hypothesis, held=[index])
     mode = float(evidence.point.fit[index])
     fitted_points: dict[float, FitPoint] = {mode: evidence.point}
     fits: dict[float, Evidence] = {}
@@ -341,9 +318,9 @@ def _refit_at(evidence: Evidence, index: int, values: Floats) -> list[Evidence]:
             near, far = sorted(fitted_points, key=lambda other: abs(other - value))[:2]
             step = (fitted_points[near].fit - fitted_points[far].fit) * (value - near) / (near - far)
             starting_points = held.at(
-                replace(fitted_points[near], fit=np.clip(fitted_points[near].fit + step, held.low[0], held.high[0]))
+                replace(fitted_points[near], fit=np.clip(fitted_points[near].fit + step, held.low, held.high))
             )
-        (fits[value],) = laplace_at(held, held.descend(held.update_noise_levels(held.evaluate(starting_points), 1), 1))
+        fits[value] = laplace_at(held, held.descend(held.update_noise_levels(held.evaluate(starting_points), 1), 1))
         fitted_points[value] = fits[value].point
     return [fits[value] for value in values.tolist()]
 
@@ -376,7 +353,7 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
 
     The shares of each mixture sum to 1.
     """
-    hypothesis = fitter.hypotheses[0]
+    hypothesis = fitter.hypothesis
     spreads = [parameter for parameter in hypothesis.model.parameters if parameter.acts_on == "gain_spread"]
     if not spreads:
         return None
@@ -388,7 +365,7 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
     shifted = fitter.weighed(fitter.with_covariance(grid.points, covariance), grid.products)
     shifted = replace(shifted, log_slope_gradient=grid.log_slope_gradient)
     values, covariances = mean_integrals(fitter, shifted)
-    free = np.flatnonzero(fitter.free[0])
+    free = np.flatnonzero(fitter.free)
     mean_index = int(np.searchsorted(free, index))
     information, gradient = fitter.posterior_equations(shifted)
     step = np.linalg.solve(information[:, free[:, None], free], gradient[:, free, None])[:, mean_index, 0]
@@ -429,7 +406,7 @@ def profile_end(evidence: Evidence, index: int, limit: float) -> float | None:
     parameter = evidence.hypothesis.model.parameters[index]
     mode = float(evidence.point.fit[index])
     values = np.linspace(np.clip(limit, *parameter.bounds), mode, _STRIDES, endpoint=False)
-    held = Fitter([evidence.hypothesis], held=[index])
+    held = Fitter(evidence.hypothesis, held=[index])
     initial = held.evaluate(_held_points(held, evidence, index, values))
     fitted = held.descend(held.update_noise_levels(initial, 1), 1)
     priors = np.array([parameter.log_prior(value) for value in values.tolist()])

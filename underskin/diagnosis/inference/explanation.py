@@ -7,7 +7,7 @@ or lie far behind the best are pruned (`FittingProblem.explain`).
 """
 
 import itertools
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -26,10 +26,7 @@ from underskin.diagnosis.inference.hypothesis import (
     Hypothesis,
     Points,
     curvature,
-    joined_points,
     parameter_slices,
-    points_of,
-    stacked,
 )
 from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, Plateau
@@ -69,33 +66,20 @@ class StartingPoint:
     single: Mapping[str, Sequence[float]]
 
 
-def best_starts(fitter: Fitter, starting_points: Sequence[StartingPoint]) -> list[Points]:
-    """The starts of each hypothesis: the best of the local minima of a grid over the new mechanisms' prior quantiles,
-    and of the values that the recordings suggest."""
-    grids = [_Grid(*pair) for pair in zip(fitter.hypotheses, starting_points, strict=True)]
-    initial = fitter.initial(
-        [grid.coordinates for grid in grids], [starting_point.nuisances for starting_point in starting_points]
-    )
-    many_steps = fitter.covariance_indices.size and all(
-        starting_point.parent is None for starting_point in starting_points
-    )
-    evaluated = fitter.update_noise_levels(
-        initial, _NOISE_LEVEL_STEPS_WITHOUT_PARENT if many_steps else _NOISE_LEVEL_STEPS
-    )
-    edges = np.cumsum([0, *(len(grid.coordinates) for grid in grids)])
-    starts = []
-    for number, (grid, starting_point) in enumerate(zip(grids, starting_points, strict=True)):
-        at = evaluated[edges[number] : edges[number + 1]]
-        cost = at.cost[: grid.size].reshape(grid.shape)
-        # Many steps move the mechanisms' covariance parameters off the grid, so that all its points are kept.
-        on_grid = np.arange(grid.size) if many_steps else np.flatnonzero(_are_lowest(cost))
-        lowest = at[np.append(on_grid, np.arange(grid.size, len(at)))]
-        if fitter.lines.curves:
-            guess_count = len(at) - grid.size
-            starts.append(_starts_of_curves(fitter, lowest, guess_count, grid.new_names, starting_point))
-        else:
-            starts.append(lowest.points[np.sort(_cheapest(lowest)[:_STARTS])])
-    return starts
+def best_starts(fitter: Fitter, known: StartingPoint) -> Points:
+    """The best of the local minima of a grid over the new mechanisms' prior quantiles, and of the values that the
+    recordings suggest."""
+    grid = _Grid(fitter.hypothesis, known)
+    initial = fitter.initial(grid.coordinates, known.nuisances)
+    many_steps = fitter.covariance_indices.size and known.parent is None
+    at = fitter.update_noise_levels(initial, _NOISE_LEVEL_STEPS_WITHOUT_PARENT if many_steps else _NOISE_LEVEL_STEPS)
+    cost = at.cost[: grid.size].reshape(grid.shape)
+    # Many steps move the mechanisms' covariance parameters off the grid, so that all its points are kept.
+    on_grid = np.arange(grid.size) if many_steps else np.flatnonzero(_are_lowest(cost))
+    lowest = at[np.append(on_grid, np.arange(grid.size, len(at)))]
+    if fitter.lines.curves:
+        return _starts_of_curves(fitter, lowest, len(at) - grid.size, grid.new_names, known)
+    return lowest.points[np.sort(_cheapest(lowest)[:_STARTS])]
 
 
 class _Grid:
@@ -137,7 +121,7 @@ class _Grid:
 
 def _with_softer_moduli(fitter: Fitter, at: Evaluated) -> Evaluated:
     """Of curves with an undeclared modulus: also with smaller moduli, since adhesion makes a sample look stiffer."""
-    indices = [index for index, parameter in enumerate(fitter.hypotheses[0].model.parameters) if parameter.proportional]
+    indices = [index for index, parameter in enumerate(fitter.model.parameters) if parameter.proportional]
     if not indices:
         return at
     points = at.points[np.repeat(np.arange(len(at)), len(_SOFTER))]
@@ -151,9 +135,9 @@ def _with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
 
     Given the shared parameters curves are independent, so one set of depths serves all of them.
     """
-    (hypothesis,) = fitter.hypotheses
-    assert isinstance(hypothesis.model, CurveModel)
-    indices = hypothesis.model.contact_points
+    hypothesis, model = fitter.hypothesis, fitter.model
+    assert isinstance(model, CurveModel)
+    indices = model.contact_points
     travels = [curve.displacement_mm for curve in curves_of(fitter.lines.campaign)]
     deepest, span = np.array([travel.max() for travel in travels]), np.array([np.ptp(travel) for travel in travels])
     covariance = np.tile([GAIN_PRIOR.middle, 0.0, hypothesis.smooth.middle, *at.points.covariance[0, 3:]], (len(at), 1))
@@ -161,7 +145,7 @@ def _with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
     depth = np.repeat(span[None], len(at), axis=0)
     for ratios in _DEPTHS:
         depths = depth[:, None] * ratios[:, None]  # (starts, ratios, curves)
-        tried = np.clip(deepest - depths, fitter.low[0, indices], fitter.high[0, indices]).reshape(-1, len(indices))
+        tried = np.clip(deepest - depths, fitter.low[indices], fitter.high[indices]).reshape(-1, len(indices))
         points = at.points[np.repeat(np.arange(len(at)), len(ratios))]
         fit = points.fit.copy()
         fit[:, indices] = tried
@@ -171,7 +155,7 @@ def _with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
         best = residual.reshape(depths.shape).argmin(axis=1)[:, None]
         depth = np.take_along_axis(depths, best, axis=1)[:, 0]
     chosen = at.points.fit.copy()
-    chosen[:, indices] = np.clip(deepest - depth, fitter.low[0, indices], fitter.high[0, indices])
+    chosen[:, indices] = np.clip(deepest - depth, fitter.low[indices], fitter.high[indices])
     return fitter.evaluate(replace(at.points, fit=chosen, covariance=covariance), slopes=False)
 
 
@@ -183,7 +167,7 @@ def _starts_of_curves(
     grid_count = len(lowest) - guess_count
     ranked = _cheapest(lowest[:grid_count])[:_CONTACT_POINT_STARTS]
     candidates = lowest[np.append(np.sort(ranked), np.arange(grid_count, len(lowest)))]
-    is_single = len(fitter.hypotheses[0].model.names) == 1
+    is_single = len(fitter.model.names) == 1
     moves_contact = is_single and Adhesion.name in new_names
     if fitter.lines.kind == "indentation" and (moves_contact or starting_point.nuisances is None):
         candidates = _with_contact_points(
@@ -193,23 +177,22 @@ def _starts_of_curves(
     count = _STARTS_FROM_PARENT if starting_point.parent is not None and not begins_at_guesses else _STARTS
     starts = candidates.points[np.sort(_cheapest(candidates)[:count])]
     if new_names and starting_point.parent is not None and starting_point.nuisances is not None:
-        starts = joined_points(
+        starts = Points.joined(
             starts, _without_effect(fitter, new_names, starting_point.parent, starting_point.nuisances)
         )
     if not (moves_contact and guess_count):
         return starts
     # The null hypothesis' modulus and contact points may lead away from the jumps of the curves: the best guess is also
     # fitted from the priors' centres.
-    mechanism_count = fitter.hypotheses[0].mechanism_parameter_count
-    initial = fitter.initial([lowest.points.fit[grid_count:, :mechanism_count]], [None])
-    return joined_points(starts, initial.points[_cheapest(initial)[:1]])
+    initial = fitter.initial(lowest.points.fit[grid_count:, : fitter.hypothesis.mechanism_parameter_count])
+    return Points.joined(starts, initial.best.points)
 
 
 def _without_effect(
     fitter: Fitter, new_names: Sequence[str], parent: Mapping[str, Sequence[float]], nuisances: FitPoint
 ) -> Points:
     """The parent's fit, with the added mechanisms as near as their bounds allow to no effect."""
-    (hypothesis,) = fitter.hypotheses
+    hypothesis = fitter.hypothesis
     coordinates = np.zeros((1, hypothesis.mechanism_parameter_count))
     for name, span in parameter_slices(hypothesis.model.names, hypothesis.lines).items():
         coordinates[0, span] = (
@@ -217,7 +200,7 @@ def _without_effect(
             if name in new_names
             else parent.get(name, ())
         )
-    return replace(fitter.start([coordinates], [nuisances]), covariance=nuisances.covariance[None])
+    return replace(fitter.start(coordinates, nuisances), covariance=nuisances.covariance[None])
 
 
 def _no_effect_coordinate(parameter: Parameter) -> float:
@@ -261,16 +244,6 @@ def _are_lowest(cost: Floats) -> Mask:
     return np.asarray(cost <= neighbourhood_minimum)
 
 
-def with_scatter(hypotheses: Sequence[Hypothesis], points: Mapping[int, Points]) -> dict[int, Points]:
-    """Starts of hypotheses with position scatter, from the points of those without it."""
-    starts: dict[int, Points] = {}
-    for members in groups(points, hypotheses):
-        fitter = Fitter([hypotheses[number] for number in members])
-        scattered = fitter.with_scatter(stacked([points[number] for number in members]))
-        starts |= {number: points_of(scattered, owner, fitter.counts[owner]) for owner, number in enumerate(members)}
-    return starts
-
-
 def hardly_scatters(evidence: Evidence) -> bool:
     """Whether the position scatter is below the usual one: the added mechanism may explain the parent's scatter."""
     return float(evidence.point.covariance[Scatter.POSITION]) < POSITION_PRIOR.middle
@@ -279,16 +252,6 @@ def hardly_scatters(evidence: Evidence) -> bool:
 def without_scatter(points: Points) -> Points:
     """The points of a hypothesis with position scatter, without that parameter."""
     return replace(points, covariance=np.delete(points.covariance, Scatter.POSITION, axis=1))
-
-
-def groups(
-    numbers: Iterable[int], hypotheses: Sequence[Hypothesis] | Mapping[int, Hypothesis]
-) -> Collection[list[int]]:
-    """The numbers of these hypotheses, in groups that can be evaluated together."""
-    members: dict[object, list[int]] = {}
-    for number in numbers:
-        members.setdefault(hypotheses[number].group(number), []).append(number)
-    return members.values()
 
 
 _SCATTER_CERTAINTY = (
@@ -357,6 +320,17 @@ class Request:
     never_pruned: bool = False  # fitted to convergence and explained, however far behind and even without gain
 
     @property
+    def starting_point(self) -> StartingPoint:
+        """What is known of its parameters."""
+        parent, nuisances = self.parent, self.nuisances
+        coordinates = None if parent is None else {name: parent.coordinates(name) for name in parent.names}
+        if self.initial is not None:
+            coordinates = {name: self.initial.coordinates(name) for name in self.names}
+            nuisances = self.initial.point
+        single = {} if self.single is None else {name: self.single.coordinates(name) for name in self.single.names}
+        return StartingPoint(coordinates, parent.point if parent and nuisances is None else nuisances, single)
+
+    @property
     def without_scatter(self) -> bool:
         """Whether it is fitted without position scatter."""
         return self.parent is None or self.parent.p_position_scatter < _SCATTER_CERTAINTY
@@ -419,175 +393,103 @@ class FittingProblem:
             self._hypotheses[key] = replace(hypothesis, has_position_scatter=has_position_scatter)
         return self._hypotheses[key]
 
-    def explain(self, requests: Sequence[Request], best: float = np.inf) -> list[Explanation | None]:
-        """The sets' explanations.
+    def explain(self, request: Request, best: float = np.inf) -> Explanation | None:
+        """The set's explanation, with and without position scatter where that could show.
 
         None where the log posterior density gains less than `_LEAST_GAIN` over the parent's: the added mechanism is not
-        supported; and where a set is pruned, `PRUNE_NATS` behind the others or the `best` cost so far. Evidences are
-        Laplace approximations. Raises Unsupported.
+        supported; and where the set is pruned, `PRUNE_NATS` behind the `best` cost so far. Evidences are Laplace
+        approximations. Raises Unsupported.
         """
-        plain_hypotheses, scattered_hypotheses = (
-            [self.hypothesis(request.names, with_position_scatter) for request in requests]
-            for with_position_scatter in (False, True)
-        )
-        scattered_only = {number for number, request in enumerate(requests) if not request.without_scatter}
-        starts = _starts(
-            {number: plain_hypotheses[number] for number in range(len(requests)) if number not in scattered_only},
-            requests,
-        )
-        scattered_starts = _starts(
-            {number: scattered_hypotheses[number] for number in sorted(scattered_only)}, requests
-        )
-        fits: list[list[tuple[float, Evidence]]] = [[] for _ in requests]
-        log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
-        also_scattered: dict[int, Points] = {}
-        fitted = _fitted(plain_hypotheses, starts, requests, best)
-        parentless = {number: improved for number, improved, _ in fitted if requests[number].parent is None}
-        position_matters = self._position_matters(plain_hypotheses, parentless)
-        for number, improved, evidence in fitted:
-            parent = requests[number].parent
+        parent = request.parent
+        plain, scattered = (Fitter(self.hypothesis(request.names, has_scatter)) for has_scatter in (False, True))
+        log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER]).tolist()
+        fits: list[tuple[float, Evidence]] = []
+        if request.without_scatter:
+            improved, evidence = _fitted(plain, best_starts(plain, request.starting_point), request, best)
             if evidence is None and parent is not None and parent.p_position_scatter <= 0.5:
-                continue
-            tries_scatter = parent.p_position_scatter > 1 - _SCATTER_CERTAINTY if parent else position_matters[number]
+                return None
+            tries_scatter = (
+                self._position_matters(plain, improved)
+                if parent is None
+                else parent.p_position_scatter > 1 - _SCATTER_CERTAINTY
+            )
             if evidence is not None:
-                fits[number].append((float(log_priors[0]) if tries_scatter or parent else 0.0, evidence))
-            if tries_scatter:
-                also_scattered[number] = improved
-        scattered_starts |= with_scatter(scattered_hypotheses, also_scattered)
-        best = min([best, *(evidence.cost for of_request in fits for _, evidence in of_request)])
-        supported_plain = {number for number, of_request in enumerate(fits) if of_request}
-        fitted_scattered = _fitted(scattered_hypotheses, scattered_starts, requests, best)
-        _add(fits, fitted_scattered, log_priors[1])
-        for number, _, evidence in fitted_scattered:
-            if evidence is None and np.isfinite(requests[number].cost_to_beat(True)):
-                fits[number].clear()
-        also_plain = {
-            number: without_scatter(improved)
-            for number, improved, evidence in fitted_scattered
-            if evidence is not None
-            and number not in supported_plain
-            and (number not in scattered_only or hardly_scatters(evidence))
-        }
-        _add(fits, _fitted(plain_hypotheses, also_plain, requests, best), log_priors[0])
-        return [Explanation.of(of_request) if of_request else None for of_request in fits]
+                fits.append((log_priors[0] if tries_scatter or parent else 0.0, evidence))
+                best = min(best, evidence.cost)
+            if not tries_scatter:
+                return Explanation.of(fits) if fits else None
+            starts = scattered.with_scatter(improved)
+        else:
+            starts = best_starts(scattered, request.starting_point)
+        improved, evidence = _fitted(scattered, starts, request, best)
+        if evidence is None:
+            gains_nothing = np.isfinite(request.cost_to_beat(has_position_scatter=True))
+            return Explanation.of(fits) if fits and not gains_nothing else None
+        if not fits and (request.without_scatter or hardly_scatters(evidence)):
+            _, without = _fitted(plain, without_scatter(improved), request, min(best, evidence.cost))
+            fits += [] if without is None else [(log_priors[0], without)]
+        return Explanation.of([*fits, (log_priors[1], evidence)])
+
+    def explain_all(self, requests: Sequence[Request]) -> list[Explanation | None]:
+        """The same of several sets, one after another, each pruned against the best before it."""
+        explanations: list[Explanation | None] = []
+        best = np.inf
+        for request in requests:
+            explanations.append(explanation := self.explain(request, best))
+            best = best if explanation is None else min(best, explanation.best.cost)
+        return explanations
 
     def refit(self, explanations: Sequence[Explanation]) -> list[Explanation | None]:
         """Explanations of more recordings, fitted to these from their most probable points; Laplace approximations.
 
         None where a set has other parameters for these recordings, or they do not support it.
         """
-        hypotheses: list[Hypothesis] = []
-        starts: dict[int, Points] = {}
+        refitted: list[Explanation | None] = []
+        best = np.inf
         for explanation in explanations:
-            try:
-                hypothesis = self.hypothesis(explanation.names, explanation.best.hypothesis.has_position_scatter)
-            except (Unsupported, InvalidInput):
-                continue  # a recording that the mechanism, or any model of a curve, needs was left out
-            if [parameter.name for parameter in hypothesis.model.parameters] == [
-                parameter.name for parameter in explanation.model.parameters
-            ]:
-                fitter = Fitter([hypothesis])
-                # Bounds may be narrower here: those of a time follow from how often the curves were sampled.
-                fit = np.clip(explanation.point.fit, fitter.low[0], fitter.high[0])
-                starts[len(hypotheses)] = fitter.at(
-                    replace(explanation.point, fit=fit, sensor_log_gain=fitter.no_sensor_log_gain)
-                )
-                hypotheses.append(hypothesis)
-        requests = [Request(hypothesis.model.names) for hypothesis in hypotheses]
-        fitted = {requests[number].names: evidence for number, _, evidence in _fitted(hypotheses, starts, requests)}
-        evidences = [fitted.get(explanation.names) for explanation in explanations]
-        return [Explanation.of([(0.0, evidence)]) if evidence else None for evidence in evidences]
+            evidence = self._refitted(explanation, best)
+            best = best if evidence is None else min(best, evidence.cost)
+            refitted.append(None if evidence is None else Explanation.of([(0.0, evidence)]))
+        return refitted
 
-    def _position_matters(self, hypotheses: Sequence[Hypothesis], points: Mapping[int, Points]) -> dict[int, bool]:
-        """Whether position scatter, as large as it usually gets, would show in some recording, of each hypothesis that
-        has points."""
-        matters = dict.fromkeys(points, False)
+    def _refitted(self, explanation: Explanation, best: float) -> Evidence | None:
+        try:
+            hypothesis = self.hypothesis(explanation.names, explanation.best.hypothesis.has_position_scatter)
+        except (Unsupported, InvalidInput):
+            return None  # a recording that the mechanism, or any model of a curve, needs was left out
+        names = [parameter.name for parameter in hypothesis.model.parameters]
+        if names != [parameter.name for parameter in explanation.model.parameters]:
+            return None
+        fitter = Fitter(hypothesis)
+        # Bounds may be narrower here: those of a time follow from how often the curves were sampled.
+        fit = np.clip(explanation.point.fit, fitter.low, fitter.high)
+        start = fitter.at(replace(explanation.point, fit=fit, sensor_log_gain=fitter.no_sensor_log_gain))
+        return _fitted(fitter, start, Request(explanation.names), best)[1]
+
+    def _position_matters(self, fitter: Fitter, points: Points) -> bool:
+        """Whether position scatter, as large as it usually gets, would show in some recording at one of the points."""
         if self.lines.curves:
-            return matters
-        for members in groups(points, hypotheses):
-            fitter = Fitter([hypotheses[number] for number in members])
-            together = stacked([points[number] for number in members])
-            products = fitter.products(together, slopes=False, place=True)
-            if products.place_slopes is not None:
-                first = (products.place_slopes**2).sum(axis=0) / (products.level**2 + 1e-300)
-                effect = POSITION_RANGE[1] ** 2 * first + 0.5 * POSITION_RANGE[1] ** 4 * self.curvature.square
-                shows = effect.max(axis=1) > _LEAST_SCATTER**2
-                for owner, number in enumerate(members):
-                    matters[number] = bool(shows[together.owner == owner].any())
-        return matters
+            return False
+        products = fitter.products(points, slopes=False, place=True)
+        if products.place_slopes is None:
+            return False
+        first = (products.place_slopes**2).sum(axis=0) / (products.level**2 + 1e-300)
+        effect = POSITION_RANGE[1] ** 2 * first + 0.5 * POSITION_RANGE[1] ** 4 * self.curvature.square
+        return bool((effect > _LEAST_SCATTER**2).any())
 
 
-def _fitted(
-    hypotheses: Sequence[Hypothesis], starts: Mapping[int, Points], requests: Sequence[Request], best: float = np.inf
-) -> list[tuple[int, Points, Evidence | None]]:
-    """Of each hypothesis that has starts: its number, the improved starts, and the evidence of the best; None where
-    that does not gain on its parent, or is pruned: far behind the others or the `best` cost so far."""
-    fits: list[tuple[int, Points, Evidence | None]] = []
-    for members in groups(starts, hypotheses):
-        fitter = Fitter([hypotheses[number] for number in members])
-        points = stacked([starts[number] for number in members])
-        costs_to_beat = np.array([requests[number].cost_to_beat(fitter.has_position_scatter) for number in members])[
-            points.owner
-        ]
-        # Of curves every pair is tried, and begins from a single mechanism.
-        unpruned_size = 1 if fitter.lines.curves else 0
-        never_pruned = [
-            requests[number].never_pruned or len(requests[number].names) <= unpruned_size for number in members
-        ]
-        margins = np.where(never_pruned, np.inf, PRUNE_NATS)[points.owner]
+def _fitted(fitter: Fitter, starts: Points, request: Request, best: float) -> tuple[Points, Evidence | None]:
+    """The improved starts, and the evidence of the best; None where that does not gain on its parent, or is pruned: far
+    behind the `best` cost so far."""
+    cost_to_beat = request.cost_to_beat(fitter.has_position_scatter)
+    # Of curves every pair is tried, and begins from a single mechanism.
+    pruned = not (request.never_pruned or len(request.names) <= (1 if fitter.lines.curves else 0))
 
-        def target(
-            at: Evaluated, costs_to_beat: Floats = costs_to_beat, margins: Floats = margins, best: float = best
-        ) -> Floats:
-            return np.minimum(costs_to_beat, min(best, float(at.cost.min())) + margins)
+    def target(at: Evaluated) -> Floats:
+        margin = PRUNE_NATS if pruned else np.inf
+        return np.full(len(at), min(cost_to_beat, min(best, float(at.cost.min())) + margin))
 
-        improved = fitter.improve(points, target)
-        supported = [row for row in improved.best().tolist() if improved.cost[row] < target(improved)[row]]
-        best = min(best, float(improved.cost.min()))
-        evidence: dict[int, Evidence] = {}
-        if supported:
-            owners = improved.points.owner[supported].tolist()
-            evidence = dict(zip(owners, laplace_at(fitter, improved[np.array(supported)]), strict=True))
-        for owner, number in enumerate(members):
-            fits.append((number, points_of(improved.points, owner, fitter.counts[owner]), evidence.get(owner)))
-    return fits
-
-
-def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -> dict[int, Points]:
-    """The starts of the requests' fits."""
-    starts: dict[int, Points] = {}
-    for members in groups(hypotheses, hypotheses):
-        starting_points = []
-        for number in members:
-            parent, nuisances = requests[number].parent, requests[number].nuisances
-            coordinates = None if parent is None else {name: parent.coordinates(name) for name in parent.names}
-            initial = requests[number].initial
-            if initial is not None:
-                coordinates, nuisances = (
-                    {name: initial.coordinates(name) for name in requests[number].names},
-                    initial.point,
-                )
-            single_explanation = requests[number].single
-            single = (
-                {}
-                if single_explanation is None
-                else {name: single_explanation.coordinates(name) for name in single_explanation.names}
-            )
-            starting_points.append(
-                StartingPoint(coordinates, parent.point if parent and nuisances is None else nuisances, single)
-            )
-        starts |= dict(
-            zip(members, best_starts(Fitter([hypotheses[number] for number in members]), starting_points), strict=True)
-        )
-    return starts
-
-
-def _add(
-    fits: Sequence[list[tuple[float, Evidence]]],
-    fitted: Iterable[tuple[int, Points, Evidence | None]],
-    log_prior: float,
-) -> None:
-    """Add to each request's fits those that have evidence, with their log prior."""
-    for number, _, evidence in fitted:
-        if evidence is not None:
-            fits[number].append((float(log_prior), evidence))
+    improved = fitter.improve(starts, target)
+    leading = improved.best
+    supported = leading.cost[0] < target(leading)[0]
+    return improved.points, laplace_at(fitter, leading) if supported else None

@@ -1,11 +1,11 @@
-"""Fits of hypotheses: costs and their derivatives at many points at once, starting points, and their improvement.
+"""Fits of a hypothesis: costs and their derivatives at several points at once, starting points, and their improvement.
 
 Mean parameters take damped Gauss–Newton steps within the bounds, with a damping for each point, until it converges.
 Parameters of the covariance only (gain and position scatter, line level, sensor spread, pick-up) take Newton steps on
 the likelihood of fixed predictions, which need no model evaluation.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from copy import copy
 from dataclasses import replace
 from enum import IntEnum
@@ -18,7 +18,6 @@ from underskin.autodiff import contiguous
 from underskin.diagnosis.inference.hypothesis import (
     Evaluated,
     FitPoint,
-    GaussianBatch,
     Hypothesis,
     Likelihoods,
     Points,
@@ -31,7 +30,6 @@ from underskin.diagnosis.inference.products import FrfProducts, Products, joined
 from underskin.diagnosis.noise import DISCREPANCY, GAIN_PRIOR, POSITION_PRIOR, START_GAIN, USUAL, SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.mechanisms.models.frf import FrfModels
 from underskin.units import Floats, Indices, Mask
 
 _FREE_SPREAD = 0.02  # above this sd of b, e^b is linearised at the most probable b, not at 0
@@ -63,50 +61,34 @@ class Scatter(IntEnum):
 
 
 class Fitter:
-    """Evaluates, starts and improves points of hypotheses of the same recordings with the same covariance
-    parameters."""
+    """Evaluates, starts and improves points of a hypothesis."""
 
-    def __init__(self, hypotheses: Sequence[Hypothesis], held: Collection[int] = ()) -> None:
+    def __init__(self, hypothesis: Hypothesis, held: Collection[int] = ()) -> None:
         """Prepare names and bounds; parameters with indices `held` are fixed and have no prior."""
-        self.hypotheses = tuple(hypotheses)
-        first = hypotheses[0]
-        self.lines, self.curvature, self.has_position_scatter = first.lines, first.curvature, first.has_position_scatter
-        self.covariance = first.covariance
+        self.hypothesis, self.model, self.lines = hypothesis, hypothesis.model, hypothesis.lines
+        self.curvature, self.has_position_scatter = hypothesis.curvature, hypothesis.has_position_scatter
+        self.covariance = hypothesis.covariance
         self._covariance_prior = np.array([parameter.prior.row for parameter in self.covariance])
         self._lowest = np.array([parameter.low for parameter in self.covariance])
         self._highest = np.array([parameter.high for parameter in self.covariance])
-        self.counts = [len(hypothesis.model.parameters) for hypothesis in hypotheses]
-        shape = len(hypotheses), max(self.counts)
-        self.free = np.zeros(shape, dtype=bool)
-        self.low, self.high, self._precision, self._centre = (np.zeros(shape) for _ in range(4))
-        self._freedom = np.full(shape, np.inf)
-        self._log_prior_height = np.zeros(len(hypotheses))
-        for number, hypothesis in enumerate(hypotheses):
-            indices = [index for index in hypothesis.mean_indices if index not in held]
-            self.free[number, indices] = True
-            self.low[number, : self.counts[number]], self.high[number, : self.counts[number]] = hypothesis.bounds
-            priors = hypothesis.priors[:, indices]
-            self._precision[number, indices], self._centre[number, indices] = priors[:2]
-            self._log_prior_height[number], self._freedom[number, indices] = priors[2].sum(), priors[3]
+        parameters = self.model.parameters
+        self.free = np.zeros(len(parameters), dtype=bool)
+        self.free[[index for index in hypothesis.mean_indices if index not in held]] = True
+        self.low, self.high = map(contiguous, hypothesis.bounds)
         self._range = self.high - self.low
-        gaussians = [hypothesis.other_kinds for hypothesis in hypotheses]
-        self._gaussians = (
-            GaussianBatch(gaussians, shape[1]) if any(gaussian is not None for gaussian in gaussians) else None
-        )
-        # Indices of each hypothesis's covariance parameters that belong to mechanisms; these come last.
+        precision, centre, height, freedom = hypothesis.priors
+        self._precision, self._centre = np.where(self.free, precision, 0.0), np.where(self.free, centre, 0.0)
+        self._freedom = np.where(self.free, freedom, np.inf)
+        self._log_prior_height = float(height[self.free].sum())
+        # Indices of the covariance parameters that belong to mechanisms; these come last.
         self.covariance_indices = np.array(
-            [
-                [index for index, parameter in enumerate(hypothesis.model.parameters) if parameter.moves_covariance]
-                for hypothesis in hypotheses
-            ],
-            dtype=np.intp,
-        ).reshape(len(hypotheses), -1)
-        mechanism_parameters = [first.model.parameters[index] for index in self.covariance_indices[0]]
-        self._shared_count = len(self.covariance) - len(mechanism_parameters)
+            [index for index, parameter in enumerate(parameters) if parameter.moves_covariance], dtype=np.intp
+        )
+        self._shared_count = len(self.covariance) - len(self.covariance_indices)
         spreads = [
-            self._shared_count + index
-            for index, parameter in enumerate(mechanism_parameters)
-            if parameter.acts_on == "gain_spread"
+            self._shared_count + number
+            for number, index in enumerate(self.covariance_indices)
+            if parameters[index].acts_on == "gain_spread"
         ]
         self._spread = spreads[0] if spreads else None
 
@@ -116,8 +98,8 @@ class Fitter:
         return np.zeros(self.lines.sensors.shape[1])
 
     def at(self, point: FitPoint) -> Points:
-        """One point of the first hypothesis."""
-        return Points(np.zeros(1, dtype=np.intp), point.fit[None], point.covariance[None], point.sensor_log_gain[None])
+        """One point."""
+        return Points(point.fit[None], point.covariance[None], point.sensor_log_gain[None])
 
     def evaluate(self, points: Points, *, slopes: bool = True) -> Evaluated:
         """Predict, with derivatives if `slopes`, and compute the costs."""
@@ -127,48 +109,30 @@ class Fitter:
     def products(self, points: Points, *, slopes: bool, place: bool) -> Products:
         """The inner products at points; with derivatives if `slopes`, with position slopes if `place`."""
         if self.lines.curves:
-            edges = np.searchsorted(points.owner, np.arange(len(self.hypotheses) + 1))
-            parts = [
-                hypothesis.curve_products(points.fit[low:high, :count], slopes=slopes)
-                for hypothesis, count, low, high in zip(
-                    self.hypotheses, self.counts, edges[:-1], edges[1:], strict=True
+            return self.hypothesis.curve_products(points.fit, slopes=slopes)
+        return joined(
+            [
+                FrfProducts.of(
+                    self.hypothesis.frf_lines,
+                    self.hypothesis.pickup_rows,
+                    self.hypothesis.frf_model.respond(points.fit[batch], slopes=slopes, place=place),
                 )
-                if high > low
+                for batch in self._at_once(points, len(self.low) if slopes else 0)
             ]
-            return joined(parts, max(self.counts))
-        several = self._at_once(points, max(self.counts) if slopes else 0)
-        return joined([self._frf_products(points[batch], slopes, place) for batch in several], max(self.counts))
+        )
 
     def _at_once(self, points: Points, variables: int) -> list[slice]:
         """Slices of points small enough that arrays with derivatives by so many variables stay small."""
-        largest = max(hypothesis.frf_model.numbers(variables) for hypothesis in self.hypotheses)
-        count = max(_NUMBERS_AT_ONCE // largest, 1)
+        count = max(_NUMBERS_AT_ONCE // self.hypothesis.frf_model.numbers(variables), 1)
         return [slice(first, first + count) for first in range(0, len(points), count)]
-
-    @cached_property
-    def _models(self) -> FrfModels:
-        return FrfModels([hypothesis.frf_model for hypothesis in self.hypotheses])
 
     def place_slopes(self, points: Points) -> Floats:
         """∂m/∂x and ∂m/∂y of recordings, without the dynamics (2, points, recordings)."""
         slopes = np.empty((2, len(points), self.lines.recordings))
         for batch in self._at_once(points, 0):
-            part = points[batch]
-            for rows, response in self._models.respond(part.owner, part.fit, slopes=False, place=True, lines=False):
-                slopes[:, batch][:, rows] = response.place_slopes
+            response = self.hypothesis.frf_model.respond(points.fit[batch], slopes=False, place=True, lines=False)
+            slopes[:, batch] = response.place_slopes
         return slopes
-
-    def _frf_products(self, points: Points, slopes: bool, place: bool) -> FrfProducts:
-        """The inner products at points that are evaluated at once."""
-        parts = self._models.respond(points.owner, points.fit, slopes=slopes, place=place)
-        products = []
-        for rows, response in parts:
-            hypothesis = self.hypotheses[points.owner[rows[0]]]
-            products.append(FrfProducts.of(hypothesis.frf_lines, hypothesis.pickup_rows, response))
-        order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        if len(parts) == 1:  # whose points may be ordered by contact
-            return products[0] if (np.diff(order) == 1).all() else products[0][order]
-        return FrfProducts.joined(products, max(self.counts))[order]
 
     def weighed(self, points: Points, products: Products) -> Evaluated:
         """Points with known predictions and their costs; where the sensors' gains are free, at the most probable
@@ -197,7 +161,7 @@ class Fitter:
         values = np.exp(covariance[..., None])
         shape = (*covariance.shape[:-1], 1)
         values_by_name = {parameter.name: values[..., column, :] for column, parameter in enumerate(self.covariance)}
-        pickup = self.hypotheses[0].model.pickup
+        pickup = self.model.pickup
         return SeveralLevels(
             gain=values[..., Scatter.GAIN, :],
             level=values[..., Scatter.LEVEL, :],
@@ -211,7 +175,7 @@ class Fitter:
         """The costs (points, sets) with covariance parameters (points, sets, parameters), at fixed predictions."""
         from underskin.diagnosis.inference.kernels import log_priors
 
-        pickup = self.hypotheses[0].model.pickup
+        pickup = self.model.pickup
         if pickup is not None or self.lines.curves:
             rows = len(self.lines.value) if pickup is None else 4 * self.lines.recordings
             at_once = max(_NUMBERS_AT_ONCE // (covariances.shape[1] * rows), 1)
@@ -224,11 +188,9 @@ class Fitter:
         )
         bounds = self.free, self.low, self.high, self._precision, self._centre
         heights = self._freedom, self._log_prior_height
-        log_priors(
-            points.owner, contiguous(points.fit), *bounds, *heights, covariances, self._covariance_prior, log_posterior
-        )
-        if self._gaussians is not None:
-            log_posterior += self._gaussians.log_densities(points)[:, None]
+        log_priors(contiguous(points.fit), *bounds, *heights, covariances, self._covariance_prior, log_posterior)
+        if self.hypothesis.other_kinds is not None:
+            log_posterior += self.hypothesis.other_kinds.log_densities(points.fit)[:, None]
         return -log_posterior
 
     def costs(self, at: Evaluated, covariances: Floats) -> Floats:
@@ -238,29 +200,27 @@ class Fitter:
     def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
         """Information and gradient of the log posterior in the mean parameters (points, parameters, parameters).
 
-        Held and padded parameters have gradient 0 and information 1.
+        Held parameters have gradient 0 and information 1.
         """
         levels, sensor_log_gain = self.levels(at.points.covariance[:, None]), at.points.sensor_log_gain
         information, gradient = normal_equations(
             self.lines, self.curvature, at.products, levels, sensor_log_gain, at.log_slope_gradient
         )
-        owner = at.points.owner
-        free = self.free[owner]
-        offset = at.points.fit - self._centre[owner]
-        precision = self._prior_precision(owner, offset)
-        if self._gaussians is not None:
-            of_others, towards = self._gaussians.equations(at.points)
-            information, gradient = information + of_others, gradient + towards
-        gradient = np.where(free, gradient - precision * offset, 0.0)
-        information = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
-        diagonal = np.arange(free.shape[1])
-        information[:, diagonal, diagonal] += np.where(free, precision, 1.0)
+        offset = at.points.fit - self._centre
+        precision = self._prior_precision(offset)
+        others = self.hypothesis.other_kinds
+        if others is not None:
+            information, gradient = information + others.precision, gradient + others.gradients(at.points.fit)
+        gradient = np.where(self.free, gradient - precision * offset, 0.0)
+        information = np.where(self.free[:, None] & self.free, information, 0.0)
+        diagonal = np.arange(len(self.free))
+        information[:, diagonal, diagonal] += np.where(self.free, precision, 1.0)
         return information, gradient
 
-    def _prior_precision(self, owner: Indices, offset: Floats) -> Floats:
+    def _prior_precision(self, offset: Floats) -> Floats:
         """Precision of the quadratic with the prior's gradient at the `offset` from the centres (points, parameters);
         it decreases with the offset in heavy tails."""
-        precision, freedom = self._precision[owner], self._freedom[owner]
+        precision, freedom = self._precision, self._freedom
         with np.errstate(invalid="ignore"):
             weight = (freedom + 1) / (freedom + precision * offset**2)
         return np.where(np.isfinite(freedom), weight, 1.0) * precision
@@ -268,7 +228,7 @@ class Fitter:
     def with_covariance(self, points: Points, covariance: Floats) -> Points:
         """The points with other covariance parameters; those of mechanisms are also coordinates of the fit."""
         fit = points.fit.copy()
-        np.put_along_axis(fit, self.covariance_indices[points.owner], covariance[:, self._shared_count :], axis=1)
+        fit[:, self.covariance_indices] = covariance[:, self._shared_count :]
         return replace(points, covariance=covariance, fit=fit)
 
     def update_noise_levels(self, at: Evaluated, steps: int) -> Evaluated:
@@ -276,11 +236,7 @@ class Fitter:
 
         Where mechanisms have covariance parameters these are correlated, so the steps are joint.
         """
-        if (
-            isinstance(at.products, FrfProducts)
-            and not self.covariance_indices.size
-            and self.hypotheses[0].model.pickup is None
-        ):
+        if isinstance(at.products, FrfProducts) and not self.covariance_indices.size and self.model.pickup is None:
             return self._update_independently(at, at.products, steps)
         from underskin.diagnosis.inference.kernels import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
 
@@ -376,43 +332,29 @@ class Fitter:
             hessian[:, b, a] = hessian[:, a, b]
         return gradient + np.einsum("nij,nj->ni", hessian, here - centre), hessian
 
-    def start(self, mechanism_fits: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
-        """Points of each hypothesis with these coordinates of its mechanisms (points, parameters), nuisances from a
-        parent or at their priors' centres, and usual noise levels."""
-        owner = np.repeat(np.arange(len(mechanism_fits)), [len(coordinates) for coordinates in mechanism_fits])
-        fit = np.zeros((len(owner), max(self.counts)))
-        for number, (hypothesis, values, parent) in enumerate(
-            zip(self.hypotheses, mechanism_fits, parents, strict=True)
-        ):
-            count, mechanisms = self.counts[number], hypothesis.mechanism_parameter_count
-            nuisances = np.array([parameter.start for parameter in hypothesis.model.parameters[mechanisms:]])
-            if parent is not None:
-                nuisances = parent.fit[len(parent.fit) - (count - mechanisms) :]
-            rows = owner == number
-            # Bounds may differ from the parent's: where the contact sticks, a snap-in confines its beginning.
-            nuisances = np.clip(nuisances, self.low[number, mechanisms:count], self.high[number, mechanisms:count])
-            fit[rows, :mechanisms], fit[rows, mechanisms:count] = values, nuisances
+    def start(self, mechanism_fits: Floats, parent: FitPoint | None) -> Points:
+        """Points with these coordinates of the mechanisms (points, parameters), nuisances from a parent or at their
+        priors' centres, and usual noise levels."""
+        points, mechanisms = mechanism_fits.shape
+        nuisances = np.array([parameter.start for parameter in self.model.parameters[mechanisms:]])
+        if parent is not None:
+            nuisances = parent.fit[len(parent.fit) - len(nuisances) :]
+        # Bounds may differ from the parent's: where the contact sticks, a snap-in confines its beginning.
+        nuisances = np.clip(nuisances, self.low[mechanisms:], self.high[mechanisms:])
+        fit = np.concatenate([mechanism_fits, np.tile(nuisances, (points, 1))], axis=1)
         shared = [GAIN_PRIOR.middle, 0.0]
         if self.has_position_scatter:
             shared.append(POSITION_PRIOR.middle)
         if self.lines.curves:
-            shared.append(self.hypotheses[0].smooth.middle)
-        of_mechanisms = np.take_along_axis(fit, self.covariance_indices[owner], axis=1)
-        covariance = np.concatenate([np.tile(shared, (len(owner), 1)), of_mechanisms], axis=1)
-        return Points(owner, fit, covariance, np.tile(self.no_sensor_log_gain, (len(owner), 1)))
+            shared.append(self.hypothesis.smooth.middle)
+        covariance = np.concatenate([np.tile(shared, (points, 1)), fit[:, self.covariance_indices]], axis=1)
+        return Points(fit, covariance, np.tile(self.no_sensor_log_gain, (points, 1)))
 
-    def initial(
-        self,
-        mechanism_fits: Sequence[Floats],
-        parents: Sequence[FitPoint | None] | None = None,
-        *,
-        slopes: bool = False,
-    ) -> Evaluated:
-        """The starting points of each hypothesis with these coordinates, evaluated, with d33 estimated from the
-        data."""
-        points = self.start(mechanism_fits, parents or [None] * len(mechanism_fits))
+    def initial(self, mechanism_fits: Floats, parent: FitPoint | None = None, *, slopes: bool = False) -> Evaluated:
+        """The starting points with these coordinates, evaluated, with d33 estimated from the data."""
+        points = self.start(mechanism_fits, parent)
         products = self.products(points, slopes=slopes, place=self.has_position_scatter)
-        if not any(parameter.proportional for parameter in self.hypotheses[0].model.parameters):
+        if not any(parameter.proportional for parameter in self.model.parameters):
             return self.weighed(points, products)
         ratio = self._ratio(points, products)
         if isinstance(products, FrfProducts):
@@ -433,11 +375,8 @@ class Fitter:
 
         Large scatter may have biased the fit without it, so the nuisances' centres are tried as well.
         """
-        fresh = points.fit.copy()
-        for number, (hypothesis, count) in enumerate(zip(self.hypotheses, self.counts, strict=True)):
-            nuisances = slice(hypothesis.mechanism_parameter_count, count)
-            starts = [parameter.start for parameter in hypothesis.model.parameters[nuisances]]
-            fresh[points.owner == number, nuisances] = starts
+        fresh, mechanisms = points.fit.copy(), self.hypothesis.mechanism_parameter_count
+        fresh[:, mechanisms:] = [parameter.start for parameter in self.model.parameters[mechanisms:]]
         scales = np.log(_POSITION_STARTS)
         gain, level, mechanism_levels = points.covariance[:, :1], points.covariance[:, 1:2], points.covariance[:, 2:]
         shared = np.minimum(gain, GAIN_PRIOR.middle), level
@@ -465,39 +404,29 @@ class Fitter:
     def _times(self, points: Points, ratio: Floats) -> tuple[Points, Floats]:
         """Points with d33 multiplied by `ratio` (points,) within its bounds, and the factor applied; 1 where the ratio
         is not positive."""
-        number, index = np.arange(len(points)), self._d33[points.owner]
-        fit = points.fit.copy()
+        fit, index = points.fit.copy(), self._d33
         change = np.log(np.where(ratio > 0, ratio, 1.0))
-        low, high = self.low[points.owner, index], self.high[points.owner, index]
-        fit[number, index] = np.clip(fit[number, index] + change, low, high)
-        return replace(points, fit=fit), np.exp(fit[number, index] - points.fit[number, index])
+        fit[:, index] = np.clip(fit[:, index] + change, self.low[index], self.high[index])
+        return replace(points, fit=fit), np.exp(fit[:, index] - points.fit[:, index])
 
     def _with_d33(self, at: Evaluated) -> Evaluated:
         """With the most probable d33 at these noise levels; needs no further prediction."""
         information, gradient = self.posterior_equations(at)
-        number, index = np.arange(len(at)), self._d33[at.points.owner]
-        step = np.clip(gradient[number, index] / information[number, index, index], -_LARGEST_STEP, _LARGEST_STEP)
+        index = self._d33
+        step = np.clip(gradient[:, index] / information[:, index, index], -_LARGEST_STEP, _LARGEST_STEP)
         return self.update_noise_levels(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
 
     @cached_property
-    def _d33(self) -> Indices:
-        """Index of the parameter of each hypothesis that the prediction is proportional to."""
-        proportional = [
-            [parameter.proportional for parameter in hypothesis.model.parameters] for hypothesis in self.hypotheses
-        ]
-        return np.array([flags.index(True) for flags in proportional])
+    def _d33(self) -> int:
+        """Index of the parameter that the prediction is proportional to."""
+        return [parameter.proportional for parameter in self.model.parameters].index(True)
 
     @cached_property
     def _moves_position_slopes(self) -> Mask:
-        """Parameters of each hypothesis that may change ∇σ/σ at the contact (hypotheses, parameters): not d33, nor
-        those of the dynamics."""
-        moves = np.zeros(self.low.shape, dtype=bool)
-        for number, hypothesis in enumerate(self.hypotheses):
-            moves[number, : self.counts[number]] = [
-                not parameter.proportional for parameter in hypothesis.model.parameters
-            ]
-            for name, span in parameter_slices(hypothesis.model.names, self.lines).items():
-                moves[number, span] &= not self.lines.mechanisms[name].needs_lines
+        """Parameters that may change ∇σ/σ at the contact: not d33, nor those of the dynamics."""
+        moves = np.array([not parameter.proportional for parameter in self.model.parameters])
+        for name, span in parameter_slices(self.model.names, self.lines).items():
+            moves[span] &= not self.lines.mechanisms[name].needs_lines
         return moves
 
     def improve(self, start: Points, cost_to_beat: CostToBeat | None = None) -> Evaluated:
@@ -509,21 +438,18 @@ class Fitter:
         initial = by_least_squares(self, start)
         from_starts = self.update_noise_levels(self.evaluate(start), _CURVE_SETTLING)
         if from_starts.cost.min() < initial.cost[0]:
-            initial = from_starts[from_starts.best()]
+            initial = from_starts.best
         if cost_to_beat is not None and initial.cost[0] > cost_to_beat(initial)[0] + _MAY_GAIN:
             return initial
         return self.update_noise_levels(self._between_samples(initial).descend(initial, 1), _CURVE_SETTLING)
 
     def _between_samples(self, at: Evaluated) -> Self:
         """With contact points confined to the interval between samples that they are in, where adhesion moves them."""
-        (hypothesis,) = self.hypotheses
-        assert isinstance(hypothesis.model, CurveModel)
-        if not hypothesis.model.hidden_jumps:
+        assert isinstance(self.model, CurveModel)
+        if not self.model.hidden_jumps:
             return self
         held = copy(self)
-        held.low, held.high = (
-            bound[None] for bound in between_samples(hypothesis, at.points.fit[0], self.low[0], self.high[0])
-        )
+        held.low, held.high = between_samples(self.hypothesis, at.points.fit[0], self.low, self.high)
         return held
 
     def descend(self, best: Evaluated, settling: int, cost_to_beat: CostToBeat | None = None) -> Evaluated:
@@ -567,8 +493,7 @@ class Fitter:
 
         A point that does not gain first needs the gradient of its position slopes, then shorter steps.
         """
-        owner = at.points.owner
-        fit = np.clip(at.points.fit + step, self.low[owner], self.high[owner])
+        fit = np.clip(at.points.fit + step, self.low, self.high)
         tried = self.update_noise_levels(self.evaluate(replace(at.points, fit=fit)), settling)
         gained = at.cost - tried.cost
         better = gained > 0
@@ -608,14 +533,13 @@ class Fitter:
 
         base, replacements = at.points, other.points
         points = Points(
-            np.concatenate([base.owner, replacements.owner])[order],
             merged(base.fit, replacements.fit),
             merged(base.covariance, replacements.covariance),
             merged(base.sensor_log_gain, replacements.sensor_log_gain),
         )
         log_slope_gradient = None
         if at.log_slope_gradient is not None or other.log_slope_gradient is not None:
-            unknown = np.full((1, self.lines.recordings, max(self.counts)), np.nan)
+            unknown = np.full((1, self.lines.recordings, len(self.low)), np.nan)
             log_slope_gradient = merged(
                 *(
                     np.repeat(unknown, len(evaluated), axis=0)
@@ -624,22 +548,20 @@ class Fitter:
                     for evaluated in (at, other)
                 )
             )
-        products = joined([at.products, other.products], max(self.counts))[order]
+        products = joined([at.products, other.products])[order]
         return Evaluated(points, products, merged(at.cost, other.cost), log_slope_gradient)
 
     def with_log_slope_gradient(self, at: Evaluated) -> Evaluated:
         """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position slopes t, by differences."""
-        count = max(self.counts)
-        owner = at.points.owner
-        step = _SLOPE_STEP * (self.high - self.low)[owner]
-        step = np.where(at.points.fit + step <= self.high[owner], step, -step)
-        number, index = np.nonzero(self.free[owner] & self._moves_position_slopes[owner])
+        step = _SLOPE_STEP * self._range
+        step = np.where(at.points.fit + step <= self.high, step, -step)
+        number, index = np.nonzero(np.broadcast_to(self.free & self._moves_position_slopes, step.shape))
         moved = at.points[number]
         fit = moved.fit.copy()
         fit[np.arange(len(fit)), index] += step[number, index]
         here, there = (_log_size(self.place_slopes(points)) for points in (at.points, replace(moved, fit=fit)))
-        log_slope_gradient = np.zeros((len(at), here.shape[1], count))
-        log_slope_gradient[np.arange(len(at)), :, self._d33[owner]] = 2.0  # the response is proportional to d33
+        log_slope_gradient = np.zeros((len(at), here.shape[1], len(self.low)))
+        log_slope_gradient[:, :, self._d33] = 2.0  # the response is proportional to d33
         log_slope_gradient[number, :, index] = (there - here[number]) / step[number, index][:, None]
         return replace(at, log_slope_gradient=log_slope_gradient)
 
@@ -647,12 +569,11 @@ class Fitter:
         """Damped Gauss–Newton steps of the mean parameters within the bounds, and the gains that the gradients
         promise."""
         information, gradient = self.posterior_equations(at)
-        owner, fit = at.points.owner, at.points.fit
-        low, high = self.low[owner], self.high[owner]
-        free, every = self.free[owner], np.arange(fit.shape[1])
+        fit, low, high = at.points.fit, self.low, self.high
+        free, every = np.broadcast_to(self.free, fit.shape), np.arange(fit.shape[1])
         diagonal = information[:, every, every]
         # Of curves, so that a parameter without effect does not take all of a step
-        least = self._range[owner] ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
+        least = self._range**-2.0 if self.lines.curves else _LEAST_CURVATURE
         for _ in every:
             matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
             matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + least, 1.0)
@@ -671,7 +592,7 @@ def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
 
     A small smooth error with a close fit and a large one with a loose fit may both be local maxima; both are tried.
     """
-    fitting = LeastSquares(fitter.hypotheses[0])
+    fitting = LeastSquares(fitter.hypothesis)
     fits, costs = zip(*(fitting.fitted(fit) for fit in start.fit), strict=True)
     fit = fits[int(np.argmin(costs))]
     smooth = np.clip(_SMOOTH_STARTS, *_smooth_range(fitter))
@@ -680,12 +601,12 @@ def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
     at = fitter.update_noise_levels(
         fitter.evaluate(replace(both, fit=np.tile(fit, (len(smooth), 1)), covariance=covariance)), _SETTLING
     )
-    return at[at.best()]
+    return at.best
 
 
 def _smooth_range(fitter: Fitter) -> tuple[float, float]:
     """Range of starting values of the log smooth error of curves."""
-    smooth = fitter.hypotheses[0].smooth
+    smooth = fitter.hypothesis.smooth
     return smooth.low, max(smooth.high, DISCREPANCY.low)
 
 

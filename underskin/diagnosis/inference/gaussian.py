@@ -67,7 +67,16 @@ class Gaussian:
 
     def log_density(self, point: Floats) -> float:
         """ln L at one point (quantities,)."""
-        return float(self.height + self.linear @ point - 0.5 * point @ self.precision @ point)
+        return float(self.log_densities(point[None])[0])
+
+    def log_densities(self, points: Floats) -> Floats:
+        """ln L at points (points, quantities)."""
+        quadratic = np.einsum("np,pq,nq->n", points, self.precision, points)
+        return np.asarray(self.height + points @ self.linear - 0.5 * quadratic)
+
+    def gradients(self, points: Floats) -> Floats:
+        """∂ ln L/∂q at points (points, quantities)."""
+        return np.asarray(self.linear - points @ self.precision)
 
     def posterior(self, centre: Floats, precision: Floats) -> tuple[Floats, Floats]:
         """Mean (…, quantities) and covariance under normal priors of this centre and precision, independent

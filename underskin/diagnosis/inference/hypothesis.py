@@ -17,6 +17,7 @@ with H, the Hessian of σ, of the base model.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -267,46 +268,24 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
 
 @dataclass(frozen=True)
 class Points:
-    """Coordinates of fits: of the models (points, parameters), of the covariance, and the sensors' log gains.
+    """Coordinates of fits of one hypothesis: of the model (points, parameters), of the covariance, and the sensors' log
+    gains."""
 
-    `owner` is the index of each point's hypothesis, in rising order; rows of models with fewer parameters are padded
-    with zeros.
-    """
-
-    owner: Indices
     fit: Floats
     covariance: Floats
     sensor_log_gain: Floats
 
     def __len__(self) -> int:
-        return len(self.owner)
+        return len(self.fit)
 
     def __getitem__(self, points: Indices | Mask | slice) -> "Points":
-        return Points(self.owner[points], self.fit[points], self.covariance[points], self.sensor_log_gain[points])
+        return Points(self.fit[points], self.covariance[points], self.sensor_log_gain[points])
 
-
-def joined_points(first: Points, second: Points) -> Points:
-    """The points of both, which are of one hypothesis."""
-    names = "owner", "fit", "covariance", "sensor_log_gain"
-    return Points(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
-
-
-def points_of(points: Points, owner: int, count: int) -> Points:
-    """The points of one of several hypotheses, with its `count` parameters, as points of that hypothesis only."""
-    chosen = points[points.owner == owner]
-    return Points(np.zeros_like(chosen.owner), chosen.fit[:, :count], chosen.covariance, chosen.sensor_log_gain)
-
-
-def stacked(parts: Sequence[Points]) -> Points:
-    """Points of several hypotheses, in the order of `parts`."""
-    owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    fit = np.zeros((len(owner), max(part.fit.shape[1] for part in parts)))
-    for number, part in enumerate(parts):
-        fit[owner == number, : part.fit.shape[1]] = part.fit
-    covariance, sensor_log_gain = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("covariance", "sensor_log_gain")
-    )
-    return Points(owner, fit, covariance, sensor_log_gain)
+    @classmethod
+    def joined(cls, first: "Points", second: "Points") -> Self:
+        """The points of both."""
+        names = "fit", "covariance", "sensor_log_gain"
+        return cls(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
 
 
 @dataclass(frozen=True)
@@ -335,39 +314,10 @@ class Evaluated:
         log_slope_gradient = None if self.log_slope_gradient is None else self.log_slope_gradient[points]
         return Evaluated(self.points[points], self.products[points], self.cost[points], log_slope_gradient)
 
-    def best(self) -> Indices:
-        """The point of least cost of each hypothesis that has one."""
-        order = np.lexsort((self.cost, self.points.owner))
-        owner = self.points.owner[order]
-        return order[np.append(True, owner[1:] != owner[:-1])] if len(order) else order
-
-
-class GaussianBatch:
-    """Gaussian likelihoods of several hypotheses, padded to equally many parameters."""
-
-    def __init__(self, gaussians: Sequence[Gaussian | None], parameters: int) -> None:
-        """None where only the hypothesis's own recordings inform on its parameters."""
-        self._precision, self._linear = (
-            np.zeros((len(gaussians), parameters, parameters)),
-            np.zeros((len(gaussians), parameters)),
-        )
-        self._height = np.zeros(len(gaussians))
-        for number, gaussian in enumerate(gaussians):
-            if gaussian is not None:
-                count = len(gaussian.linear)
-                self._precision[number, :count, :count] = gaussian.precision
-                self._linear[number, :count], self._height[number] = gaussian.linear, gaussian.height
-
-    def log_densities(self, points: Points) -> Floats:
-        """ln L at points (points,)."""
-        owner, fit = points.owner, points.fit
-        quadratic = np.einsum("np,npq,nq->n", fit, self._precision[owner], fit)
-        return np.asarray(self._height[owner] + (self._linear[owner] * fit).sum(axis=1) - 0.5 * quadratic)
-
-    def equations(self, points: Points) -> tuple[Floats, Floats]:
-        """Information (points, parameters, parameters) and gradient (points, parameters) of ln L."""
-        precision = self._precision[points.owner]
-        return precision, self._linear[points.owner] - np.einsum("npq,nq->np", precision, points.fit)
+    @property
+    def best(self) -> "Evaluated":
+        """The point of least cost."""
+        return self[[int(np.argmin(self.cost))]]
 
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
@@ -443,12 +393,6 @@ class Hypothesis:
         """The number of parameters that belong to mechanisms; they come first."""
         mechanisms = [self.lines.mechanisms[name] for name in self.model.names]
         return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
-
-    def group(self, number: int) -> object:
-        """A key that is equal for hypotheses that can be evaluated together; `number` makes it unique for those that
-        cannot."""
-        names = tuple(parameter.name for parameter in self.covariance)
-        return number if self.lines.curves else (self.gain, POSITION_PRIOR, names)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:

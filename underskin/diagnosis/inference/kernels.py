@@ -140,11 +140,10 @@ def log_plateaus(covariance: Floats, plateaus: Floats) -> float:
 
 
 @compiled(
-    "void(int64[::1], float64[:, ::1], boolean[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
-    "float64[:, ::1], float64[:, ::1], float64[::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
+    "void(float64[:, ::1], boolean[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], "
+    "float64, float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
 )
 def log_priors(
-    owner: NDArray[np.int64],
     fit: Floats,
     free: Mask,
     low: Floats,
@@ -152,28 +151,26 @@ def log_priors(
     precision: Floats,
     centre: Floats,
     freedom: Floats,
-    height: Floats,
+    height: float,
     covariances: Floats,
     plateaus: Floats,
     totals: Floats,
 ) -> None:
     """Add the log prior densities to `totals` (points, sets).
 
-    Of the coordinates `fit` (points, parameters) that are free in each point's hypothesis a normal or uniform density
-    within bounds, or one of Student's t with so many degrees of `freedom`, where these are finite; of the covariance's
-    coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the log of the
-    area (parameters, 5).
+    Of the coordinates `fit` (points, parameters) that are free a normal or uniform density within bounds, or one of
+    Student's t with so many degrees of `freedom`, where these are finite; of the covariance's coordinates (points,
+    sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the log of the area (parameters, 5).
     """
     for point in range(len(fit)):
-        hypothesis = owner[point]
-        log_prior = height[hypothesis]
+        log_prior = height
         for index in range(fit.shape[1]):
-            if free[hypothesis, index]:
+            if free[index]:
                 value = fit[point, index]
-                if value < low[hypothesis, index] or value > high[hypothesis, index]:
+                if value < low[index] or value > high[index]:
                     log_prior = -np.inf
-                square = precision[hypothesis, index] * (value - centre[hypothesis, index]) ** 2
-                tail = freedom[hypothesis, index]
+                square = precision[index] * (value - centre[index]) ** 2
+                tail = freedom[index]
                 log_prior -= 0.5 * (square if tail == np.inf else (tail + 1) * np.log1p(square / tail))
         for number in range(covariances.shape[1]):
             totals[point, number] += log_prior + log_plateaus(covariances[point, number], plateaus)

@@ -58,7 +58,7 @@ class PickupRows:
     """The rows that mains pick-up reaches, in order of recordings.
 
     Attributes: `lines`, which of a model's distinct lines they are on; `line`, the index of each row's line among
-    these; `row_numbers`, the indices of the rows.
+    these.
     """
 
     def __init__(self, lines: Lines, pickup: Pickup, design: FrfDesign) -> None:
@@ -66,14 +66,10 @@ class PickupRows:
         rows = pickup.rows
         self.recordings = lines.recordings
         alike = np.arange(len(rows)) if pickup.alike is None else pickup.alike
-        self._columns = alike, lines.deviation[rows] ** -2.0, lines.recording[rows], contiguous(lines.value[rows])
         self.lines, line = np.unique(design.line[rows], return_inverse=True)
         self.line: Indices = line.reshape(-1)
-        self.row_numbers: Indices = np.arange(len(rows))
-
-    def columns(self, line: Indices) -> tuple[Array, ...]:
-        """What the compiled functions take of each row, with the index of its line (rows,)."""
-        return *self._columns, line
+        weight, value = lines.deviation[rows] ** -2.0, contiguous(lines.value[rows])
+        self.columns = alike, weight, lines.recording[rows], value, self.line  # as compiled functions take them
 
 
 @cached_while_alive  # a diagnosis evaluates dozens of models of one design
@@ -322,44 +318,25 @@ class FrfProducts:
         return replace(self, level_slopes=None, turning=None, pickup=pickup)
 
     @classmethod
-    def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
-        """At the points of several, one after another, padded to so many parameters."""
-        filled = [part.filled(parameters, turning=any(other.turning for other in parts)) for part in parts]
+    def joined(cls, parts: Sequence["FrfProducts"]) -> Self:
+        """At the points of several, one after another."""
 
         def of(name: str, axis: int = 0) -> Any:
-            values = [getattr(part, name) for part in filled]
+            values = [getattr(part, name) for part in parts]
             return None if values[0] is None else np.concatenate(values, axis=axis)
 
-        level = of("level"), of("level_slopes"), of("place_slopes", axis=1)
-        turning = [part.turning for part in filled if part.turning is not None]
-        pickup = [part.pickup for part in filled if part.pickup is not None]
+        turning = [part.turning for part in parts if part.turning is not None]
+        pickup = [part.pickup for part in parts if part.pickup is not None]
         return cls(
             parts[0].yy,
             of("uu"),
             of("uy"),
-            *level,
+            of("level"),
+            of("level_slopes"),
+            of("place_slopes", axis=1),
             SlopeSums.joined(turning) if turning else None,
             PickupProducts.joined(pickup) if pickup else None,
         )
-
-    def filled(self, parameters: int, *, turning: bool) -> Self:
-        """With zero derivatives by further parameters, `parameters` in all; also those of u if `turning`."""
-        slopes = self.level_slopes
-        if slopes is None:
-            return self
-        further = parameters - slopes.shape[-1]
-        slopes = np.pad(slopes, ((0, 0), (0, 0), (0, further))) if further else slopes
-        slope_sums = self.turning
-        if slope_sums is None:
-            none = np.zeros_like(slopes)
-            slope_sums = (
-                SlopeSums(none, none, np.broadcast_to(none[..., None], (*none.shape, parameters))) if turning else None
-            )
-        elif further:
-            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (slope_sums.uv, slope_sums.vy))
-            slope_sums = SlopeSums(uv, vy, np.pad(slope_sums.vv, ((0, 0), (0, 0), (0, further), (0, further))))
-        pickup = None if self.pickup is None else self.pickup.filled(parameters)
-        return replace(self, level_slopes=slopes, turning=slope_sums, pickup=pickup)
 
     def scaled(self, factor: Floats) -> Self:
         """With levels multiplied by `factor` (points,)."""
@@ -383,10 +360,9 @@ class FrfProducts:
 @dataclass(frozen=True)
 class PickupProducts:
     """u (points, lines) and v (points, parameters, lines) on the distinct lines of the rows with pick-up; v is None
-    where it is 0. `line` is the index of each row's line."""
+    where it is 0."""
 
     rows: PickupRows
-    line: Indices
     u: Array
     v: Array | None
 
@@ -394,9 +370,9 @@ class PickupProducts:
     def of(cls, rows: PickupRows, points: int, factor: Differentiated | None) -> Self:
         """Of the dynamics' factor on a model's distinct lines."""
         if factor is None:
-            return cls(rows, rows.line, np.ones((points, len(rows.lines)), dtype=complex), None)
+            return cls(rows, np.ones((points, len(rows.lines)), dtype=complex), None)
         slopes = factor.slopes.transpose(1, 0, 2)[..., rows.lines] if len(factor.slopes) else None
-        return cls(rows, rows.line, factor.value[:, rows.lines], slopes)
+        return cls(rows, factor.value[:, rows.lines], slopes)
 
     def __getitem__(self, points: Array | slice) -> Self:
         """At some of the points."""
@@ -404,30 +380,10 @@ class PickupProducts:
 
     @classmethod
     def joined(cls, parts: Sequence["PickupProducts"]) -> Self:
-        """At the points of several, one after another; on the rows themselves where models' distinct lines differ."""
-        first = parts[0]
-        if any(part.line is not first.line for part in parts):
-            parts = [part._on_rows() for part in parts]
+        """At the points of several, one after another."""
         slopes = [part.v for part in parts if part.v is not None]
-        return cls(
-            first.rows,
-            parts[0].line,
-            np.concatenate([part.u for part in parts]),
-            np.concatenate(slopes) if slopes else None,
-        )
-
-    def _on_rows(self) -> Self:
-        return replace(
-            self,
-            line=self.rows.row_numbers,
-            u=self.u[:, self.line],
-            v=None if self.v is None else self.v[..., self.line],
-        )
-
-    def filled(self, parameters: int) -> Self:
-        """With zero derivatives by further parameters, `parameters` in all."""
-        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1]), dtype=complex) if self.v is None else self.v
-        return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
+        u = np.concatenate([part.u for part in parts])
+        return cls(parts[0].rows, u, np.concatenate(slopes) if slopes else None)
 
     def without_pickup(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums corrected for pick-up."""
@@ -438,7 +394,7 @@ class PickupProducts:
         uu, uy, yy = (np.broadcast_to(x, shape).copy() for x in (sums.uu, sums.uy, sums.yy))
         log_determinant = np.zeros(shape[:2])
         square = np.ascontiguousarray(np.swapaxes((levels.pickup / levels.level) ** 2, 1, 2))
-        subtract_pickup(square, *self.rows.columns(self.line), _complex(self.u), uu, uy, yy, log_determinant)
+        subtract_pickup(square, *self.rows.columns, _complex(self.u), uu, uy, yy, log_determinant)
         return Sums(uu, uy, yy, log_determinant[..., None])
 
     def slopes_without_pickup(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
@@ -450,7 +406,7 @@ class PickupProducts:
             return sums
         square = contiguous((levels.pickup[:, 0] / levels.level[:, 0, 0][:, None]) ** 2)
         uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
-        rows = self.rows.columns(self.line)
+        rows = self.rows.columns
         subtract_pickup_slopes(square, *rows, _complex(self.u), _complex(self.v), uv, vy, vv)
         return SlopeSums(uv, vy, vv)
 
@@ -482,8 +438,8 @@ def _products_of_factor(lines: FrfLines, u: Array, slopes: Array) -> tuple[Float
 Products = FrfProducts | CurveProducts
 
 
-def joined(parts: Sequence[Products], parameters: int) -> Products:
-    """Products of models of the same recordings one after another, padded to so many parameters."""
+def joined(parts: Sequence[Products]) -> Products:
+    """Products of one model at several sets of points, one after another."""
     if len(parts) == 1:
         return parts[0]
     curves = [part for part in parts if isinstance(part, CurveProducts)]
@@ -491,4 +447,4 @@ def joined(parts: Sequence[Products], parameters: int) -> Products:
         slopes = [part.force_slopes for part in curves if part.force_slopes is not None]
         force = np.concatenate([part.force for part in curves])
         return CurveProducts(curves[0].lines, force, np.concatenate(slopes) if slopes else None)
-    return FrfProducts.joined([part for part in parts if isinstance(part, FrfProducts)], parameters)
+    return FrfProducts.joined([part for part in parts if isinstance(part, FrfProducts)])

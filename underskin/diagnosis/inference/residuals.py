@@ -102,7 +102,7 @@ def precision_of(hypothesis: Hypothesis) -> Floats:
 
 def information(explanation: Explanation, rows: Floats, noise: Explanation | None = None) -> Floats:
     """Jᵀ C⁻¹ J of changes of the force J (changes, samples), under the noise of the explanation or of another one."""
-    fitter = Fitter([explanation.best.hypothesis])
+    fitter = Fitter(explanation.best.hypothesis)
     covariance = (noise or explanation).point.covariance
     at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)))
     levels = fitter.levels(at.points.covariance[:, None])
@@ -162,7 +162,7 @@ def with_hidden_mechanism(
         fit[:, slices[mechanism]] = explanation.coordinates(mechanism)
     for column, parameter in zip(new, parameters, strict=True):
         fit[:, column] = [parameter.quantile(level) for level in levels[:, column - new.start].tolist()]
-    held = Fitter([hypothesis], held=new)
+    held = Fitter(hypothesis, held=new)
     at = _fitted(held, fit, explanation)
     if not len(at):
         return None
@@ -177,7 +177,7 @@ def with_hidden_mechanism(
         return NormalMixture.joined(
             [normals.times(share) for normals, share in zip(spread, shares.tolist(), strict=True)]
         )
-    row = int(np.searchsorted(np.flatnonzero(held.free[0]), index))
+    row = int(np.searchsorted(np.flatnonzero(held.free), index))
     deviation = np.sqrt([covariance[row, row] for covariance in covariances])
     return NormalMixture(shares, at.points.fit[:, index], deviation)
 
@@ -198,7 +198,7 @@ def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
     covariance, sensor_log_gain = (
         np.tile(values, (len(fit), 1)) for values in (point.covariance, point.sensor_log_gain)
     )
-    initial = held.evaluate(Points(np.zeros(len(fit), dtype=np.intp), fit, covariance, sensor_log_gain))
+    initial = held.evaluate(Points(fit, covariance, sensor_log_gain))
     fitted = held.descend(initial, 1, lambda at: np.full(len(at), cost + MAY_MATTER_NATS))
     return fitted[np.flatnonzero(fitted.cost < cost + MAY_MATTER_NATS)]
 

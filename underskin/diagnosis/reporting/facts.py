@@ -288,7 +288,7 @@ class Facts:
             return round(100 * float((pickup**2 / (pickup + noise)).sum() / pickup.sum()), 1)
         rest = tuple(other for other in self.shown.names if other != name)
         fitted = [candidate for candidate in (*self.search.explanations, *self.search.laws) if candidate.names == rest]
-        without = fitted[0] if fitted else problem.explain([Request(rest)])[0]
+        without = fitted[0] if fitted else problem.explain(Request(rest))
         assert without is not None  # a single request is never pruned
         scores = (*self.scores, cross_validation.in_sample(problem, without))
         floor = self.scores[1].noise / self.scores[1].size

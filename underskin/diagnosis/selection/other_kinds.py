@@ -182,7 +182,7 @@ class OtherKind:
                 Request(ordered, nuisances=start, never_pruned=True),
                 Request(ordered, parent, never_pruned=True),
             ]
-            fits = self.problem.explain(requests if parent else requests[:1])
+            fits = self.problem.explain_all(requests if parent else requests[:1])
             best = max(
                 (explanation for explanation in fits if explanation), key=lambda explanation: explanation.log_evidence
             )

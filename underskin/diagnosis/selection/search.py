@@ -108,22 +108,13 @@ class _Sets:
         """Add the explanations of sets that have none yet, from the first parent beside which the new mechanism
         shows."""
         self.tried |= {frozenset(request.names) for request in requests}
-        while requests:
-            first: dict[frozenset[str], Request] = {}
-            later = []
-            for request in requests:
-                names = frozenset(request.names)
-                if names in self.explanations:
-                    continue
-                if names in first:
-                    later.append(request)
-                else:
-                    first[names] = request
-            best = min((fitted.best.cost for fitted in self.explanations.values()), default=np.inf)
-            for names, explanation in zip(first, self.problem.explain(list(first.values()), best), strict=True):
-                if explanation is not None:
-                    self.explanations[names] = explanation
-            requests = later
+        best = min((fitted.best.cost for fitted in self.explanations.values()), default=np.inf)
+        for request in requests:
+            names = frozenset(request.names)
+            explanation = None if names in self.explanations else self.problem.explain(request, best)
+            if explanation is not None:
+                self.explanations[names] = explanation
+                best = min(best, explanation.best.cost)
 
     def grow(self, size: int) -> None:
         """Add sets of so many mechanisms: the best with one less, each with one more, and pairs that may cancel."""
@@ -181,8 +172,8 @@ class _Sets:
         requests = [
             Request(pair.names, nuisances=None if Adhesion.name in pair.names else best.point) for pair in pairs
         ]
-        for request, fitted in zip(requests, self.problem.explain(requests, best.best.cost), strict=True):
-            names = frozenset(request.names)
+        for request in requests:
+            names, fitted = frozenset(request.names), self.problem.explain(request, best.best.cost)
             before = self.explanations.get(names)
             if fitted is not None and (before is None or fitted.best.cost < before.best.cost - _STUCK):
                 self.explanations[names] = fitted
@@ -190,7 +181,7 @@ class _Sets:
 
 def smooth_error_gain(explanation: Explanation) -> float:
     """Nats that a smooth error brings an explanation of curves over the least one and rougher noise."""
-    fitter = Fitter([explanation.best.hypothesis])
+    fitter = Fitter(explanation.best.hypothesis)
     at = fitter.evaluate(fitter.at(explanation.point), slopes=False)
     points = at.points[np.zeros(len(_ROUGHER), dtype=np.intp)]
     covariance = points.covariance.copy()
@@ -219,7 +210,7 @@ def frf_problem(
         for name, mechanism in mechanisms.named.items()
         if name not in unsupported and "frf" in mechanism.kinds and mechanism.needs_lines
     ]
-    fits = problem.explain([Request(()), *(Request((name,)) for name in names)])
+    fits = problem.explain_all([Request(()), *(Request((name,)) for name in names)])
     null, *singles = fitted = [fit for fit in fits if fit is not None]
     moving_mean = [
         single

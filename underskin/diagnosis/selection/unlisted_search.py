@@ -424,7 +424,7 @@ def _fit_laws(problem: FittingProblem, chosen: Sequence[tuple[Explanation, Score
     for base, score in chosen:
         _add_to_mechanisms(problem, score)
         requests.append(Request((*base.names, score.law.name), base))
-    fits = problem.explain(requests) if requests else []
+    fits = problem.explain_all(requests)
     return [explanation for explanation in fits if explanation is not None]
 
 
@@ -451,7 +451,7 @@ def _with_named_mechanisms(problem: FittingProblem, search: Search, fitted: Sequ
             for name in problem.lines.mechanisms.named
             if name not in search.unsupported and frozenset((name, *explanation.names)) not in fitted_sets
         ]
-    fits = problem.explain(requests) if requests else []
+    fits = problem.explain_all(requests)
     return [explanation for explanation in fits if explanation is not None]
 
 
@@ -466,7 +466,7 @@ def _without_companions(problem: FittingProblem, fitted: Sequence[Explanation]) 
             if frozenset(rest) not in fitted_sets:
                 fitted_sets.add(frozenset(rest))
                 requests.append(Request(rest))
-    fits = problem.explain(requests) if requests else []
+    fits = problem.explain_all(requests)
     return [explanation for explanation in fits if explanation is not None]
 
 

@@ -154,7 +154,7 @@ class CampaignFits:
         supported = self.supported(names)
         if self._by_set.get(supported) is None:
             catalogue = self.problem.lines.mechanisms.named
-            (fit,) = self.problem.explain([Request(tuple(name for name in catalogue if name in supported))])
+            fit = self.problem.explain(Request(tuple(name for name in catalogue if name in supported)))
             self._by_set[supported] = fit
         return self._by_set[supported]
 

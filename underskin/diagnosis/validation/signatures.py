@@ -61,9 +61,9 @@ class Signatures:
     def __init__(self, problem: FittingProblem) -> None:
         """Predicted around the base model with the declared values."""
         self._problem = problem
-        self._fitter = Fitter([problem.hypothesis((), has_position_scatter=False)])
-        point = self._fitter.initial([np.zeros((1, 0))]).points.fit[0]
-        self._base = self._fitter.hypotheses[0].model.predict(point)
+        self._fitter = Fitter(problem.hypothesis((), has_position_scatter=False))
+        point = self._fitter.initial(np.zeros((1, 0))).points.fit[0]
+        self._base = self._fitter.model.predict(point)
         self.mechanisms: list[str] = []
         self.percent: list[float] = []
         self._values: list[tuple[Array, Lines]] = []  # of curves, whose smooth error depends on the explanation
@@ -104,7 +104,7 @@ class Signatures:
 
     def projection(self, levels: NoiseLevels) -> "Projection":
         """The information on the signatures under this noise, and what the nuisances d33, E and h absorb of them."""
-        nuisances = self._fitter.hypotheses[0].model.parameters
+        nuisances = self._fitter.model.parameters
         full, count = self._information(levels), len(nuisances)
         precision = [parameter.prior.sd**-2 if isinstance(parameter.prior, Normal) else 0.0 for parameter in nuisances]
         shared = full[count:, :count]
@@ -125,8 +125,8 @@ class Signatures:
     def _information(self, levels: NoiseLevels) -> Floats:
         """On the nuisances and then on all signatures."""
         hypothesis = self._problem.hypothesis((), has_position_scatter=levels.position > 0)
-        fitter = Fitter([hypothesis])
-        base = fitter.initial([np.zeros((1, 0))])
+        fitter = Fitter(hypothesis)
+        base = fitter.initial(np.zeros((1, 0)))
         gain, level, position, spread, smooth = (
             np.full((1, 1, 1), value)
             for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
@@ -399,8 +399,8 @@ def without_seating(
     if rows.recordings < len(campaign.recordings):
         return None
     problem = FittingProblem(rows, table)
-    (stiffening_fit,) = problem.explain([Request(tuple(names))])
-    (plain_fit,) = problem.explain([Request(tuple(name for name in names if name != StrainStiffening.name))])
+    stiffening_fit = problem.explain(Request(tuple(names)))
+    plain_fit = problem.explain(Request(tuple(name for name in names if name != StrainStiffening.name)))
     assert stiffening_fit is not None
     assert plain_fit is not None
     if stiffening_fit.log_evidence - plain_fit.log_evidence > SHOWS:

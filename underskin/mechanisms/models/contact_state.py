@@ -9,19 +9,16 @@ contact_curves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from underskin.autodiff import Differentiated, cbrt, chain, stacked
+from underskin.autodiff import Differentiated, cbrt, chain
 from underskin.mechanisms.models.frf_design import FrfDesign, Pickup
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves, CurveGrid
 from underskin.physics.elastic_layer import Layer
-from underskin.units import Floats, Indices
+from underskin.units import Floats
 
 
 @dataclass
@@ -42,31 +39,10 @@ class Contacts:
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the present radius, where a mechanism reads it
 
     @property
-    def optional(self) -> tuple[Differentiated | None, ...]:
-        """What only some mechanisms set: contacts are of one structure where the same of these are None."""
-        return self.slip, self.work_of_adhesion, self.relaxed, self.second_over_first
-
-    def at_points(self, subset: Indices | None) -> Contacts:
-        """At some of several points (points, contacts), at all for None."""
-        if subset is None:
-            return self
-        return self._with({name: x.at_points(subset) for name, x in self._differentiated().items()})
-
-    @classmethod
-    def stacked(cls, parts: Sequence[Contacts], points: Sequence[int]) -> Contacts:
-        """Contacts of the same structure at several sets of points, stacked; `points` is the size of each set."""
-        if len(parts) == 1:
-            return parts[0]
-        fields = [part._differentiated() for part in parts]
-        return parts[0]._with({name: stacked([values[name] for values in fields], points) for name in fields[0]})
-
-    def _with(self, changed: dict[str, Any]) -> Contacts:
-        other = copy(self)
-        vars(other).update(changed)
-        return other
-
-    def _differentiated(self) -> dict[str, Differentiated]:
-        return {name: value for name, value in vars(self).items() if isinstance(value, Differentiated)}
+    def share_a_layer(self) -> bool:
+        """Whether the linear layer, its Poisson ratio and its glue line, is the same at all points."""
+        layers = [x.value for x in (self.poisson_ratio, self.slip) if x is not None]
+        return all(bool((value == value.flat[0]).all()) for value in layers)
 
     @property
     def reduced_modulus(self) -> Differentiated:
