@@ -106,14 +106,14 @@ def _compared(effects: Effects) -> Compared:
 
 def _explained(problem: FittingProblem) -> list[Explanation]:
     # One by one, so that none is pruned because of the others.
-    results = [explanation for names in HYPOTHESES for explanation in [problem.explain(Request(names))]]
+    results = [problem.explain(Request(names)) for names in HYPOTHESES]
     return [fit for fit in results if fit is not None]
 
 
 def _sampled(problem: FittingProblem, explained: Explanation) -> Sampled:
     """Without positioning scatter and, where the diagnosis looked for it, with it."""
     plain, scattering = (
-        Fitter([problem.hypothesis(explained.names, has_position_scatter)]) for has_position_scatter in (False, True)
+        Fitter(problem.hypothesis(explained.names, has_position_scatter)) for has_position_scatter in (False, True)
     )
     without = nested(Posterior(plain, explained.point))
     if explained.p_position_scatter == 0:

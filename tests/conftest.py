@@ -23,6 +23,10 @@ settings.register_profile(
 )
 settings.load_profile("tests")
 
+for call in (httpx.Client.__init__, httpx.get, httpx.post, httpx.put, httpx.patch, httpx.delete, httpx.request):
+    assert call.__kwdefaults__ is not None
+    call.__kwdefaults__["timeout"] = httpx.Timeout(300)
+
 # To read all that a system trusts takes each client and command longer than its requests: looked up one by one instead.
 if Path("/etc/ssl/certs").is_dir():
     os.environ.pop("SSL_CERT_FILE", None)
@@ -75,7 +79,7 @@ def server_url(shared_server: Server) -> str:
 @pytest.fixture(scope="session")
 def http(shared_server: Server) -> Iterator[httpx.Client]:
     """A client of it."""
-    with httpx.Client(base_url=shared_server.url, timeout=60) as client:
+    with httpx.Client(base_url=shared_server.url, timeout=300) as client:
         yield client
 
 

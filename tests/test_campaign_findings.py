@@ -121,7 +121,7 @@ def own_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("document", "told"), [(BOTH, [YEAR, PLACE]), (COMPRESSION, [YEAR]), (recorded(), [])])
 def test_the_service_tells_them_of_what_comes_in(document: dict[str, Any], told: list[str], own_server: Server) -> None:
-    with httpx.Client(base_url=own_server.url, timeout=60) as http:
+    with httpx.Client(base_url=own_server.url, timeout=300) as http:
         kept = http.post("/v1/campaigns?skin=palm", json=document).json()
         assert kept["status"] == "ok"
         assert kept["findings"] == told
@@ -140,7 +140,7 @@ def test_import_tells_them(own_server: Server, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("document", "told"), [(BOTH, [YEAR, PLACE]), (COMPRESSION, [YEAR])])
 def test_upload_page_tells_before_anything_kept(document: dict[str, Any], told: list[str], own_server: Server) -> None:
     """The upload page tells them before anything is kept."""
-    with httpx.Client(base_url=own_server.url, headers=BROWSING, timeout=60) as browser:
+    with httpx.Client(base_url=own_server.url, headers=BROWSING, timeout=300) as browser:
         form = {"form_token": token_of(browser.get("/upload").text)}
         files = {"file": ("again.json", json.dumps({**document, "name": "looked at"}).encode())}
         page = browser.post("/upload", data=form, files=files, follow_redirects=True).text

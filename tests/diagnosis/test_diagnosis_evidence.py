@@ -72,8 +72,8 @@ def test_likelihood_whole_covariance_matrix(made: Made, has_position_scatter: bo
     problem = FittingProblem(lines(campaign(made, table)), table)
     hypothesis = problem.hypothesis(made.mechanisms, has_position_scatter, all_lines=True)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, made.parameters, strict=False)]
-    fitter, used = Fitter([hypothesis]), hypothesis.lines
-    at = fitter.initial([np.array([own])], slopes=True)
+    fitter, used = Fitter(hypothesis), hypothesis.lines
+    at = fitter.initial(np.array([own]), slopes=True)
     levels, curvature = fitter.levels(at.points.covariance).first, fitter.curvature
     factor = np.exp(0.5 * levels.position**2 * curvature.laplacian)[used.recording]
     prediction = hypothesis.model.predict(at.points.fit[0])
@@ -103,8 +103,8 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
     problem = FittingProblem(lines(campaign(made, table)), table)
     hypothesis = problem.hypothesis(names, has_position_scatter=False)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, values, strict=False)]
-    fitter = Fitter([hypothesis])
-    return laplace_at(fitter, fitter.improve(fitter.initial([np.array([own])]).points))[0]
+    fitter = Fitter(hypothesis)
+    return laplace_at(fitter, fitter.improve(fitter.initial(np.array([own])).points))
 
 
 @pytest.mark.parametrize(("names", "values"), [CASES[index] for index in first(3, (0, 1, 17, 10, 4))])

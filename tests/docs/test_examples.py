@@ -168,7 +168,7 @@ def test_labview_request_byte_for_byte(server_url: str) -> None:
     assert f"Content-Length: {len(body)}" in head
     address = urlsplit(server_url)
     head = head.replace("127.0.0.1:8000", address.netloc).replace("\n", "\r\n") + "\r\n\r\n"
-    with socket.create_connection((address.hostname, address.port), timeout=30) as connection:
+    with socket.create_connection((address.hostname, address.port), timeout=300) as connection:
         connection.sendall(head.encode())
         assert connection.recv(100).startswith(b"HTTP/1.1 100 Continue\r\n\r\n")
         connection.sendall(body.encode())

@@ -22,7 +22,7 @@ BODIES: dict[str, dict[str, Any]] = {
 
 def connect(server: Server) -> socket.socket:
     """A connection on which a test may say what no honest client would."""
-    return socket.create_connection(("127.0.0.1", httpx.URL(server.url).port or 0), timeout=30)
+    return socket.create_connection(("127.0.0.1", httpx.URL(server.url).port or 0), timeout=300)
 
 
 def read_answer(connection: socket.socket) -> tuple[int, dict[str, str], bytes]:

@@ -32,7 +32,7 @@ class InProcess:
     def client(self) -> httpx.AsyncClient:
         """A client of it."""
         transport = httpx.ASGITransport(AsgiMiddleware(self.api, self.gate, {}, problem_page))
-        return httpx.AsyncClient(transport=transport, base_url="http://localhost", timeout=60)
+        return httpx.AsyncClient(transport=transport, base_url="http://localhost", timeout=300)
 
 
 @contextmanager

@@ -64,7 +64,7 @@ async def load(url: str, seconds: int) -> Load:
             seen.wrong.append(f"{request.url}: {answer.status_code} {answer.text[:200]}")
 
     limits = httpx.Limits(max_connections=50, max_keepalive_connections=50)
-    async with httpx.AsyncClient(base_url=url, timeout=10, limits=limits) as client:
+    async with httpx.AsyncClient(base_url=url, timeout=300, limits=limits) as client:
         requests = mixed(client)
         expected = [(await client.send(request)).raise_for_status().content for request in requests]
         sigma = float(TABLE.sigma(1.7, 0.6, 0.01).sigma)

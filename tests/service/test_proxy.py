@@ -135,7 +135,7 @@ def raw(client: httpx.Client) -> Iterator[ssl.SSLSocket]:
     trust = ssl.create_default_context()
     trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
     with (
-        socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=120) as plain,
+        socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=300) as plain,
         trust.wrap_socket(plain, server_hostname=NAME) as connection,
     ):
         yield connection

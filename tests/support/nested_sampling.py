@@ -23,7 +23,7 @@ class Posterior:
     def __init__(self, fitter: Fitter, around: FitPoint) -> None:
         """`around` gives the place where the sensors' gains are linearised first."""
         self.fitter, self._around = fitter, around
-        hypothesis = fitter.hypotheses[0]
+        hypothesis = fitter.hypothesis
         self._places = hypothesis.mean_indices
         self._mean = [hypothesis.model.parameters[place] for place in self._places]
         self._covariance = [_quantiles(entry) for entry in fitter.covariance]

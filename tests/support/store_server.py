@@ -60,7 +60,7 @@ def running(place: Place, *, key: str | None = None, **settings: str) -> Iterato
     with log.open("ab") as stderr:
         process = preloaded.start(["serve", "--port", str(port)], environment, (0, 1, stderr.fileno()))
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", headers=headers, timeout=60) as client:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", headers=headers, timeout=300) as client:
             _wait_until_ready(client, process, log)
             yield Server(process, client, place)
     finally:

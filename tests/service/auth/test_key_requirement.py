@@ -18,7 +18,7 @@ on_sqlite = pytest.mark.parametrize("place", ["sqlite"], indirect=True)  # what 
 QUIET = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
 
 
-STRANGER = httpx.Client(timeout=60)
+STRANGER = httpx.Client(timeout=300)
 
 
 def anonymous(server: Server, path: str = "/v1/skins", accept: str = "*/*") -> httpx.Response:

@@ -28,7 +28,7 @@ def guarded(tmp_path: Path) -> Iterator[tuple[str, str]]:
 def tried(url: str, key: str, forwarded: str | None = None) -> httpx.Response:
     """The answer to the login page's form with this key; `forwarded`: what a proxy says of whom it is for."""
     headers = {"Origin": url, **BROWSING, **({} if forwarded is None else {"X-Forwarded-For": forwarded})}
-    with httpx.Client(base_url=url, headers=headers, timeout=60) as browser:
+    with httpx.Client(base_url=url, headers=headers, timeout=300) as browser:
         form = browser.get("/login")
         return browser.post("/login", data={"key": key, "form_token": token_of(form.text)})
 

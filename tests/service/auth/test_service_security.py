@@ -84,7 +84,7 @@ def keyed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Keyed]:
 @pytest.fixture
 def locked(keyed: Keyed) -> Iterator[httpx.Client]:
     """A client of it without a key."""
-    with httpx.Client(base_url=keyed.server.url, timeout=30) as client:
+    with httpx.Client(base_url=keyed.server.url, timeout=300) as client:
         yield client
 
 
@@ -158,7 +158,7 @@ def test_no_page_is_told_that_it_may_call(http: httpx.Client) -> None:
 
 
 def test_every_route_but_health_needs_a_key(keyed: Keyed, locked: httpx.Client) -> None:
-    with httpx.Client(base_url=keyed.server.url, headers=bearer(keyed.tokens["lab"]), timeout=60) as holder:
+    with httpx.Client(base_url=keyed.server.url, headers=bearer(keyed.tokens["lab"]), timeout=300) as holder:
         routes = all_routes(holder)
         document = holder.get("/openapi.json").json()
     assert document["security"] == [{"key": []}]

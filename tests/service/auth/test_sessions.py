@@ -52,7 +52,7 @@ def log_in(keyed: tuple[Server, dict[str, str]]) -> Iterator[Browser]:
 
         def logged_in(name: str, browser: str, at: Server = server) -> httpx.Client:
             headers = {**BROWSING, "User-Agent": browser, "Origin": str(at.http.base_url).rstrip("/")}
-            client = stack.enter_context(httpx.Client(base_url=at.http.base_url, headers=headers, timeout=60))
+            client = stack.enter_context(httpx.Client(base_url=at.http.base_url, headers=headers, timeout=300))
             form = {"form_token": token_of(client.get("/login").text), "key": keys[name]}
             assert client.post("/login", data=form).status_code == 303
             assert client.get("/").status_code == 200
@@ -211,13 +211,13 @@ def test_a_logout_during_a_look_is_kept(tmp_path: Path, monkeypatch: pytest.Monk
 
     def slowly(_: object) -> frozenset[str]:
         looking.set()
-        assert logged_out.wait(10)
+        assert logged_out.wait(240)
         return frozenset({"another"})
 
     monkeypatch.setattr(noted, "ended", slowly)
     look = threading.Thread(target=sessions.look)
     look.start()
-    assert looking.wait(10)
+    assert looking.wait(240)
     sessions.log_out(cookie, key)
     logged_out.set()
     look.join(10)

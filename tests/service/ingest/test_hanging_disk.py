@@ -35,7 +35,7 @@ def hanging_server(disk: HangingDisk, tmp_path_factory: pytest.TempPathFactory) 
 def send_by_page(server: Server, number: int) -> int:
     """As a browser does, in a session of its own."""
     files = [("file", (name, orjson.dumps(campaign(name)) + b" " * PADDED_BYTES)) for name in ("a.json", "b.json")]
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as browser:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as browser:
         form = {"form_token": token_of(browser.get("/upload").text), "skin": f"by page {number}"}
         return browser.post("/upload", data=form, files=files).status_code
 

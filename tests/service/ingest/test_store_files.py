@@ -174,7 +174,7 @@ def test_killed_server_sent_cleared_away(place: Place) -> None:
 
     def slow() -> Iterator[bytes]:
         yield b" " * 1_000_000
-        under_way.wait(30)
+        under_way.wait(240)
         yield b" "
 
     def send(http: httpx.Client) -> None:

@@ -83,7 +83,7 @@ def test_request_files_unfold_too_much_refused(small: Server, zeros: bytes) -> N
 
 @pytest.mark.soak
 def test_the_page_says_so_too(small: Server, zeros: bytes) -> None:
-    with httpx.Client(base_url=small.http.base_url, headers=BROWSING, timeout=60) as browser:
+    with httpx.Client(base_url=small.http.base_url, headers=BROWSING, timeout=300) as browser:
         form = {"form_token": token_of(browser.get("/upload").text)}
         place = browser.post("/upload", data=form, files=files(zeros, FITTING + 1)).headers["location"]
         form = {"form_token": token_of(browser.get(place).text), "skin": "by page"}

@@ -129,7 +129,7 @@ def test_server_ends_puts_back(place: Place) -> None:
         diagnosis_id = asked(server, sent(server, long()))
         (worker,) = await_workers(server, 1)
         server.process.send_signal(signal.SIGTERM)
-        server.process.wait(120)
+        server.process.wait(240)
         assert is_gone(worker)
     with running(place, **NONE) as server:
         assert found(server, diagnosis_id)["state"] == "queued"

@@ -50,7 +50,7 @@ def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 def is_well(server: Server) -> bool:
     """Whether `/health` answers, on a connection of its own."""
-    return httpx.get(f"{server.url}/health", timeout=10).status_code == 200
+    return httpx.get(f"{server.url}/health", timeout=60).status_code == 200
 
 
 def counted(server: Server, limit: str) -> float:
@@ -240,7 +240,7 @@ def test_refused_not_read_gives_way(locked: Server, begun: str) -> None:
     with ExitStack() as stack:
         connections = [one for _ in range(4) for one in opened(locked, CONNECTIONS, begun, stack)]
         deadline = time.monotonic() + 30
-        while httpx.get(f"{locked.url}/v1/tables", timeout=10).status_code != 401:
+        while httpx.get(f"{locked.url}/v1/tables", timeout=60).status_code != 401:
             assert time.monotonic() < deadline
             for connection in connections if begun is REFUSED else []:
                 with suppress(ConnectionError):
@@ -313,9 +313,9 @@ def test_health_answers_connections_descriptors(tmp_path: Path) -> None:
             with ExitStack() as stack:
                 for _ in range(13):
                     for _ in range(20):
-                        stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=30))
-                    assert httpx.get(f"{url}/health", timeout=30).status_code == 200
-                assert httpx.get(f"{url}/v1/tables", timeout=10).status_code == 200
+                        stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=300))
+                    assert httpx.get(f"{url}/health", timeout=300).status_code == 200
+                assert httpx.get(f"{url}/v1/tables", timeout=300).status_code == 200
             assert '"limit":"connections"' in log.read_text()
         finally:
             process.terminate()

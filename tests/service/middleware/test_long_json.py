@@ -81,7 +81,7 @@ class Beside:
             thread.join()
 
     def _ask(self) -> None:
-        with httpx.Client(base_url=self._server.url, timeout=120) as client:
+        with httpx.Client(base_url=self._server.url, timeout=300) as client:
             while not self._ending.is_set():
                 start = processor_s(self._server.process.pid)
                 assert client.get("/health").status_code == 200
@@ -191,7 +191,7 @@ def test_a_large_campaign_is_kept(server: Server) -> None:
     assert answer.status_code == 201
     entries = answer.json()["recordings"]
     assert {entry["status"] for entry in entries} == {"ok"}
-    kept = httpx.get(f"{server.url}/v1/campaigns/{answer.json()['id']}/document", timeout=120).json()
+    kept = httpx.get(f"{server.url}/v1/campaigns/{answer.json()['id']}/document", timeout=300).json()
     sent = {entry["id"]: entry for entry in json.loads(body)["recordings"]}
     assert len(kept["recordings"]) == len(sent)
     for entry in kept["recordings"][::100]:
@@ -204,7 +204,7 @@ def test_what_is_no_number_is_found_where_it_is(server: Server, wrong: str) -> N
     numbers = "0.25, " * 250_000
     body = f'{{"rt_over_h": 0.6,\n "a_over_h": [{numbers}{wrong}]}}'.encode()
     problem = problem_of(
-        httpx.post(server.url + "/v1/sigma", content=body, headers=JSON, timeout=60), 422 if "null" in wrong else 400
+        httpx.post(server.url + "/v1/sigma", content=body, headers=JSON, timeout=300), 422 if "null" in wrong else 400
     )
     place = len(' "a_over_h": [') + len(numbers)
     if "null" in wrong:
@@ -223,10 +223,10 @@ def test_fields_beside_long_column_mean(server: Server) -> None:
     """
     column = ", ".join(["0.2500000000000"] * 60_000)
     good = f'\n{{ "model" : "half_space", "a_over_h": [{column}], "rt_over_h":0.6, "load_parameter": 0 }} '
-    found = httpx.post(server.url + "/v1/sigma", content=good, headers=JSON, timeout=60).raise_for_status().json()
+    found = httpx.post(server.url + "/v1/sigma", content=good, headers=JSON, timeout=300).raise_for_status().json()
     assert (found["model"], len(found["sigma"]), len(set(found["sigma"]))) == ("half_space", 60_000, 1)
     odd = f'{{"a_over_h": [{column}], "rt_over_h": 0.6, "model": "\\"[{column}]"}}'
-    errors = problem_of(httpx.post(server.url + "/v1/sigma", content=odd, headers=JSON, timeout=60), 422)["errors"]
+    errors = problem_of(httpx.post(server.url + "/v1/sigma", content=odd, headers=JSON, timeout=300), 422)["errors"]
     assert [error["field"] for error in errors] == ["model"]
 
 

@@ -26,7 +26,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.fixture
 def client(small: Server) -> Iterator[httpx.Client]:
     """A client of it; whatever a test did, the server must be well afterwards."""
-    with httpx.Client(base_url=small.url, timeout=30) as opened:
+    with httpx.Client(base_url=small.url, timeout=300) as opened:
         yield opened
         assert opened.post("/v1/sigma", json=SIGMA).status_code == 200
 

@@ -104,7 +104,7 @@ def test_chunked_login_form_refused_once(keyed: Server) -> None:
 
 
 def test_a_login_form_of_a_sane_length_is_read(keyed: Server) -> None:
-    with httpx.Client(base_url=keyed.url, timeout=60) as client:
+    with httpx.Client(base_url=keyed.url, timeout=300) as client:
         (token,) = re.findall(r'name="form_token" value="([^"]+)"', client.get("/login").text)
         assert client.post("/login", data={"form_token": token, "key": "k" * 7000}).status_code == 401
 

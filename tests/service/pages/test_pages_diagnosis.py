@@ -243,7 +243,7 @@ def test_read_sees_no_button_changes_nothing(locked: tuple[Server, dict[str, str
     """Who may read only sees no button and changes nothing."""
     server, keys = locked
     diagnosis_id = asked(server, campaign_id := sent(server, resonant("locked"), "locked"))
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
         somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
         shown = somebody.get(f"/campaigns/{campaign_id}").text
         assert "Diagnose</button>" not in shown

@@ -51,7 +51,7 @@ def test_a_key_tells_who_it_is_whatever_is_typed(locked: tuple[Server, dict[str,
     server, keys = locked
     kept = server.http.post("/v1/campaigns", json=campaign("signed")).json()["id"]
     own = {"Origin": str(server.http.base_url).rstrip("/")}
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as writer:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as writer:
         writer.post("/login", data={"form_token": token_of(writer.get("/login").text), "key": keys["write"]})
         page = writer.get(f"/campaigns/{kept}").text
         assert 'name="who"' not in page

@@ -174,7 +174,7 @@ def test_sensors_in_one_place_have_their_views(server: Server) -> None:
 def test_two_ids_become_one_skin(server: Server) -> None:
     for name in ("left hand", "left-hand"):
         assert server.http.post("/v1/campaigns", json=campaign(name, id=name)).status_code == 201
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, follow_redirects=True, timeout=60) as lab:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, follow_redirects=True, timeout=300) as lab:
         form = {"form_token": token_of(lab.get("/skins/left%20hand").text), "other": "left-hand", "reason": "a slip"}
         joined = lab.post("/skins/left%20hand/join", data=form)
         assert "left-hand counts as this skin" in joined.text
@@ -266,7 +266,7 @@ def test_example_comes_back_once_withdrawn(tmp_path: Path) -> None:
     """The example comes back once all of it was withdrawn."""
     with (  # a server of its own: withdrawn campaigns stay
         running(Place(tmp_path)) as server,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as anyone,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as anyone,
     ):
         form = {"form_token": token_of(anyone.get("/").text)}
         anyone.post("/example", data=form)

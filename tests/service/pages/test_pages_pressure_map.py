@@ -87,7 +87,7 @@ def test_a_map_is_seen_computed_and_saved(visitor: Visit, server: Server) -> Non
 )
 def test_wrong_map_said_beside(server: Server, content: bytes, told: str) -> None:
     """What is wrong with a map is said beside it."""
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
         form = {"form_token": token_of(somebody.get("/loads/map").text), "thickness_mm": "2.25", "map": SMALL}
         answer = somebody.post("/loads/map", data=form, files={"file": ("pressed.csv", content)})
     assert answer.status_code == 200
@@ -96,7 +96,7 @@ def test_wrong_map_said_beside(server: Server, content: bytes, told: str) -> Non
 
 
 def test_much_more_than_a_map_is_not_taken(server: Server) -> None:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
         form = {"form_token": token_of(somebody.get("/loads/map").text)}
         answer = somebody.post("/loads/map", data=form, files={"file": ("a.csv", b"0,1,1\n" * 500_000)})
     assert answer.status_code == 413
@@ -105,11 +105,11 @@ def test_much_more_than_a_map_is_not_taken(server: Server) -> None:
 
 def test_map_needs_session_s_form_no_right_write(server: Server, locked: tuple[Server, dict[str, str]]) -> None:
     """A map needs the session s own form and no right to write."""
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
         assert somebody.post("/loads/map", files={"map": (None, SMALL)}).status_code == 403
     other, keys = locked
     own = {"Origin": str(other.http.base_url).rstrip("/")}
-    with httpx.Client(base_url=other.http.base_url, headers=BROWSING | own, timeout=60) as reader:
+    with httpx.Client(base_url=other.http.base_url, headers=BROWSING | own, timeout=300) as reader:
         reader.post("/login", data={"form_token": token_of(reader.get("/login").text), "key": keys["read"]})
         form = {"form_token": token_of(reader.get("/loads/map").text)}
         answer = reader.post("/loads/map", data=form, files={"map": (None, SMALL)})

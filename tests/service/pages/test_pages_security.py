@@ -16,7 +16,7 @@ from tests.support.store_server import Server, campaign
 
 @pytest.fixture
 def anyone(server: Server) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         yield client
 
 
@@ -45,7 +45,7 @@ def test_a_page_says_what_it_takes(anyone: httpx.Client) -> None:
 
 def test_a_form_of_another_session_is_refused(anyone: httpx.Client, server: Server) -> None:
     token = token_of(anyone.get("/").text)
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as other:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as other:
         assert other.post("/example", data={"form_token": token}).status_code == 403
         other.get("/")
         assert other.post("/example", data={"form_token": token}).status_code == 403
@@ -131,7 +131,7 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
 
 def test_who_may_read_only_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
     server, keys = locked
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as reader:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as reader:
         reader.post("/login", data={"form_token": token_of(reader.get("/login").text), "key": keys["read"]})
         start = reader.get("/").text
         assert "Load the example skin" not in start
@@ -147,7 +147,7 @@ def test_who_may_read_only_changes_nothing(locked: tuple[Server, dict[str, str]]
 def test_a_session_ends_with_its_key(locked: tuple[Server, dict[str, str]]) -> None:
     server, _ = locked
     key = server.place.command("key", "create", "guest").stdout.strip()
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as guest:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as guest:
         guest.post("/login", data={"form_token": token_of(guest.get("/login").text), "key": key})
         assert guest.get("/").status_code == 200
         server.place.command("key", "revoke", "guest")
@@ -175,6 +175,6 @@ def test_session_ends_time_nobody_move(locked: tuple[Server, dict[str, str]], mo
 def test_login_leads_nowhere_else(locked: tuple[Server, dict[str, str]]) -> None:
     server, keys = locked
     for place in ("//example.org", "https://example.org", "/\\example.org", "javascript:alert(1)"):
-        with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
+        with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
             form = {"form_token": token_of(somebody.get("/login").text), "key": keys["read"], "next": place}
             assert somebody.post("/login", data=form).headers["location"] == "/"

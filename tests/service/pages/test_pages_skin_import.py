@@ -50,7 +50,7 @@ def empty(server: Server, export: bytes) -> Server:
 
 @pytest.fixture
 def sender(empty: Server) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=empty.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=empty.http.base_url, headers=BROWSING, timeout=300) as client:
         yield client
 
 
@@ -173,8 +173,8 @@ def test_bringing_skin_needs_session_s_form_done(empty: Server, export: bytes) -
     """Bringing a skin in needs the session s own form and is done once."""
     server = empty
     with (
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as own,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as other,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as own,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as other,
     ):
         form, stolen = ({"form_token": token_of(client.get("/upload").text)} for client in (own, other))
         place = own.post("/upload", data=form, files={"file": ("skin.h5", export)}).headers["location"]
@@ -194,8 +194,8 @@ def test_who_may_read_only_brings_no_skin_in(locked: tuple[Server, dict[str, str
     server, keys = locked
     origin = {"Origin": str(server.http.base_url).rstrip("/")}
     with (
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=60) as writer,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=60) as somebody,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=300) as writer,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=300) as somebody,
     ):
         for client, key in ((writer, keys["write"]), (somebody, keys["read"])):
             client.post("/login", data={"form_token": token_of(client.get("/login").text), "key": key})

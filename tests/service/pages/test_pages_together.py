@@ -58,7 +58,7 @@ def test_what_is_outdated_is_diagnosed_again(server: Server) -> None:
     first, second, _ = sent_to(server, "changing", "a", "b", "c")
     with (
         Client(str(server.http.base_url)) as client,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as form,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as form,
     ):
         whole = client.skins.diagnose("changing", name="all of it")["id"]
         chosen = client.skins.diagnose("changing", [first, second], "two of it")["id"]
@@ -170,7 +170,7 @@ def test_fleet_skin_nothing_diagnose_refused(server: Server) -> None:
     sent_to(server, "bare-2", "c")
     with (
         Client(str(server.http.base_url)) as client,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as form,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as form,
     ):
         client.campaigns.withdraw(only, "wrong sphere")
         fields = {"form_token": token_of(form.get("/fleets").text), "find": "bare-", "name": "<b>batch"}

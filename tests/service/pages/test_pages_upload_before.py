@@ -12,7 +12,7 @@ from tests.support.store_server import Server, campaign
 
 def looked_at(server: Server, name: str, content: str, **fields: str) -> str:
     """The page of an upload."""
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         form = {"form_token": token_of(client.get("/upload").text), **fields}
         answer = client.post("/upload", data=form, files={"file": (name, content.encode())}, follow_redirects=True)
     assert answer.status_code == 200, answer.text

@@ -84,7 +84,7 @@ def decoded(values: Any) -> np.ndarray:
 
 @pytest.fixture
 def client(server: Server) -> Any:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as opened:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as opened:
         yield opened
 
 

@@ -26,7 +26,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 @contextmanager
 def browser(server: Server) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         yield client
 
 

@@ -46,7 +46,7 @@ channels: {force_n: {channel: Force}, charge_pc: {channel: Charge}}
 
 def test_stated_preload_held_against_force_file(server: Server) -> None:
     """A stated preload is held against the force of each file."""
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         form = {"form_token": token_of(client.get("/upload").text)}
         files = [("file", (f"{force}.tdms", shaken(force))) for force in (1.0, 2.0)]
         answer = client.post("/upload", data=form, files=[*files, ("rig", ("rig.yaml", RIG))], follow_redirects=True)

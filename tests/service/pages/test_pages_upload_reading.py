@@ -22,7 +22,7 @@ def upload(server: Server) -> Iterator[tuple[httpx.Client, str]]:
     """The session of an upload of binary files, which are read in processes of their own, and its address."""
     sent = server.http.post("/v1/campaigns", json=campaign("binary")).json()
     content = server.http.get(f"/v1/campaigns/{sent['id']}/document?format=hdf5").content
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=120) as browser:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as browser:
         form = {"form_token": token_of(browser.get("/upload").text)}
         files = [("file", (f"{number}.h5", content)) for number in range(FILES)]
         yield browser, browser.post("/upload", data=form, files=files).headers["location"]

@@ -17,7 +17,7 @@ from tests.support.store_server import Place, Server, campaign, running
 
 @pytest.fixture
 def sender(server: Server) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         yield client
 
 
@@ -51,7 +51,7 @@ def test_kept_twice_kept_once_discarded_taken(sender: httpx.Client, server: Serv
 
 def test_an_upload_is_its_session_s_own(sender: httpx.Client, server: Server) -> None:
     place = posted(sender)
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as other:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as other:
         form = {"form_token": token_of(other.get("/upload").text), "skin": "stolen"}
         assert other.get(place).status_code == 404
         for path in ("keep", "discard", "restore", "mapping"):
@@ -77,7 +77,7 @@ def test_an_upload_needs_the_session_s_own_form(sender: httpx.Client) -> None:
 
 def test_who_may_read_only_uploads_nothing(locked: tuple[Server, dict[str, str]]) -> None:
     server, keys = locked
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
         somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
         shown = somebody.get("/upload").text
         assert "may read only" in shown
@@ -95,7 +95,7 @@ def test_upload_beyond_limit_refused_page(tmp_path: Path) -> None:
     """An upload beyond the limit is refused on a page."""
     with (
         running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.1") as server,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody,
     ):
         form = {"form_token": token_of(somebody.get("/upload").text)}
         answer = somebody.post("/upload", data=form, files={"file": ("a.csv", b"1,2\n" * 50_000)})

@@ -33,7 +33,7 @@ FORM = {
 
 
 def kept_by_page(server: Server, text: str, skin: str) -> None:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         token = {"form_token": token_of(client.get("/upload").text)}
         address = client.post("/upload", data=token, files={"file": ("afm.txt", text.encode())}).headers["location"]
         token = {"form_token": token_of(client.get(address).text)}
@@ -51,7 +51,7 @@ def kept_by_page(server: Server, text: str, skin: str) -> None:
 def test_instrument_s_template_reads_next_file(server: Server) -> None:
     """An instrument s template reads its next file."""
     text = text_of_raw_curve(above="# template")
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         for day in ("monday", "tuesday"):
             token = {"form_token": token_of(client.get("/upload").text)}
             sent = {"file": (f"{day}.txt", f"{text}\n".encode())}
@@ -78,7 +78,7 @@ def test_depth_several_channels_not_flipped(server: Server) -> None:
 
     Height less deflection, of a height that falls, is no depth turned round: the modulus would be wrong.
     """
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         token = {"form_token": token_of(client.get("/upload").text)}
         text = text_of_raw_curve(above="# not flipped").encode()
         address = client.post("/upload", data=token, files={"file": ("afm.txt", text)}).headers["location"]

@@ -222,7 +222,7 @@ def test_the_document_stays_the_same(http: httpx.Client, document: dict[str, Any
 def test_key_asked_document_needed(document: dict[str, Any], locked: Server) -> None:
     """A key is asked for in the document where one is needed."""
     assert "security" not in document
-    with httpx.Client(base_url=locked.url, headers=authorization(locked), timeout=60) as client:
+    with httpx.Client(base_url=locked.url, headers=authorization(locked), timeout=300) as client:
         described = client.get("/openapi.json").json()
     assert described["security"] == [{"key": []}]
     assert described["components"]["securitySchemes"]["key"]["scheme"] == "bearer"

@@ -99,8 +99,8 @@ def test_health_answered_large_batch_computed(server_url: str) -> None:
     """Health is answered while a large batch is computed."""
     rows = 400_000
     body = {"a_over_h": np.linspace(0, 3, rows).tolist(), "rt_over_h": 0.6, "load_parameter": 0.01}
-    with ThreadPoolExecutor(1) as threads, httpx.Client(base_url=server_url, timeout=60) as client:
-        batch = threads.submit(httpx.post, f"{server_url}/v1/sigma", json=body, timeout=60)
+    with ThreadPoolExecutor(1) as threads, httpx.Client(base_url=server_url, timeout=300) as client:
+        batch = threads.submit(httpx.post, f"{server_url}/v1/sigma", json=body, timeout=300)
         answered = 0
         while not batch.done():
             answered += client.get("/health").status_code == 200

@@ -65,7 +65,7 @@ def test_the_doctor_sees_a_damaged_store(tmp_path: Path) -> None:
         for number in range(4):
             sent(server, campaign(f"kept {number}", lines=200))
         server.process.terminate()
-        server.process.wait(30)
+        server.process.wait(240)
     file = folder / "underskin.sqlite3"
     content = bytearray(file.read_bytes())
     content[8192 : len(content) // 2] = os.urandom(len(content) // 2 - 8192)

@@ -54,7 +54,7 @@ def test_it_is_noticed_and_taken_up_again(cluster: Cluster, tmp_path: Path) -> N
             assert httpx.post(f"{url}/v1/campaigns", json=campaign("lost"), timeout=NOTICED_S).status_code == 503
             network.mend()
             deadline = time.monotonic() + 60
-            while httpx.get(f"{url}/ready", timeout=60).status_code != 200:
+            while httpx.get(f"{url}/ready", timeout=300).status_code != 200:
                 assert time.monotonic() < deadline
                 time.sleep(0.5)
             assert server.http.post("/v1/campaigns", json=campaign("after")).status_code == 201

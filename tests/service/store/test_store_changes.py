@@ -16,7 +16,7 @@ BACKEND = "postgresql"
 
 @pytest.fixture
 def lab(server: Server) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         yield client
 
 
@@ -188,7 +188,7 @@ def test_import_skin_put_away_brings_back(server: Server, elsewhere: Server, lab
     assert change(lab, f"/campaigns/{first}", "withdraw", reason="a trial") == 303
     imported()
     assert listed() == ["palm"]
-    with httpx.Client(base_url=elsewhere.http.base_url, headers=BROWSING, timeout=60) as there:
+    with httpx.Client(base_url=elsewhere.http.base_url, headers=BROWSING, timeout=300) as there:
         assert change(there, "/skins/palm", "discard", reason="a trial") == 303
         assert listed() == []
         imported()  # with nothing new

@@ -28,7 +28,7 @@ def test_what_was_acknowledged_survives_any_kill(place: Place, part: int) -> Non
             for thread in threads:
                 thread.start()
             if kill % 4:  # mostly amid the stream, else before or as it sets in
-                streams[0].flowing.wait(20)
+                streams[0].flowing.wait(240)
             time.sleep(moments.uniform(0.0, 0.6))
             server.kill()
             for thread in threads:

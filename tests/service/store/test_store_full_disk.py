@@ -92,7 +92,7 @@ def test_who_has_a_key_can_log_in_to_read(small_disk: Path) -> None:
                     while file.write(size * b"x") == size:
                         pass
         url = str(server.http.base_url)
-        with httpx.Client(base_url=url, headers={"Origin": url, **BROWSING}, timeout=60) as browser:
+        with httpx.Client(base_url=url, headers={"Origin": url, **BROWSING}, timeout=300) as browser:
             form = token_of(browser.get("/login").text)
             assert browser.post("/login", data={"key": key, "form_token": form}).status_code == 303
             assert browser.get("/").status_code == 200

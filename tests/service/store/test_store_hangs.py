@@ -15,7 +15,7 @@ from tests.support.store_server import Server
 def test_answered_example_waits_store(server: Server) -> None:
     """Others are answered while the example waits for the store."""
     with (
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as browser,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as browser,
         psycopg.connect(server.place.database_url) as locking,
         ThreadPoolExecutor(1) as pool,
     ):

@@ -39,7 +39,7 @@ def on_a_terminal(place: Place, *arguments: str) -> str:
             break
         shown += part
     os.close(ours)
-    assert process.wait(60) == 0, shown.decode()
+    assert process.wait(240) == 0, shown.decode()
     return re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.decode())
 
 

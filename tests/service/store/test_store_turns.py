@@ -41,7 +41,7 @@ def test_readers_are_answered_while_writers_wait(server: Server) -> None:
     document = {"recording": campaign("excluded")["recordings"][0]["id"], "reason": "slipped"}
 
     def write() -> int:
-        return httpx.post(path, json=document, timeout=60).status_code
+        return httpx.post(path, json=document, timeout=300).status_code
 
     with ThreadPoolExecutor(WRITERS) as pool:
         with locked(server.place):
@@ -63,7 +63,7 @@ def test_files_read_uploads_wait_writers(server: Server) -> None:
     url = str(server.http.base_url)
 
     def send(number: int) -> int:
-        return httpx.post(f"{url}/v1/campaigns", json=campaign(f"waiting {number}"), timeout=60).status_code
+        return httpx.post(f"{url}/v1/campaigns", json=campaign(f"waiting {number}"), timeout=300).status_code
 
     with ThreadPoolExecutor(WRITERS) as pool:
         with locked(server.place):

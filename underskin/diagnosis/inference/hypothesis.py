@@ -317,7 +317,7 @@ class Evaluated:
     @property
     def best(self) -> "Evaluated":
         """The point of least cost."""
-        return self[[int(np.argmin(self.cost))]]
+        return self[np.array([np.argmin(self.cost)])]
 
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
