@@ -104,17 +104,18 @@ class _Sets:
         """In the order of the catalogue."""
         return tuple(name for name in self.problem.lines.mechanisms.named if name in names)
 
-    def explain(self, requests: Sequence[Request]) -> None:
-        """Add the explanations of sets that have none yet, from the first parent beside which the new mechanism
-        shows."""
+    def explain(self, requests: Sequence[Request], *, however_far: bool = False) -> None:
+        """Add the explanations of sets that have none yet, from the first parent beside which the new mechanism shows;
+        those far behind the best too if `however_far`."""
         self.tried |= {frozenset(request.names) for request in requests}
-        best = min((fitted.best.cost for fitted in self.explanations.values()), default=np.inf)
+        costs = [] if however_far else [fitted.best.cost for fitted in self.explanations.values()]
+        best = min(costs, default=np.inf)
         for request in requests:
             names = frozenset(request.names)
             explanation = None if names in self.explanations else self.problem.explain(request, best)
             if explanation is not None:
                 self.explanations[names] = explanation
-                best = min(best, explanation.best.cost)
+                best = best if however_far else min(best, explanation.best.cost)
 
     def grow(self, size: int) -> None:
         """Add sets of so many mechanisms: the best with one less, each with one more, and pairs that may cancel."""
@@ -132,14 +133,16 @@ class _Sets:
         ]
         if size == 2:
             requests += self._pairs([name for name in self.names if mechanisms[name].stage in _PAIRED])
+        self.explain(requests)
         if size == 3 and self.contact:
             best = max(self.explanations.values(), key=self.search.log_weight)
-            requests += [
-                Request(self.ordered(self.contact | {name}), never_pruned=True)
+            parent = self.explanations.get(self.contact)
+            beside = [
+                Request(self.ordered(self.contact | {name}), parent)
                 for name in self.names
                 if name not in self.contact and (name in best.names or mechanisms[name].stage in _PAIRED)
             ]
-        self.explain(requests)
+            self.explain(beside, however_far=True)
 
     def _pairs(self, names: Sequence[str]) -> list[Request]:
         """Every pair, from the better of its two."""

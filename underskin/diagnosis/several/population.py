@@ -422,4 +422,4 @@ def _explained(problem: FittingProblem, sets: Sequence[set[str]]) -> list[Explan
     """Explanations of the sets, None where one is far less probable than the others; the first is not compared."""
     catalogue = problem.lines.mechanisms.named
     requests = [Request(tuple(name for name in catalogue if name in names)) for names in sets]
-    return problem.explain_all(requests)
+    return [*problem.explain_all(requests[:1]), *problem.explain_all(requests[1:])]
