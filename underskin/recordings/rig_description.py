@@ -31,8 +31,12 @@ from underskin.errors import (
     InvalidInput,
     Mention,
     Requirement,
+    SeveralInvalid,
+    all_of,
     conflicting,
+    errors_of,
     not_one_of,
+    noting,
     out_of_range,
     required,
     too_few,
@@ -46,7 +50,6 @@ from underskin.recordings.readers.expressions import Expression
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.validation import mapping, named, shown
-from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
 from underskin.units import LAB
 
 _FULL_PERCENT = 100.0  # %

@@ -16,10 +16,9 @@ from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
-from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
+from underskin.errors import InvalidInput, UnderskinError, all_of, noting, out_of_range, wrong_type
 from underskin.findings.codes import Reason
 from underskin.recordings.validation import not_negative
-from underskin.several_errors import all_of, noting
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000

@@ -18,8 +18,7 @@ from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, qu
 from service.problems import parsed
 from service.schemas.design import DesignDemand
 from service.usecases.design_search import NEARLY, Offer, Searched, search
-from underskin.errors import UnderskinError
-from underskin.several_errors import noting
+from underskin.errors import UnderskinError, noting
 
 router = APIRouter(prefix="/design/search")
 
