@@ -31,10 +31,16 @@ from underskin.inversion.many_sensors import ROBUST
 from underskin.inversion.mixed_model import SDS_OF_95, Estimate, LevelRows, MixedModel
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter
-from underskin.prediction import plausibility, pressed_skin
-from underskin.prediction.declared_values import UNUSED_FOR_D33, unlikely
-from underskin.prediction.exchanged_values import exchanged_values
-from underskin.prediction.pressed_skin import DECLARED, declared_skin, log_slopes, transmission, usable
+from underskin.prediction import pressed_skin
+from underskin.prediction.pressed_skin import (
+    DECLARED,
+    declared_skin,
+    exchanged_values,
+    log_slopes,
+    transmission,
+    usable,
+)
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
 from underskin.recordings.frf.estimation import common_delay, exchanged_channels, lines_of, without_delay
 from underskin.recordings.frf.flat_zone import (
@@ -48,7 +54,7 @@ from underskin.recordings.frf.flat_zone import (
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
-from underskin.recordings.plausibility import at_reading
+from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.units import Floats, Indices, Mask, force_unit, to_lab, to_si, unusual

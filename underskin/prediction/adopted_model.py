@@ -21,8 +21,8 @@ from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE, current_name
 from underskin.mechanisms.unlisted.grammar import CAMPAIGN_SPECIFIC_AXES, Grammar, bound_to
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
-from underskin.prediction import plausibility
 from underskin.prediction.forward_model import needed_fields, require_fields
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, SkinDescription, frf_of, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table

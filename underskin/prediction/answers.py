@@ -15,9 +15,9 @@ from underskin.findings.formatting import significant
 from underskin.physics import half_space
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter, Skin
-from underskin.prediction import plausibility
 from underskin.prediction.columns import rows
 from underskin.prediction.pressed_skin import Transmission, Words, in_words, of_numbers, of_pressed, transmission
+from underskin.recordings import plausibility
 from underskin.surrogate.contact_model import ContactModel, ContactName
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.surrogate.solved_contact import contact_model

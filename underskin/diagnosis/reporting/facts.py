@@ -36,7 +36,7 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.expressions import CurveLaw
 from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
-from underskin.prediction import plausibility
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign
 
 _STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})
