@@ -16,7 +16,7 @@ from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, instrument_templates, skins
 from underskin.errors import FileError, InvalidInput, SeveralInvalid, conflicting, errors_of, required
-from underskin.findings.alike import grouped_by_reason, recordings_called, why_refused
+from underskin.findings.formatting import grouped_by_reason, recordings_called, why_refused
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.frf.estimators import Estimator

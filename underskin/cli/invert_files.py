@@ -20,8 +20,7 @@ from rich.text import Text
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
-from underskin.findings.alike import grouped_by_reason, recordings_called
-from underskin.findings.formatting import significant
+from underskin.findings.formatting import grouped_by_reason, recordings_called, significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
 from underskin.inversion.invert import Inversion, invert

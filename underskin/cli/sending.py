@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from underskin.errors import UnderskinError
-from underskin.findings.alike import grouped_by_reason, why_refused
-from underskin.findings.formatting import significant
+from underskin.findings.formatting import grouped_by_reason, significant, why_refused
 
 if TYPE_CHECKING:
     from underskin.client.campaigns import SentFile

@@ -40,9 +40,8 @@ from underskin.diagnosis.validation.signatures import (
     remaining_confounding,
     without_seating,
 )
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, ActiveCatalogue
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem

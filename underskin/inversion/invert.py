@@ -23,9 +23,9 @@ from scipy.special import chdtrc, stdtr
 from underskin.errors import InvalidInput
 from underskin.findings import english
 from underskin.findings.codes import Reason
+from underskin.findings.english import ImplausibleD33
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
-from underskin.findings.sentences import ImplausibleD33
 from underskin.inversion import mixed_model
 from underskin.inversion.many_sensors import ROBUST
 from underskin.inversion.mixed_model import SDS_OF_95, Estimate, LevelRows, MixedModel

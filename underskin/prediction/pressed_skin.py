@@ -7,7 +7,7 @@ equations 7 to 16), and `solved`, a sphere in frictionless contact with that lay
 
 `in_words` says which limit a row outside the domain exceeds, `L = 1.17 exceeds 0.1: at most 25.6 N`; `reasons` why a
 recording cannot be used; `declared_skin` and `log_slopes` relate the FRF to the declared values.
-"""""
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -28,10 +28,9 @@ from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLa
 from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
-from underskin.findings.codes import FindingCode
+from underskin.findings.codes import FindingCode, Lack, Lacking
 from underskin.findings.english import lacking
 from underskin.findings.formatting import clause, in_digits, in_percent, of_clauses, small
-from underskin.findings.lacking import Lack, Lacking
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.curves import CurveModel

@@ -27,9 +27,8 @@ from underskin.diagnosis.slips.unit_errors import (
     single_unit_errors,
     unlikely_d33,
 )
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.models.composed import compose
 from underskin.prediction.pressed_skin import exchanged_values
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
