@@ -19,7 +19,7 @@ from underskin import ExtensionError, InvalidInput, extensions
 from underskin.mechanisms import CATALOGUE, FrfState, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.base import AXES, READS, UNITS
 from underskin.mechanisms.contract import check
-from underskin.mechanisms.models.frf_design import Pickup, together
+from underskin.mechanisms.models.contact_state import Pickup, together
 from underskin.mechanisms.parameter import ActsOn
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in

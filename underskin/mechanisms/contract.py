@@ -15,9 +15,9 @@ from underskin.extensions import described
 from underskin.mechanisms import base
 from underskin.mechanisms.base import Kind, Mechanism, Stage
 from underskin.mechanisms.models.composition import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
+from underskin.mechanisms.models.contact_state import joined
 from underskin.mechanisms.models.curves import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.models.frf_design import joined
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign

@@ -34,9 +34,8 @@ from underskin.diagnosis.selection.gain_residual import GainResidual
 from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unlisted.axes import Axis
 from underskin.mechanisms.unlisted.expressions import CurveLaw, Extent, curve_laws, of_samples
-from underskin.mechanisms.unlisted.forms import Shape
+from underskin.mechanisms.unlisted.forms import Axis, Shape
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw, Grammar, combination
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.recordings.campaign import curves_of

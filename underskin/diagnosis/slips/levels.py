@@ -36,7 +36,7 @@ from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unlisted.axes import axes_of, recording_order
+from underskin.mechanisms.unlisted.forms import axes_of, recording_order
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, offsets
 from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable

@@ -6,8 +6,7 @@ import numpy as np
 
 from underskin.errors import conflicting
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.models.frf_design import LARGEST_OFFSET_MM
+from underskin.mechanisms.models.contact_state import LARGEST_OFFSET_MM, FrfState
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.campaign import Conditions, frf_of, offsets
 

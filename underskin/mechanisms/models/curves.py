@@ -24,8 +24,8 @@ from underskin.mechanisms.models.composition import (
     modulus_parameter,
     required_modulus,
 )
+from underskin.mechanisms.models.contact_state import Pickup
 from underskin.mechanisms.models.curve_state import Curve, memories, numbers
-from underskin.mechanisms.models.frf_design import Pickup
 from underskin.mechanisms.parameter import Parameter
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.physics.uniaxial import neo_hookean, stiffening

@@ -19,8 +19,7 @@ from underskin.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Kind, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve, SampleLaw, Samples
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unlisted.axes import Axis
-from underskin.mechanisms.unlisted.forms import EVERYWHERE, Feature, Shape, reference, shapes
+from underskin.mechanisms.unlisted.forms import EVERYWHERE, Axis, Feature, Shape, reference, shapes
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
 from underskin.mechanisms.unlisted.laws import PREFIX, LagLaw, LawDescription, RecordingLaw, UnlistedLaw, changes
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, AXES, ActsOn, Form

@@ -22,8 +22,7 @@ from underskin.autodiff import Differentiated, exp, log
 from underskin.mechanisms.base import Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.mechanisms.unlisted.axes import Axis, axes_of, every_axis
-from underskin.mechanisms.unlisted.forms import Shape, constant, shapes
+from underskin.mechanisms.unlisted.forms import Axis, Shape, axes_of, constant, every_axis, shapes
 from underskin.mechanisms.unlisted.laws import (
     LAG_KINDS,
     PREFIX,

@@ -24,8 +24,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unlisted.axes import Axis
-from underskin.mechanisms.unlisted.forms import Feature, Shape
+from underskin.mechanisms.unlisted.forms import Axis, Feature, Shape
 from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form, acted_on, followed
 from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
