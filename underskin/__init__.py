@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from underskin.diagnosis.diagnose import diagnose, diagnose_fleet, diagnose_together
     from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.inversion.invert import Inversion, invert
-    from underskin.physics.charge_response import Sigma
-    from underskin.physics.skin import Indenter, Skin
+    from underskin.physics.charge_response import Indenter, Sigma, Skin
     from underskin.prediction.forward_model import Predicted, predict
     from underskin.prediction.pressed_skin import Transmission, transmission
     from underskin.recordings.campaign import Campaign, Conditions, SkinDescription, frf_conditions

@@ -40,7 +40,7 @@ def field(
     import numpy as np
 
     from underskin.cli import columns
-    from underskin.physics.skin import INCOMPRESSIBLE
+    from underskin.physics.charge_response import INCOMPRESSIBLE
     from underskin.prediction.answers import lab_columns
     from underskin.prediction.stress_field import field_from_lab
     from underskin.surrogate.sigma_table import load_table

@@ -29,8 +29,7 @@ from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
 from underskin.inversion.many_sensors import ROBUST
 from underskin.inversion.mixed_model import SDS_OF_95, Estimate, LevelRows, MixedModel
-from underskin.physics.charge_response import gain
-from underskin.physics.skin import Indenter
+from underskin.physics.charge_response import Indenter, gain
 from underskin.prediction import pressed_skin
 from underskin.prediction.pressed_skin import (
     DECLARED,

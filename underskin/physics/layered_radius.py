@@ -1,6 +1,6 @@
 """The radius of a sphere's frictionless contact with the bonded incompressible linear layer at a given force.
 
-With α = a/h and P = F R/(E' h³): P = (4/3) α³ A(α), where A, 1 at α = 0, is exact at nodes (contact_integral_equation)
+With α = a/h and P = F R/(E' h³): P = (4/3) α³ A(α), where A, 1 at α = 0, is exact at nodes (contact_curves)
 and interpolated by a spline. Beyond the last node α is continued as a power of P, sufficient to state how far a contact
 is beyond a limit.
 """
@@ -8,8 +8,7 @@ is beyond a limit.
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H
-from underskin.physics.contact_integral_equation import ContactEquation
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactEquation
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 

@@ -13,8 +13,7 @@ from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
 from underskin.physics import half_space
-from underskin.physics.charge_response import gain
-from underskin.physics.skin import Indenter, Skin
+from underskin.physics.charge_response import Indenter, Skin, gain
 from underskin.prediction.columns import rows
 from underskin.prediction.pressed_skin import Transmission, Words, in_words, of_numbers, of_pressed, transmission
 from underskin.recordings import plausibility

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.physics import charge_response, hertz
-from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
+from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
 from underskin.recordings.campaign import FrfRecording, SkinDescription
 from underskin.surrogate.contact_model import ContactModel
 from underskin.units import GRAM_FORCE, Floats, Mask, to_si

@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.physics import charge_response, elastic_layer
-from underskin.physics.contact_integral_equation import ContactEquation
+from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
+from underskin.physics.contact_curves import ContactEquation
 from underskin.physics.contact_pressure import SpherePressure
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.layer_stress import layer_stress
-from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
 from underskin.prediction.pressed_skin import Transmission, in_words, of_pressed, transmission
 from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, checked

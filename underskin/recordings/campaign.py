@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from underskin import errors
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, out_of_range, too_few, wrong_type
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import validation as field
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.validation import Further, shown

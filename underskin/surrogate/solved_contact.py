@@ -1,6 +1,6 @@
 """A rigid sphere in frictionless contact with the bonded incompressible layer itself, as a contact model: `solved`.
 
-The contact of the linear layer at the given force is exact (contact_integral_equation): its radius α = a/h, the
+The contact of the linear layer at the given force is exact (contact_curves): its radius α = a/h, the
 transform p̂ of its pressure, and with M of the bonded layer the stress on the base (hankel_transform). What finite
 strain adds is in the contact table, over α and L^(1/3), L = F/(R² E):
 
@@ -17,11 +17,11 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 from scipy.special import j0
 
-from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
+from underskin.physics.charge_response import INCOMPRESSIBLE
+from underskin.physics.contact_curves import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
 from underskin.physics.layered_radius import LayeredRadius
-from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.surrogate.contact_model import ContactModel, ContactName, ContactRadius
 from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
 from underskin.surrogate.sigma_table import SigmaTable

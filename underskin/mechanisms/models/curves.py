@@ -27,7 +27,7 @@ from underskin.mechanisms.models.composition import (
 from underskin.mechanisms.models.contact_state import Pickup
 from underskin.mechanisms.models.curve_state import Curve, memories, numbers
 from underskin.mechanisms.parameter import Parameter
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.uniaxial import neo_hookean, stiffening
 from underskin.recordings.campaign import (
     CompressionConditions,
