@@ -18,7 +18,7 @@ from underskin.recordings import validation as field
 from underskin.recordings.campaign import Sensors
 from underskin.recordings.readers import json_file
 from underskin.recordings.validation import shown
-from underskin.surrogate.contact_model import ContactName
+from underskin.surrogate.sigma_table import ContactName
 from underskin.units import Floats
 
 MOST_CONTACTS = 1000

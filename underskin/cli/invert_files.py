@@ -30,8 +30,7 @@ from underskin.recordings import plausibility, validation
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.reading import Reading, join, read_file
 from underskin.recordings.rig_description import RigDescription
-from underskin.surrogate.contact_model import ContactName
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import ContactName, SigmaTable, load_table
 from underskin.surrogate.solved_contact import contact_model
 from underskin.units import to_lab
 

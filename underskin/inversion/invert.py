@@ -54,8 +54,8 @@ from underskin.recordings.frf.flat_zone import (
 from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
-from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
+from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import Floats, Indices, Mask, force_unit, to_lab, to_si, unusual
 
 _DEAD = 0.05  # of the array's d33

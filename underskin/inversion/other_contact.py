@@ -5,8 +5,7 @@ from underskin.inversion.invert import Inversion, invert
 from underskin.inversion.mixed_model import Estimate
 from underskin.prediction.answers import OTHER, STATED
 from underskin.recordings.campaign import Campaign
-from underskin.surrogate.contact_model import ContactName
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.sigma_table import ContactName, SigmaTable
 from underskin.surrogate.solved_contact import contact_model
 
 

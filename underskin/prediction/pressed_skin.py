@@ -21,7 +21,7 @@ from underskin.findings.finding import Finding
 from underskin.physics import charge_response, hertz
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
 from underskin.recordings.campaign import FrfRecording, SkinDescription
-from underskin.surrogate.contact_model import ContactModel
+from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import GRAM_FORCE, Floats, Mask, to_si
 
 

@@ -25,7 +25,7 @@ from underskin.physics.contact_pressure import SpherePressure
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.layer_stress import layer_stress
 from underskin.prediction.pressed_skin import Transmission, in_words, of_pressed, transmission
-from underskin.surrogate.contact_model import ContactModel
+from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import Floats, checked
 
 _AROUND_CONTACT, _AROUND_SENSOR, _LEAST = 2.0, 1.0, 3.0  # thicknesses that a section shows
