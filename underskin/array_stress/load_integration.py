@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from underskin.physics.contact_pressure import SpherePressure
-from underskin.surrogate.influence_table import Influence, SensorStress
+from underskin.surrogate.tables import Influence, SensorStress
 from underskin.units import Floats
 
 _FINE_CELL = 0.02  # of the thickness: below, one point a cell; γ varies over lengths of about 0.3

@@ -10,7 +10,7 @@ from underskin.errors import InvalidInput, unusable
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.recordings.curve_preparation import prepared, reject_exchanged_columns
 from underskin.recordings.modulus import CompressionModulus, IndentationModulus, of_compression, of_indentation
-from underskin.surrogate.contact_table import load_contact
+from underskin.surrogate.tables import load_contact
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ Seminara 2018, equation 16). Rows outside the domain are NaN, never extrapolated
 """
 
 import math
-import os
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -22,7 +21,7 @@ from scipy.interpolate import make_interp_spline
 from underskin.autodiff import contiguous
 from underskin.physics import hertz
 from underskin.physics.charge_response import Sigma
-from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Table
+from underskin.surrogate.tables import SIGMA_SCHEMA, Table, tables_folder
 from underskin.surrogate.tensor_spline import TensorSpline
 from underskin.units import Floats
 
@@ -219,16 +218,6 @@ class SigmaTable(ContactModel, Table):
     def load_over_cube(self, a_over_h: Floats) -> tuple[Floats, Floats]:
         """4/3 and 1/3, by Hertz."""
         return np.full_like(a_over_h, 4 / 3), np.full_like(a_over_h, 1 / 3)
-
-
-def tables_folder() -> Path:
-    """The folder of the tables: `UNDERSKIN_TABLES`, else in the installed package, else next to it in a checkout."""
-    override = os.environ.get("UNDERSKIN_TABLES")
-    if override:
-        return Path(override)
-    package = Path(__file__).parents[1]
-    shipped = package / "tables"
-    return shipped if shipped.is_dir() else package.parent / "tables"
 
 
 def load_table(path: Path | None = None) -> SigmaTable:

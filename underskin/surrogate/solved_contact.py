@@ -22,8 +22,8 @@ from underskin.physics.contact_curves import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
 from underskin.physics.layered_radius import LayeredRadius
-from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
 from underskin.surrogate.sigma_table import ContactModel, ContactName, ContactRadius, SigmaTable
+from underskin.surrogate.tables import CONTACT_TABLE, ContactTable, load_contact
 from underskin.units import Floats
 
 _RHO = 3.0 * np.linspace(0.0, 1.0, 65) ** 1.5  # rT/h of the nodes: as far as the σ table's
