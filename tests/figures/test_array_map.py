@@ -7,7 +7,7 @@ import pytest
 from underskin.figures.array_discs import disc_size
 from underskin.figures.array_map import D33, Quantity, array_map, significance_note
 from underskin.figures.loads import loaded_array
-from underskin.inversion.array_course import differ_from_others
+from underskin.inversion.array_history import differ_from_others
 from underskin.units import Floats
 
 SIDE = 8

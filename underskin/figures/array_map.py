@@ -13,7 +13,7 @@ from plotly.colors import sample_colorscale
 from underskin.diagnosis.reporting.page_styles import with_minus
 from underskin.figures.array_discs import AROUND, SHARE, radius_of, ring, smallest_distance
 from underskin.figures.style import COLOURS, INK, as_columns, label, styled
-from underskin.inversion.array_course import differ_from_others, differ_from_zero, threshold
+from underskin.inversion.array_history import differ_from_others, differ_from_zero, threshold
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.units import Floats, Mask
 

@@ -27,8 +27,7 @@ from underskin.findings.english import ImplausibleD33
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
-from underskin.inversion.many_sensors import ROBUST
-from underskin.inversion.mixed_model import SDS_OF_95, Estimate, LevelRows, MixedModel
+from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
 from underskin.physics.charge_response import Indenter, gain
 from underskin.prediction import pressed_skin
 from underskin.prediction.pressed_skin import (

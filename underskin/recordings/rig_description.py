@@ -45,9 +45,9 @@ from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.readers import channel_arithmetic, json_file, text
-from underskin.recordings.readers.calendar_times import time_zone, with_zone
 from underskin.recordings.readers.expressions import Expression
 from underskin.recordings.readers.sandbox import call_apart
+from underskin.recordings.readers.text import time_zone, with_zone
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.validation import mapping, named, shown
 from underskin.units import LAB

@@ -16,7 +16,6 @@ import numpy as np
 from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
-from underskin.recordings.common_samples import aligned, with_joined
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.channel_arithmetic import FIELD
@@ -31,11 +30,13 @@ from underskin.recordings.readers.unit_labels import (
     unit,
 )
 from underskin.recordings.regular_samples import (
+    aligned,
     complete_lines,
     evenly_sampled,
     longest_complete,
     mean_step,
     sorted_spectrum,
+    with_joined,
 )
 from underskin.recordings.rig_description import (
     AUTOMATIC,

@@ -11,8 +11,8 @@ from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, sensor
 from service.pages.shared.history import RESTS, By
 from service.schemas.skins import History, SensorHistory, TrendAnswer
 from service.store import AnyRow
-from underskin.inversion.trend import interval
-from underskin.recordings.readers.calendar_times import in_lab
+from underskin.inversion.array_history import interval
+from underskin.recordings.readers.text import in_lab
 
 _MOST_NAMED = 5  # sensors, in a sentence
 

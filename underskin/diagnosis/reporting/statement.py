@@ -41,7 +41,7 @@ from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, acted_on, followed
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import IndentationRecording
-from underskin.recordings.readers.calendar_times import time_zone
+from underskin.recordings.readers.text import time_zone
 from underskin.units import Floats
 
 _INSUFFICIENT = "The recordings cannot tell anything: "

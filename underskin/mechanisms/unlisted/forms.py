@@ -22,7 +22,7 @@ from underskin.mechanisms.base import Values
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.mechanisms.unlisted.vocabulary import AXES, Form
 from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
-from underskin.recordings.readers.calendar_times import time_zone
+from underskin.recordings.readers.text import time_zone
 from underskin.units import Floats
 
 _SAME = 1e-9  # of the range, within which values are one level
