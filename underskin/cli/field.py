@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from underskin.cli.contact_option import Contact, ContactOption
+from underskin.cli.rigs import Contact, ContactOption
 
 
 def _number(meaning: str) -> object:
