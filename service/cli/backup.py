@@ -14,7 +14,7 @@ from service.store import Database, StorageFailed, database, key_requirement, mi
 from service.store import backup as backups
 from service.usecases import mechanism_files
 from underskin import UnderskinError
-from underskin.cli.progress import byte_steps
+from underskin.cli.store import byte_steps
 from underskin.mechanisms.declared.folder import FOLDER
 
 

@@ -81,7 +81,7 @@ def _on(mechanism: "DeclaredMechanism") -> str:
 
     column_names = [name for name in mechanism.axes if name not in AXES]
     columns = f", by {' and '.join(column_names)} of their conditions" if column_names else ""
-    return ("on FRFs" if "frf" in mechanism.kinds else "on indentation curves") + columns
+    return ("on FRFs" if mechanism.acts_on_frfs else "on indentation curves") + columns
 
 
 def _load(file: Path) -> "DeclaredMechanism":

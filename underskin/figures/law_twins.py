@@ -43,7 +43,7 @@ def law_twins(table: SigmaTable) -> Mapping[str, tuple[Twin, ...]]:
     projection = np.linalg.inv(nuisances @ nuisances.T + priors) @ nuisances
     directions: dict[str, Floats] = {}
     for name, mechanism in CATALOGUE.items():
-        if "frf" not in mechanism.kinds or not mechanism.moves_predictions:
+        if not mechanism.acts_on_frfs or not mechanism.moves_predictions:
             continue
         try:
             model = compose([name], campaign, table)

@@ -414,7 +414,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     NoD33
         No frf recording lies within the domain of the table, has a line in the flat zone, and any charge.
     """
-    recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
+    recorded = campaign.of(FrfRecording)
     if not recorded:
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     for excess in excesses(campaign.skin):

@@ -94,6 +94,11 @@ class Mechanism:
         return list(Stage).index(self.stage), self.order, self.name
 
     @property
+    def acts_on_frfs(self) -> bool:
+        """Whether FRFs are among the recordings that it acts on."""
+        return "frf" in self.kinds
+
+    @property
     def needs_lines(self) -> bool:
         """Whether it acts on single lines, so that the lines of a recording cannot be replaced by their mean."""
         return self.stage in (Stage.LINES, Stage.ADDED_CHARGE)

@@ -14,14 +14,12 @@ from underskin.errors import InvalidInput, not_finite, not_unique
 from underskin.extensions import described
 from underskin.mechanisms import base
 from underskin.mechanisms.base import Kind, Mechanism, Stage
+from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
 from underskin.mechanisms.models.contact_state import joined
-from underskin.mechanisms.models.curves import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign
-from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
@@ -159,7 +157,7 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     if _result_of(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
         return
     field = f"law ({kind})"
-    model = _result_of(field, lambda: _model(mechanism, campaign, kind))
+    model = _result_of(field, lambda: forward_model([mechanism], campaign, load_table(), kind))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
     values = []
@@ -190,12 +188,6 @@ def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
                 batch_part.value, single_part.value, 1e-9, 0, equal_nan=True
             )
             _require(f"{field} at several points", None, same, allowed)
-
-
-def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | IndentationModel | CompressionModel:
-    if kind == "frf":
-        return FrfModel([mechanism], campaign, load_table())
-    return (IndentationModel if kind == "indentation" else CompressionModel)([mechanism], campaign)
 
 
 def _points(parameters: Sequence[Parameter], nuisances: Sequence[Parameter]) -> Iterator[tuple[Floats, str]]:

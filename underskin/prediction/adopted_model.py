@@ -161,19 +161,19 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     reason = implausible_d33(report)
     if reason is not None:
         raise InvalidInput("diagnosis_id", "a diagnosis", f"its d33 cannot be right: {reason}")
-    if not any(isinstance(recording, FrfRecording) for recording in campaign.recordings):
+    if not campaign.of(FrfRecording):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {
         current_name(stated["name"]): {
             current_name(parameter["name"]): float(parameter["value"]) for parameter in stated["parameters"]
         }
         for stated in report["mechanisms"]
-        if not _is_for_curves_only(stated["name"])
+        if stated["name"] not in CATALOGUE or CATALOGUE[stated["name"]].acts_on_frfs
     }
     if report["mechanisms"] and not parameters:
         allowed = "must be of mechanisms that act on FRFs: those of curves alone predict none"
         raise InvalidInput("diagnosis_id", report["mechanisms"][0]["name"], allowed)
-    frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
+    frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and mechanism.acts_on_frfs]
     current = parameters_together(frf, campaign, "frf")
     for name, values in parameters.items():
         # Parameters that move no prediction are not used; those of older reports may be others.
@@ -187,10 +187,6 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     relative_deviation = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
     model = AdoptedModel(campaign.skin, parameters, relative_deviation)
     return model if report["verdict"] in ("explained", "ambiguous") else replace(model, **_law(report, campaign, table))
-
-
-def _is_for_curves_only(name: str) -> bool:
-    return name in CATALOGUE and "frf" not in CATALOGUE[name].kinds
 
 
 def not_adopted(report: Mapping[str, Any]) -> str | None:

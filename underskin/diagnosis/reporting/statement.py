@@ -431,10 +431,10 @@ def _size(leading: LeadingLaw) -> str:
     where = f" {location}" if (location := _where(leading, at)) else ""
     if law.description.acts_on in ("force", "position"):
         return f"{_signed(ends, ' N' if law.description.acts_on == 'force' else ' mm')}{where}"
-    if isinstance(law, LagLaw) and law.kind == "corner":
+    if isinstance(law, LagLaw) and law.dispersion == "corner":
         value, low, high = law.lowest_hz * ends
         return f"lines below a corner of {value:.3g} Hz ({low:.3g} to {high:.3g}) fall off{where}"
-    if isinstance(law, LagLaw) and law.kind == "power":
+    if isinstance(law, LagLaw) and law.dispersion == "power":
         return f"by a power of frequency of {_signed(-ends[[0, 2, 1]], '')}{where}"
     if leading.is_phase:
         return f"the phase by {_signed(np.degrees(ends), '°')}{where}"

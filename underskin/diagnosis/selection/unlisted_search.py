@@ -124,7 +124,7 @@ class Screening:
 
         self._of_recordings = _Group.of(laws_of(RecordingLaw), lambda law: law.description.acts_on)
         self._over_frequency = _Group.of(laws_of(FrequencyLaw), lambda _: "")
-        self._lags = _Group.of(laws_of(LagLaw), lambda law: law.kind)
+        self._lags = _Group.of(laws_of(LagLaw), lambda law: law.dispersion)
 
     def scores(self, explanation: Explanation) -> list[Score]:
         """Of every law, averaged over the grid of its shape parameters."""

@@ -595,7 +595,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
     estimates, contact_points, refused = [], [], None
     for recording in recordings:
         span = float(np.ptp(to_si("displacement_mm", recording.displacement_mm)))
-        contact = 0.0
+        contact, interval = 0.0, None
         if isinstance(recording, IndentationRecording):
             features = curve_landmarks(recording.displacement_mm, recording.force_n, recording.time_s)
             force = recording.force_n - features.drift * times_of(recording)
@@ -611,12 +611,12 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
                 contact = float(to_si("displacement_mm", touch(recording.displacement_mm, features.snap_in)))
             if refused is not None and span == 0:
                 raise refused
+            if sticks:
+                interval = snap_in_interval(recording.displacement_mm, recording.force_n, recording.time_s)
         sd, bound = _CONTACT_SD * span, _CONTACT_BOUND * span
-        if sticks and isinstance(recording, IndentationRecording):
-            interval = snap_in_interval(recording.displacement_mm, recording.force_n, recording.time_s)
-            if interval is not None:
-                before, contact, after = (float(to_si("displacement_mm", place)) for place in interval)
-                sd, bound = 0.5 * (after - before), after - before
+        if interval is not None:
+            before, contact, after = (float(to_si("displacement_mm", place)) for place in interval)
+            sd, bound = 0.5 * (after - before), after - before
         contact_points.append(contact_point(recording.id, contact, sd, bound))
     if refused is not None and not estimates:
         raise refused

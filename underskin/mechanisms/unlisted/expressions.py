@@ -299,11 +299,11 @@ def _of_lag(law: LagLaw, values: Numbers) -> str:
         change = f"{number(amplitudes[0])}·({symbol(law.axis)}/{middle})^{number(values['law_exponent'])}"
     else:
         change = change_text(law, values, amplitudes).removeprefix("+ ")
-    if law.kind == "angle":
+    if law.dispersion == "angle":
         return f"FRF = FRF0·exp(−i·({change}))"
-    if law.kind == "delay":
+    if law.dispersion == "delay":
         return f"FRF = FRF0·exp(−i·({change})·f/{number(law.highest_hz)} Hz)"
-    if law.kind == "corner":
+    if law.dispersion == "corner":
         return f"FRF = FRF0/(1 + ({change})·{number(law.lowest_hz)} Hz/(i·f))"
     return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^(−({change}))"
 

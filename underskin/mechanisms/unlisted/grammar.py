@@ -24,7 +24,7 @@ from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.mechanisms.unlisted.forms import Axis, Shape, axes_of, constant, every_axis, shapes
 from underskin.mechanisms.unlisted.laws import (
-    LAG_KINDS,
+    DISPERSIONS,
     PREFIX,
     LagLaw,
     LawDescription,
@@ -324,7 +324,7 @@ def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, listed: Col
             if _makes_sense(acts_on, axis, shape, listed)
         ]
         if len(lines) >= 2 and shape.form != "free":
-            laws += [LagLaw(kind, axis, shape, lines) for kind in LAG_KINDS]
+            laws += [LagLaw(dispersion, axis, shape, lines) for dispersion in DISPERSIONS]
     if axis.name == "preload_n":
         lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost", share=_CONSTANT)
         laws.append(RecordingLaw("force", axis, lost, tables))
