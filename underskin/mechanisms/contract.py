@@ -13,12 +13,11 @@ import numpy as np
 from underskin.errors import InvalidInput, not_finite, not_unique
 from underskin.extensions import described
 from underskin.mechanisms import base
-from underskin.mechanisms.base import Kind, Mechanism, Stage
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Uniform
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
 from underskin.mechanisms.models.contact_state import joined
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats

@@ -13,11 +13,10 @@ import numpy as np
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
-from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Stage
+from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Parameter, Stage
 from underskin.mechanisms.laws import misalignment
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
-from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE, current_name
 from underskin.mechanisms.unlisted.grammar import CAMPAIGN_SPECIFIC_AXES, Grammar, bound_to
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw

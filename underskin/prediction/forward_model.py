@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import conflicting, not_one_of, out_of_range, required, wrong_type
-from underskin.mechanisms.base import NEEDED_FIELDS, Kind, Mechanism
+from underskin.mechanisms.base import NEEDED_FIELDS, Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composed import Model, forward_model
 from underskin.mechanisms.models.composition import D33, chosen, kind_of, parameters_together
-from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Conditions, FrfConditions
 from underskin.surrogate.sigma_table import SigmaTable

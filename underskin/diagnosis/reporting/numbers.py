@@ -25,7 +25,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, mixture_quantile
-from underskin.mechanisms.parameter import Parameter
+from underskin.mechanisms.base import Parameter
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Floats
 

@@ -31,9 +31,9 @@ from underskin.diagnosis.inference.residuals import (
 )
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.gain_residual import GainResidual
+from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.unlisted.expressions import CurveLaw, Extent, curve_laws, of_samples
 from underskin.mechanisms.unlisted.forms import Axis, Shape
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw, Grammar, combination

@@ -32,10 +32,9 @@ from underskin.diagnosis.noise import GAIN_FALL, Plateau
 from underskin.diagnosis.slips.comparison import LEAST_RESPONSE, flat_level
 from underskin.findings.finding import Finding
 from underskin.inversion.mixed_model import GAIN_RANGE
-from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.forms import axes_of, recording_order
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, offsets

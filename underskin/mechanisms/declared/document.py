@@ -26,6 +26,7 @@ from typing import Any, get_args
 import numpy as np
 
 from underskin.errors import FileError, InvalidInput, out_of_range
+from underskin.mechanisms.base import Normal, Parameter, Prior, Uniform
 from underskin.mechanisms.declared.mechanism import (
     CONSTANTS,
     FREQUENCY,
@@ -36,7 +37,6 @@ from underskin.mechanisms.declared.mechanism import (
     read,
     value_of,
 )
-from underskin.mechanisms.parameter import Normal, Parameter, Prior, Uniform
 from underskin.mechanisms.unlisted.vocabulary import OF_CURVES, OF_SAMPLES, ActsOn
 from underskin.recordings import validation
 from underskin.recordings.readers import json_file, plain_yaml

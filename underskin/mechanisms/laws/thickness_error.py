@@ -1,8 +1,7 @@
 """The mechanism `thickness_error`."""
 
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Mechanism, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import LARGEST_STRETCH, Contacts
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
 

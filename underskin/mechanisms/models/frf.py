@@ -23,7 +23,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, chain, constant, sum_rows
 from underskin.errors import ErrorCode, InvalidInput, required
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import Mechanism, Parameter, Stage, Values
 from underskin.mechanisms.models.composition import Composition, Prediction, frf_nuisances
 from underskin.mechanisms.models.contact_state import (
     LARGEST_OFFSET_MM,
@@ -48,7 +48,6 @@ from underskin.mechanisms.models.sigma_curves import (
     layer_of,
     offset_sigma,
 )
-from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.campaign import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices, Mask, to_si

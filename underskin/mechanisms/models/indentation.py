@@ -50,7 +50,7 @@ from scipy.interpolate import CubicSpline
 
 from underskin.autodiff import constant, contiguous
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Mechanism, Values
+from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.laws.adhesion import Adhesion as AdhesionLaw
 from underskin.mechanisms.models.composition import (
     STRAIN_SHARE,
@@ -68,7 +68,6 @@ from underskin.mechanisms.models.sphere_kernels import (
     pull_off_rows,
     radius_rows,
 )
-from underskin.mechanisms.parameter import Parameter
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.sphere_law import PARABOLOID

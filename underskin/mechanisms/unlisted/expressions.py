@@ -16,9 +16,8 @@ from typing import ClassVar
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Kind, Stage, Values
+from underskin.mechanisms.base import Kind, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve, SampleLaw, Samples
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.unlisted.forms import EVERYWHERE, Axis, Feature, Shape, reference, shapes
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
 from underskin.mechanisms.unlisted.laws import PREFIX, LagLaw, LawDescription, RecordingLaw, UnlistedLaw, changes

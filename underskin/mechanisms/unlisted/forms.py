@@ -18,8 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp, where
-from underskin.mechanisms.base import Values
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.base import Normal, Parameter, Uniform, Values
 from underskin.mechanisms.unlisted.vocabulary import AXES, Form
 from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
 from underskin.recordings.readers.text import time_zone

@@ -19,9 +19,8 @@ from operator import add
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp, log
-from underskin.mechanisms.base import Stage, Values
+from underskin.mechanisms.base import Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.mechanisms.unlisted.forms import Axis, Shape, axes_of, constant, every_axis, shapes
 from underskin.mechanisms.unlisted.laws import (
     DISPERSIONS,

@@ -20,10 +20,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from underskin.autodiff import Differentiated, chain, exp
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.unlisted.forms import Axis, Feature, Shape
 from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form, acted_on, followed
 from underskin.recordings.campaign import Conditions, frf_of
