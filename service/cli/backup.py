@@ -15,7 +15,7 @@ from service.store import backup as backups
 from service.usecases import mechanism_files
 from underskin import UnderskinError
 from underskin.cli.store import byte_steps
-from underskin.mechanisms.declared.folder import FOLDER
+from underskin.mechanisms.declared.document import FOLDER
 
 
 def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")]) -> None:

@@ -11,7 +11,7 @@ from service.log import first_line
 from service.settings import Settings
 from service.store import StorageFailed, StoreError, StoreMoved
 from underskin import InvalidInput
-from underskin.mechanisms.declared.folder import FOLDER
+from underskin.mechanisms.declared.document import FOLDER
 from underskin.recordings.readers.text import time_zone
 
 STORE_ERRORS = (StoreError, StoreMoved, StorageFailed, DBAPIError)

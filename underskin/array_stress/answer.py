@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.array_stress import load_integration as integration
-from underskin.array_stress.finite_strain import finite_strain
-from underskin.array_stress.load_integration import Load
+from underskin.array_stress.load_integration import Load, finite_strain
 from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_coarse, refuse_many, refuse_off_skin, refuse_overlap
 from underskin.errors import Mention, Requirement, out_of_range

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.cli import changes, diagnose, field, mechanism, store, stored, stress, watch
+from underskin.cli import changes, diagnose, mechanism, store, stored, stress, watch
 from underskin.cli.rigs import Contact, ContactOption, EstimatorOption, RigOption
 from underskin.errors import TableError, UnderskinError
 
@@ -306,7 +306,7 @@ def _answer(
 
 
 app.command("stress", no_args_is_help=True)(stress.stress)
-app.command("field", no_args_is_help=True)(field.field)
+app.command("field", no_args_is_help=True)(stress.field)
 app.command("import", no_args_is_help=True)(store.import_files)
 app.command("export", no_args_is_help=True)(store.export_skin)
 app.command()(stored.campaigns)

@@ -23,8 +23,7 @@ from underskin.errors import FileError, InvalidInput, TableError, UnderskinError
 from underskin.findings.formatting import grouped_by_reason, recordings_called, significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
-from underskin.inversion.invert import Inversion, invert
-from underskin.inversion.other_contact import array_d33_by_other
+from underskin.inversion.invert import Inversion, array_d33_by_other, invert
 from underskin.prediction.answers import OTHER, WORDS
 from underskin.recordings import plausibility, validation
 from underskin.recordings.frf.estimators import Estimator

@@ -54,8 +54,7 @@ def save(
 ) -> None:
     """Keep the law of a report as a mechanism, recognised by name in later campaigns."""
     from underskin.mechanisms.declared import saving
-    from underskin.mechanisms.declared.document import parse
-    from underskin.mechanisms.declared.folder import FOLDER
+    from underskin.mechanisms.declared.document import FOLDER, parse
     from underskin.mechanisms.registry import CATALOGUE
 
     target = folder or (Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None)
@@ -85,7 +84,7 @@ def _on(mechanism: "DeclaredMechanism") -> str:
 
 
 def _load(file: Path) -> "DeclaredMechanism":
-    from underskin.mechanisms.declared.folder import checked
+    from underskin.mechanisms.declared.document import checked
 
     try:
         data = file.read_bytes()

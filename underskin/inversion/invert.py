@@ -30,6 +30,7 @@ from underskin.inversion import mixed_model
 from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
 from underskin.physics.charge_response import Indenter, gain
 from underskin.prediction import pressed_skin
+from underskin.prediction.answers import OTHER, STATED
 from underskin.prediction.pressed_skin import (
     DECLARED,
     declared_skin,
@@ -54,7 +55,8 @@ from underskin.recordings.frf.line_choice import excited_at_mains, noise_finding
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
-from underskin.surrogate.sigma_table import ContactModel
+from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 from underskin.units import Floats, Indices, Mask, force_unit, to_lab, to_si, unusual
 
 _DEAD = 0.05  # of the array's d33
@@ -616,3 +618,29 @@ def _cells(rows: RecordingD33, good: Indices) -> tuple[Indices, Indices, Indices
     keys = np.column_stack([rows.sensor, rows.indenter_radius, rows.preload])[good]
     _, where, cell, count = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
     return cell.reshape(-1), good[where], count
+
+
+def array_d33_by_other(
+    campaign: Campaign,
+    table: SigmaTable,
+    band_hz: tuple[float, float] | None,
+    inversion: Inversion,
+    requested: ContactName = "paper",
+) -> Estimate | None:
+    """`absolute_d33` by the other contact model; None where there is none, or it differs by at most 1 %.
+
+    Parameters
+    ----------
+    campaign, band_hz
+        The data of `inversion`, which used the contact model `requested`.
+    table
+        The σ table, with the contact table in the same folder; raises TableError where that cannot be read.
+    """
+    estimate = inversion.absolute_d33
+    if estimate is None:
+        return None
+    try:
+        other = invert(campaign, contact_model(table, OTHER[requested]), band_hz).absolute_d33
+    except InvalidInput:  # all recordings lie outside its domain
+        return None
+    return other if other is not None and abs(other.value / estimate.value - 1) > STATED else None

@@ -132,7 +132,7 @@ def charge_figure(
     answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], radius_mm: float, numbers: str
 ) -> Drawn:
     """The sensors coloured by charge, with the loads if they have positions; `radius_mm`: sensor radius."""
-    from underskin.figures.array_discs import disc_size
+    from underskin.figures.array_map import disc_size
     from underskin.figures.loads import loaded_array
 
     x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))

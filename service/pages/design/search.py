@@ -112,7 +112,7 @@ def region_csv(table: Table, typed: TypedInQuery) -> Response:
 
 
 def _figure(searched: Searched, typed: Typed) -> Drawn:
-    from underskin.figures.design_region import Offered, design_region
+    from underskin.figures.design import Offered, design_region
 
     region = searched.region
     offered = [
