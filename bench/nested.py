@@ -19,7 +19,7 @@ from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.selection.priors import log_prior
-from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
+from underskin.inversion.mixed_model import NO_POSITION_SCATTER
 from underskin.surrogate.sigma_table import load_table
 
 HIDDEN: dict[str, Effects] = {

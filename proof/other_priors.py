@@ -8,8 +8,7 @@ from typing import Any
 
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, Plateau
 from underskin.diagnosis.selection.priors import PRIORS
-from underskin.mechanisms.base import Mechanism
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
+from underskin.mechanisms.base import HeavyTailed, Mechanism, Parameter
 from underskin.mechanisms.registry import CATALOGUE
 
 _NOTHING = "nothing_missing"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from underskin.physics import charge_response
-from underskin.physics.skin import Indenter, Skin
+from underskin.physics.charge_response import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.surrogate.sigma_table import load_table
 

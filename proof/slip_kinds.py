@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from proof.slip_rivals import LevelRivals, conjugated_residual, over_one_sign
 from rig.recorded import RecordedLines
 from underskin.findings.codes import Reason
-from underskin.mechanisms.unlisted.axes import recording_order
+from underskin.mechanisms.unlisted.forms import recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 
 Floats = NDArray[np.float64]

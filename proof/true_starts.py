@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.effects import Values
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.mechanisms.parameter import Parameter
+from underskin.mechanisms.base import Parameter
 
 _NO_SATURATION = 1e3  # MPa: clipped to the parameter's bound
 _LAST_SATURATION = 0.9  # of ageing: a loss that ends

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from underskin.client.document import Document, Skin
-from underskin.surrogate.contact_model import ContactName
+from underskin.surrogate.sigma_table import ContactName
 '''
 _DATACLASS = ast.parse("dataclass(frozen=True, eq=False, kw_only=True)", mode="eval").body
 _NAMES = {"BaseModel": "Document", "dict": "Mapping", "ErrorCode": "str", "FindingCode": "str"}

@@ -19,6 +19,7 @@ CATALOGUE = ("mechanisms/laws/", "recordings/readers/", "diagnosis/slips/", "uni
 SLIPS = ("diagnosis/slips/",)
 ENGINE = ("diagnosis/", "inference/")
 _KINDS = ("frf", "indentation", "compression")
+_NO_RECORDINGS = ("dtype", "defect")  # whose `kind` is another
 _RECORDINGS = re.compile(r"\w*Recording$")
 _TRACE = """
 import importlib, sys
@@ -112,8 +113,10 @@ def kind_branches(tree: ast.Module) -> int:
 
 
 def _is_kind(node: ast.AST) -> bool:
-    name = node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
-    return name == "kind" or (name == "curves" and isinstance(node, ast.Attribute))
+    if not isinstance(node, ast.Attribute):
+        return isinstance(node, ast.Name) and node.id == "kind"
+    owner = node.value.attr if isinstance(node.value, ast.Attribute) else ast.unparse(node.value)
+    return node.attr == "curves" or (node.attr == "kind" and owner not in _NO_RECORDINGS)
 
 
 def _compares_kinds(node: ast.AST) -> bool:

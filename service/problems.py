@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 import orjson
 from pydantic import BaseModel, Field, ValidationError
 
-from underskin.errors import ErrorCode, InvalidInput
-from underskin.several_errors import SeveralInvalid
+from underskin.errors import ErrorCode, InvalidInput, SeveralInvalid
 
 _MOST_LOGGED = 3
 _MOST_LISTED_ERRORS = 100  # errors of one body

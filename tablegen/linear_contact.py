@@ -12,10 +12,10 @@ import numpy as np
 from scipy.special import j0
 
 from tablegen import linear_layer
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
-from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.units import Floats
 
 

@@ -17,10 +17,9 @@ from tests.support.installed_package import installed
 from tests.support.repository import ROOT
 from underskin import ExtensionError, InvalidInput, extensions
 from underskin.mechanisms import CATALOGUE, FrfState, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
-from underskin.mechanisms.base import AXES, READS, UNITS
+from underskin.mechanisms.base import AXES, READS, UNITS, ActsOn
 from underskin.mechanisms.contract import check
-from underskin.mechanisms.models.frf_design import Pickup, together
-from underskin.mechanisms.parameter import ActsOn
+from underskin.mechanisms.models.contact_state import Pickup, together
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
 from underskin.recordings.campaign import Conditions

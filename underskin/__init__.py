@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from underskin.diagnosis.diagnose import diagnose, diagnose_fleet, diagnose_together
     from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.inversion.invert import Inversion, invert
-    from underskin.physics.charge_response import Sigma
-    from underskin.physics.skin import Indenter, Skin
+    from underskin.physics.charge_response import Indenter, Sigma, Skin
     from underskin.prediction.forward_model import Predicted, predict
     from underskin.prediction.pressed_skin import Transmission, transmission
     from underskin.recordings.campaign import Campaign, Conditions, SkinDescription, frf_conditions
@@ -71,7 +70,7 @@ _MODULES = {
     "Campaign": "recordings.campaign",
     "Client": "client.service_client",
     "Conditions": "recordings.campaign",
-    "Indenter": "physics.skin",
+    "Indenter": "physics.charge_response",
     "Inversion": "inversion.invert",
     "Predicted": "prediction.forward_model",
     "Reading": "recordings.reading",
@@ -79,7 +78,7 @@ _MODULES = {
     "RigLimits": "diagnosis.planning.rig_limits",
     "Sigma": "physics.charge_response",
     "SigmaTable": "surrogate.sigma_table",
-    "Skin": "physics.skin",
+    "Skin": "physics.charge_response",
     "SkinDescription": "recordings.campaign",
     "Transmission": "prediction.pressed_skin",
     "diagnose": "diagnosis.diagnose",

@@ -2,6 +2,7 @@
 
 UnderskinError
 ├── InvalidInput      an invalid value: names the field, the value and what is allowed
+│   └── SeveralInvalid    several of one input, reported together so that its author can correct all at once
 ├── FileError         an unreadable file: names the file and the place in it
 ├── TableError        a table that is missing, damaged, altered or of another schema
 ├── ExtensionError    an unusable mechanism or file format of another package: names package and field
@@ -10,7 +11,7 @@ UnderskinError
 └── Unreachable       no answer from the server: nothing listens there, or time ran out (raised by the client)
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -243,3 +244,39 @@ class ServiceError(UnderskinError):
 
 class Unreachable(UnderskinError):
     """No answer came from the service; the message names its address and the reason."""
+
+
+class SeveralInvalid(InvalidInput):
+    """The first of several `errors`, for callers that report one; as a text it is all of them."""
+
+    def __init__(self, errors: Sequence[InvalidInput]) -> None:
+        first = errors[0]
+        super().__init__(first.field, first.value, first.allowed, first.index, code=first.code)
+        self.errors = errors
+        self.args = ("; ".join(map(str, errors)),)
+
+
+def errors_of(error: InvalidInput) -> Sequence[InvalidInput]:
+    """All errors of a SeveralInvalid, or the single one."""
+    return error.errors if isinstance(error, SeveralInvalid) else [error]
+
+
+@contextmanager
+def noting(errors: list[InvalidInput]) -> Iterator[None]:
+    """Append errors raised in the block to `errors`, and continue after it."""
+    try:
+        yield
+    except InvalidInput as error:
+        errors += errors_of(error)
+
+
+def all_of(readings: Mapping[str, Callable[[], Any]]) -> dict[str, Any]:
+    """The results of all readings; raises SeveralInvalid with the errors of any of them."""
+    values: dict[str, Any] = {}
+    wrong: list[InvalidInput] = []
+    for name, reading in readings.items():
+        with noting(wrong):
+            values[name] = reading()
+    if wrong:
+        raise SeveralInvalid(wrong)
+    return values

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from tablegen import linear_layer
 from underskin.physics import half_space, hertz
-from underskin.physics.skin import Indenter, Skin
+from underskin.physics.charge_response import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab, to_si

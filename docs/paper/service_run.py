@@ -19,7 +19,7 @@ from docs.paper.prototype import MODULUS_MPA, RHO, SENSOR_RADIUS_MM, SKIN, THICK
 from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
 from underskin.physics import charge_response, hertz
-from underskin.physics.skin import Indenter
+from underskin.physics.charge_response import Indenter
 from underskin.units import Floats
 
 INDENTER_RADIUS_MM = 4.0

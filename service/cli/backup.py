@@ -14,8 +14,8 @@ from service.store import Database, StorageFailed, database, key_requirement, mi
 from service.store import backup as backups
 from service.usecases import mechanism_files
 from underskin import UnderskinError
-from underskin.cli.progress import byte_steps
-from underskin.mechanisms.declared.folder import FOLDER
+from underskin.cli.store import byte_steps
+from underskin.mechanisms.declared.document import FOLDER
 
 
 def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")]) -> None:

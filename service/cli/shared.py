@@ -11,8 +11,8 @@ from service.log import first_line
 from service.settings import Settings
 from service.store import StorageFailed, StoreError, StoreMoved
 from underskin import InvalidInput
-from underskin.mechanisms.declared.folder import FOLDER
-from underskin.recordings.readers.calendar_times import time_zone
+from underskin.mechanisms.declared.document import FOLDER
+from underskin.recordings.readers.text import time_zone
 
 STORE_ERRORS = (StoreError, StoreMoved, StorageFailed, DBAPIError)
 

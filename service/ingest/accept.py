@@ -15,14 +15,13 @@ from service.ingest.rig_words import rig_sentences
 from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, instrument_templates, skins
-from underskin.errors import FileError, InvalidInput, conflicting, required
-from underskin.findings.alike import grouped_by_reason, recordings_called, why_refused
+from underskin.errors import FileError, InvalidInput, SeveralInvalid, conflicting, errors_of, required
+from underskin.findings.formatting import grouped_by_reason, recordings_called, why_refused
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
-from underskin.several_errors import SeveralInvalid, errors_of
 
 RIG = "rig"  # name of the form's part that is a rig description
 _MOST_ERRORS = 100  # in the problem of a request of which nothing is stored

@@ -14,7 +14,7 @@ from service.jobs.process import CampaignInput, Worker, WorkerProcesses
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFailed, StoreMoved, diagnoses
 from underskin import __version__
-from underskin.mechanisms.declared.folder import digest
+from underskin.mechanisms.declared.document import digest
 from underskin.recordings.validation import LONGEST_NAME
 
 logger = logging.getLogger("underskin")

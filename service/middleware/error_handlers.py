@@ -23,7 +23,7 @@ from service.store import Conflict, Missing, StorageFailed, StorageFull, StoreMo
 from service.store.answers import OtherRequest
 from service.store.engine import storage_failure
 from underskin import InvalidInput
-from underskin.several_errors import SeveralInvalid
+from underskin.errors import SeveralInvalid
 
 logger = logging.getLogger("underskin")
 

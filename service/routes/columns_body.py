@@ -14,7 +14,7 @@ from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
 from service.schemas.columns import ColumnsRequest
 from underskin.errors import ErrorCode, FileError, InvalidInput, conflicting, wrong_type
-from underskin.prediction.csv_columns import CsvColumn, CsvError, RealPart, from_csv
+from underskin.prediction.columns import CsvColumn, CsvError, RealPart, from_csv
 from underskin.recordings.reading import sheet_text
 
 try:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING
 from typing import Any, get_args
 
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import validation
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import (

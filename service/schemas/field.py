@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.schemas.columns import Status
 from service.schemas.magnitudes import Representable
-from underskin.surrogate.contact_model import ContactName
+from underskin.surrogate.sigma_table import ContactName
 
 MOST_RADII, MOST_DEPTHS = 301, 101
 

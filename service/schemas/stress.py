@@ -4,7 +4,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.schemas.columns import AnswerInColumns, FindingModel
 from underskin.array_stress.request import MOST_CONTACTS
-from underskin.surrogate.contact_model import ContactName
+from underskin.surrogate.sigma_table import ContactName
 
 
 class _StressModel(BaseModel):

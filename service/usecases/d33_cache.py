@@ -239,7 +239,7 @@ def _array_solved(
     campaign: Campaign, table: SigmaTable, band_hz: BandHz | None, inversion: "Inversion"
 ) -> dict[str, float | None] | None:
     """The field of `D33`; also null if the contact table cannot be read, which is logged."""
-    from underskin.inversion.other_contact import array_d33_by_other
+    from underskin.inversion.invert import array_d33_by_other
 
     try:
         return of_array(array_d33_by_other(campaign, table, band_hz, inversion))

@@ -8,7 +8,7 @@ from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, 
 from service.usecases.tables import requested_contact
 from underskin import Indenter, Skin
 from underskin.errors import out_of_range
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.prediction.answers import OTHER, STATED, limits_of_pressed
 from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import Design, design

@@ -19,9 +19,8 @@ from service.usecases.two_point import largest_pitch
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import resolution
-from underskin.surrogate.contact_model import ContactModel, ContactName
 from underskin.surrogate.off_centre_sigma import sigma_off_centre
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # the search range, within the table

@@ -6,7 +6,7 @@ import numpy as np
 
 from service.schemas.field import FieldAnswer, FieldQuery
 from service.usecases.tables import requested_contact
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.prediction.answers import lab_columns
 from underskin.prediction.stress_field import field_from_lab
 from underskin.surrogate.sigma_table import SigmaTable

@@ -11,10 +11,9 @@ from service.store import Database
 from service.usecases import mechanism_files, mechanisms
 from service.usecases.mechanism_findings import FoundIn, findings
 from underskin.diagnosis.data.names import EXPLAINED
-from underskin.figures.law_effect import LawEffect, lacking, law_effect
-from underskin.figures.law_twins import Twin, law_twins
+from underskin.figures.law_effect import LawEffect, Twin, lacking, law_effect, law_twins
 from underskin.mechanisms import Mechanism, Parameter
-from underskin.mechanisms.declared.folder import digest
+from underskin.mechanisms.declared.document import digest
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.unlisted.vocabulary import followed

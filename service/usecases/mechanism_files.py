@@ -12,8 +12,7 @@ from service.problems import Refusal
 from service.store import own_mechanisms
 from service.store.times import now
 from underskin.errors import FileError
-from underskin.mechanisms.declared.document import parse
-from underskin.mechanisms.declared.folder import FOLDER
+from underskin.mechanisms.declared.document import FOLDER, parse
 
 _SET_ASIDE = "discarded"  # a folder next to the files that is not read
 

@@ -14,7 +14,7 @@ from service.usecases import mechanism_files
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.declared import saving
-from underskin.mechanisms.declared.folder import checked, digest
+from underskin.mechanisms.declared.document import checked, digest
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.registry import CATALOGUE
 

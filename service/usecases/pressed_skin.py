@@ -11,11 +11,11 @@ from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, Fr
 from service.store import Database
 from service.usecases.adopted_models import press, requested_model, require_paper
 from service.usecases.tables import requested_contact
-from underskin.errors import ErrorCode, InvalidInput, conflicting, out_of_range, required
+from underskin.errors import ErrorCode, InvalidInput, SeveralInvalid, conflicting, out_of_range, required
 from underskin.physics import charge_response
-from underskin.prediction import answers, plausibility
+from underskin.prediction import answers
 from underskin.prediction.columns import rows
-from underskin.several_errors import SeveralInvalid
+from underskin.recordings import plausibility
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, checked, finite, non_negative, to_lab
 

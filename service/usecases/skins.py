@@ -16,8 +16,7 @@ from service.store import AnyRow, Database, Missing, campaigns, inversions, skin
 from service.usecases import adopted_models, annotations, d33_cache
 from underskin import InvalidInput
 from underskin.errors import conflicting
-from underskin.inversion.array_history import array_history
-from underskin.inversion.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
+from underskin.inversion.array_history import FEWEST, SIGNIFICANT, Trend, array_history, holm, trend
 from underskin.surrogate.sigma_table import SigmaTable
 
 _YEAR_S = 365.25 * 86400

@@ -2,7 +2,7 @@
 
 import pytest
 
-from underskin.cli.documents import write_rows
+from underskin.cli.stored import write_rows
 
 
 @pytest.mark.parametrize("row", [("c-1",), ("c-1", "palm", "more")])

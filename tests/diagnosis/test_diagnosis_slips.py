@@ -11,7 +11,7 @@ from rig.recorded import campaign as recorded_campaign
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.slip_campaigns import MADE, Change, changed, looked_at, named, put_right, right, slips, times
-from underskin.mechanisms.unlisted.axes import recording_order
+from underskin.mechanisms.unlisted.forms import recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats

@@ -4,10 +4,9 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from underskin.figures.array_discs import disc_size
-from underskin.figures.array_map import D33, Quantity, array_map, significance_note
+from underskin.figures.array_map import D33, Quantity, array_map, disc_size, significance_note
 from underskin.figures.loads import loaded_array
-from underskin.inversion.array_course import differ_from_others
+from underskin.inversion.array_history import differ_from_others
 from underskin.units import Floats
 
 SIDE = 8

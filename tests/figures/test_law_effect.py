@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from underskin import load_table
-from underskin.figures.law_effect import LawEffect, law_effect
-from underskin.figures.law_twins import Twin, law_twins
+from underskin.figures.law_effect import LawEffect, Twin, law_effect, law_twins
 from underskin.mechanisms.registry import built_in
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats

@@ -14,10 +14,9 @@ from tests.support.repository import ROOT
 from underskin.array_stress.request import read_request
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_one_of, required, unequal_lengths, wrong_type
 from underskin.findings import english
-from underskin.findings.codes import FindingCode, Reason
+from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
+from underskin.findings.english import ImplausibleD33, UnitGuess
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
-from underskin.findings.sentences import ImplausibleD33, UnitGuess
 from underskin.recordings.campaign import from_dict, parse
 from underskin.units import checked
 
@@ -61,7 +60,7 @@ def test_code_reason_reason_words() -> None:
 
 def test_each_reason_is_used() -> None:
     """As `Reason.NAME` somewhere beside the enumeration and the words."""
-    own = {"codes.py", "english.py", "sentences.py"}
+    own = {"codes.py", "english.py"}
     text = "".join(path.read_text(encoding="utf-8") for path in SOURCES if path.name not in own)
     assert [reason.name for reason in Reason if f"Reason.{reason.name}" not in text] == []
 

@@ -5,8 +5,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from underskin.inversion.array_course import array_levels, changes
-from underskin.inversion.array_history import ArrayHistory, array_history
+from underskin.inversion.array_history import ArrayHistory, array_history, array_levels, changes
 from underskin.units import Floats
 
 UNCERTAINTY = 0.007  # of a sensor's d33 on a date

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.simulated_campaign import Rig, simulate
-from underskin.inversion.invert import invert
-from underskin.inversion.other_contact import array_d33_by_other
+from underskin.inversion.invert import array_d33_by_other, invert
 from underskin.surrogate.sigma_table import load_table
 from underskin.surrogate.solved_contact import solved_contact
 

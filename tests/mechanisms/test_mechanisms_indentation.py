@@ -25,7 +25,7 @@ from tests.mechanisms.indentation_loops import (
 from tests.support.mechanism_campaigns import fit_of, predicted, table
 from tests.support.sphere_contact import SphereOnLayer
 from underskin.mechanisms import Unsupported, compose
-from underskin.mechanisms.parameter import Normal
+from underskin.mechanisms.base import Normal
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.physics.elastic_layer import Layer
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription

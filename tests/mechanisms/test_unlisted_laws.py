@@ -13,9 +13,8 @@ from underskin.mechanisms.declared.mechanism import value_of
 from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
-from underskin.mechanisms.unlisted.axes import Axis, axes_of, recording_order
 from underskin.mechanisms.unlisted.expressions import change_along, expression
-from underskin.mechanisms.unlisted.forms import shapes
+from underskin.mechanisms.unlisted.forms import Axis, axes_of, recording_order, shapes
 from underskin.mechanisms.unlisted.grammar import Grammar, combination
 from underskin.mechanisms.unlisted.laws import LevelTables, RecordingLaw, UnlistedLaw
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, frf_of

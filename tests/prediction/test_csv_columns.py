@@ -6,7 +6,7 @@ import openpyxl
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.prediction.csv_columns import CsvError, from_csv
+from underskin.prediction.columns import CsvError, from_csv
 from underskin.recordings.reading import sheet_text
 
 FIELDS = ("preload_n", "frf_pc_per_n")

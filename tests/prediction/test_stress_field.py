@@ -12,9 +12,9 @@ from tablegen.sigma import peak_pressures
 from tests.support.cases import first
 from underskin.errors import InvalidInput
 from underskin.physics import elastic_layer, hertz
+from underskin.physics.charge_response import Indenter, Skin
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.layer_stress import layer_stress
-from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.stress_field import StressField, field_from_lab, stress_field
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats

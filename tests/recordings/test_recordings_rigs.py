@@ -10,11 +10,10 @@ import pytest
 
 from tests.recordings.real_files import example_rig
 from tests.support.instrument_files import CHARGE, COMMON, EXAMPLES, FORCE, matlab_5, rig, tdms
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import FileError, InvalidInput, SeveralInvalid
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording, IndentationRecording
 from underskin.recordings.rig_description import RigDescription
-from underskin.several_errors import SeveralInvalid
 
 RIGS = sorted((EXAMPLES / "rigs").glob("*.yaml"))
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.physics import charge_response
-from underskin.physics.skin import Indenter, Skin
+from underskin.physics.charge_response import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
-from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
+from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import Floats
 
 LARGEST_SCATTER_MM = 0.3

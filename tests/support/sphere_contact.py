@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from underskin.errors import InvalidInput
-from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
+from underskin.physics.contact_curves import ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from tests.support.sphere_contact import SphereOnLayer
+from underskin.physics.charge_response import Indenter, Skin
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import normal_stress
-from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.forward_model import predict
 from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
 from underskin.recordings.campaign import SkinDescription, frf_conditions
-from underskin.surrogate.contact_table import load_contact
 from underskin.surrogate.sigma_table import load_table
 from underskin.surrogate.solved_contact import linear_contact, solved_contact
+from underskin.surrogate.tables import load_contact
 
 SOLVED, TABLE = solved_contact(), load_table()
 MODULUS = 16e6

@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.array_stress import load_integration as integration
-from underskin.array_stress.finite_strain import finite_strain
-from underskin.array_stress.load_integration import Load
+from underskin.array_stress.load_integration import Load, finite_strain
 from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_coarse, refuse_many, refuse_off_skin, refuse_overlap
 from underskin.errors import Mention, Requirement, out_of_range
 from underskin.findings.finding import Finding
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
 from underskin.physics.elastic_layer import Layer, slip
-from underskin.surrogate.contact_table import CONTACT_TABLE
-from underskin.surrogate.influence_table import Influence, InfluenceTable
 from underskin.surrogate.solved_contact import solved_contact
+from underskin.surrogate.tables import CONTACT_TABLE, Influence, InfluenceTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from underskin import errors
 from underskin.array_stress import pressure_map
 from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import Sensors
 from underskin.recordings.readers import json_file
 from underskin.recordings.validation import shown
-from underskin.surrogate.contact_model import ContactName
+from underskin.surrogate.sigma_table import ContactName
 from underskin.units import Floats
 
 MOST_CONTACTS = 1000

@@ -1,14 +1,16 @@
-"""The commands that change what the service keeps: withdraw, exclude, correct, join and adopt. The originals stay."""
+"""The commands that change what the service keeps: withdraw, exclude, correct, join, adopt, annotate, discard and undo.
+
+The originals stay; nothing is deleted.
+"""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from underskin.cli.documents import AsJson, Document, write_json
 from underskin.cli.rigs import EstimatorOption, RigOption
-from underskin.cli.sending import outcome, results_of
-from underskin.cli.store import LOCAL, KeyOption, Url, connect
+from underskin.cli.store import LOCAL, KeyOption, Url, connect, outcome, results_of
+from underskin.cli.stored import AsJson, Document, moment, write_json, write_rows
 from underskin.errors import UnderskinError
 
 Reason = Annotated[str, typer.Option(help="Why; kept, and shown with all that leaves it out.")]
@@ -103,3 +105,111 @@ def _say(document: Document, words: str, json: bool) -> None:
         write_json(document)
     else:
         typer.echo(words)
+
+
+OfCampaign = Annotated[str | None, typer.Option("--campaign", metavar="ID", help="Of this campaign.")]
+OfSkin = Annotated[str | None, typer.Option("--skin", metavar="ID", help="Of this skin.")]
+
+
+def annotate(
+    campaign: OfCampaign = None,
+    skin: OfSkin = None,
+    name: Annotated[str | None, typer.Option(help="What the lab calls it.")] = None,
+    notes: Annotated[str | None, typer.Option(help="Notes in place of the earlier ones; empty for none.")] = None,
+    tags: Annotated[
+        str | None, typer.Option(metavar="TAG,...", help="Tags in place of the earlier ones; empty for none.")
+    ] = None,
+    json: AsJson = False,
+    url: Url = LOCAL,
+    key: KeyOption = None,
+) -> None:
+    """Name a campaign or a skin, or change its notes or tags; what is not given stays."""
+    _require_exactly_one(campaign, skin)
+    name_field = "name" if campaign is not None else "title"
+    values = {name_field: name, "remark": notes, "tags": None if tags is None else tags.split(",")}
+    fields = {field: value for field, value in values.items() if value is not None}
+    if not fields:
+        raise UnderskinError("give at least one of --name, --notes and --tags")
+    document: Document
+    with connect(url, key) as client:
+        if campaign is not None:
+            document = client.campaigns.annotate(campaign, **fields)
+        else:
+            document = client.skins.annotate(str(skin), **fields)
+    if json:
+        write_json(document)
+        return
+    remarks = [f"tags: {', '.join(document['tags'])}"] if document["tags"] else []
+    remarks += [f"notes: {document['remark']}"] if document["remark"] else []
+    typer.echo("; ".join([f"{_noun(campaign, skin)} is called {document[name_field] or document['id']}", *remarks]))
+
+
+def discard(
+    reason: Annotated[str, typer.Option(help="Why; kept with it.")],
+    campaign: OfCampaign = None,
+    skin: OfSkin = None,
+    json: AsJson = False,
+    url: Url = LOCAL,
+    key: KeyOption = None,
+) -> None:
+    """Put a trial campaign that nothing builds on, or a skin without campaigns in use, into no list any more."""
+    _require_exactly_one(campaign, skin)
+    document: Document
+    with connect(url, key) as client:
+        if campaign is not None:
+            document = client.campaigns.discard(campaign, reason)
+        else:
+            document = client.skins.discard(str(skin), reason)
+    if json:
+        write_json(document)
+    else:
+        typer.echo(f"{_noun(campaign, skin)} is discarded; it can still be read, and that can be undone")
+
+
+def changes(
+    campaign: OfCampaign = None,
+    skin: OfSkin = None,
+    json: AsJson = False,
+    url: Url = LOCAL,
+    key: KeyOption = None,
+) -> None:
+    """What was changed of a campaign or of a skin itself, the latest first, and what can be undone."""
+    _require_exactly_one(campaign, skin)
+    with connect(url, key) as client:
+        entries = client.campaigns.changes(campaign) if campaign is not None else client.skins.changes(str(skin))
+    if json:
+        write_json(entries)
+        return
+    headings = ("id", "time (UTC)", "what", "by", "why", "undo")
+    write_rows(headings, map(_row, entries))
+
+
+def undo(
+    change: Annotated[str, typer.Argument(help="Id of the change; `underskin changes` lists them.")],
+    json: AsJson = False,
+    url: Url = LOCAL,
+    key: KeyOption = None,
+) -> None:
+    """Take a change back, as long as nothing builds on it; both stay on record."""
+    with connect(url, key) as client:
+        document = client.undo(change)
+    if json:
+        write_json(document)
+    else:
+        noun = _noun(document["campaign_id"], document["skin_id"])
+        typer.echo(f"undone of {noun}: {document['statement']}")
+
+
+def _row(change: Document) -> tuple[str, ...]:
+    undoing = "can be undone" if change["may_be_undone"] else "undone" if change["undone"] else "-"
+    by, why = change["made_from"] or "-", change["reason"] or "-"
+    return change["id"], moment(change["at"]), change["statement"], by, why, undoing
+
+
+def _noun(campaign: str | None, skin: str | None) -> str:
+    return f"skin {skin}" if campaign is None else f"campaign {campaign}"
+
+
+def _require_exactly_one(campaign: str | None, skin: str | None) -> None:
+    if (campaign is None) == (skin is None):
+        raise UnderskinError("give one of --campaign ID and --skin ID")

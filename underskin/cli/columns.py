@@ -21,8 +21,7 @@ from underskin.errors import (
 )
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
-from underskin.prediction.columns import limits_and_statuses, statuses, to_csv
-from underskin.prediction.csv_columns import CsvError, from_csv
+from underskin.prediction.columns import CsvError, from_csv, limits_and_statuses, statuses, to_csv
 from underskin.prediction.pressed_skin import Words
 from underskin.recordings.readers.formats import ZIP
 from underskin.recordings.readers.template_columns import misspelt

@@ -20,19 +20,16 @@ from rich.text import Text
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
-from underskin.findings.alike import grouped_by_reason, recordings_called
-from underskin.findings.formatting import significant
+from underskin.findings.formatting import grouped_by_reason, recordings_called, significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
-from underskin.inversion.invert import Inversion, invert
-from underskin.inversion.other_contact import array_d33_by_other
+from underskin.inversion.invert import Inversion, array_d33_by_other, invert
 from underskin.prediction.answers import OTHER, WORDS
 from underskin.recordings import plausibility, validation
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.reading import Reading, join, read_file
 from underskin.recordings.rig_description import RigDescription
-from underskin.surrogate.contact_model import ContactName
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import ContactName, SigmaTable, load_table
 from underskin.surrogate.solved_contact import contact_model
 from underskin.units import to_lab
 

@@ -54,8 +54,7 @@ def save(
 ) -> None:
     """Keep the law of a report as a mechanism, recognised by name in later campaigns."""
     from underskin.mechanisms.declared import saving
-    from underskin.mechanisms.declared.document import parse
-    from underskin.mechanisms.declared.folder import FOLDER
+    from underskin.mechanisms.declared.document import FOLDER, parse
     from underskin.mechanisms.registry import CATALOGUE
 
     target = folder or (Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None)
@@ -81,11 +80,11 @@ def _on(mechanism: "DeclaredMechanism") -> str:
 
     column_names = [name for name in mechanism.axes if name not in AXES]
     columns = f", by {' and '.join(column_names)} of their conditions" if column_names else ""
-    return ("on FRFs" if "frf" in mechanism.kinds else "on indentation curves") + columns
+    return ("on FRFs" if mechanism.acts_on_frfs else "on indentation curves") + columns
 
 
 def _load(file: Path) -> "DeclaredMechanism":
-    from underskin.mechanisms.declared.folder import checked
+    from underskin.mechanisms.declared.document import checked
 
     try:
         data = file.read_bytes()

@@ -1,5 +1,6 @@
-"""The options for rig description and estimator, and reading with them."""
+"""The options for rig description, estimator and contact, and reading with them."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from underskin.recordings.frf.estimators import Estimator
     from underskin.recordings.reading import Reading
     from underskin.recordings.rig_description import RigDescription
+
 
 RigOption = Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")]
 EstimatorOption = Annotated[
@@ -44,3 +46,18 @@ def reading_notes(reading: "Reading") -> list[str]:
     """Assumptions in reading, a line for each field, and warnings."""
     mappings = [f"read {field or 'the text as'}: {how}" for field, how in reading.taken.items()]
     return [*mappings, *(f"look at: {warning}" for warning in reading.warnings)]
+
+
+class Contact(StrEnum):
+    """How the sphere touches the layer, as `ContactName` has it."""
+
+    PAPER = "paper"
+    SOLVED = "solved"
+
+
+ContactOption = Annotated[
+    Contact,
+    typer.Option(
+        help="Hertz' pressure of a half space on the layer, as a dead load; or contact with the layer itself, solved."
+    ),
+]

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from underskin.cli.rigs import EstimatorOption, RigOption, rig_description_in
-from underskin.cli.sending import outcome
-from underskin.cli.store import LOCAL, KeyOption, Url
+from underskin.cli.store import LOCAL, KeyOption, Url, outcome
 from underskin.errors import ServiceError, UnderskinError, Unreachable
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses, Fleets, Mechanisms
 from underskin.client.documents import Change, DesignAnswer, FieldAnswer, TableEntry
 from underskin.client.http_session import Session, path_of
-from underskin.surrogate.contact_model import ContactName
+from underskin.surrogate.sigma_table import ContactName
 from underskin.units import Floats
 
 _Answer = TypeVar("_Answer", bound=answers.ServiceAnswer)

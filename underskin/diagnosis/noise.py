@@ -46,9 +46,9 @@ from typing import Self
 import numpy as np
 from scipy.optimize import minimize
 
+from underskin.inversion.mixed_model import GAIN_RANGE, POSITION_RANGE
 from underskin.mechanisms.base import Kind
 from underskin.recordings.curve_course import CurveLandmarks
-from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
 from underskin.units import Complexes, Floats, Indices
 
 GAIN_FALL = (0.6, 0.35)  # sd of the logarithm below and above

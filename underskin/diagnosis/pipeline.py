@@ -40,15 +40,14 @@ from underskin.diagnosis.validation.signatures import (
     remaining_confounding,
     without_seating,
 )
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
+from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, ActiveCatalogue
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.plausibility import implausible
-from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 
 _KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first one present gives the verdict

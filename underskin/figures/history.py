@@ -9,8 +9,7 @@ import plotly.graph_objects as go
 
 from underskin.diagnosis.reporting.page_styles import LINE_COLOURS
 from underskin.figures.style import COLOURS, MARKERS, label, styled
-from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
-from underskin.inversion.mixed_model import SDS_OF_95
+from underskin.inversion.mixed_model import MOST_NAMED, SDS_OF_95, many_sensors
 
 _MOST_POINTS = 600  # of a history that shows each sensor
 _MOST_WITH_CAPS = 60  # points of a line, up to which error bars have caps

@@ -1,17 +1,248 @@
-"""The sentences of findings in English: for each reason a template, or a function where words depend on the arguments.
+"""Findings in English: for each reason a template, or a function where words depend on the arguments.
 
-Only this table and `sentences` hold the words; another language is another such pair. Templates are those of
-`str.format` with further specifications (`_Template`).
+Only this module holds the words; another language is another such module. Templates are those of `str.format` with
+further specifications (`_Template`). The types of arguments that are more than a number or a name say their own words.
 """
 
+import math
 import string
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
-from underskin.findings import sentences
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.formatting import in_digits, significant
-from underskin.findings.lacking import Lack, Lacking
+
+
+@dataclass(frozen=True)
+class UnitGuess:
+    """The slip of units that explains an unusual magnitude.
+
+    `size` in the field's `unit` is corrected to each value of `meant`, in that unit, if it was given in the paired
+    unit; or to the only value, paired with an empty unit, if it is off by ten to the power of `off_by`. If empty, no
+    slip explains it; a size of 0 is a measured value of 0.
+    """
+
+    size: float
+    unit: str
+    meant: tuple[tuple[float, str], ...] = ()
+    off_by: int = 0
+
+    def __str__(self) -> str:
+        """The slip in words."""
+        if self.size == 0:
+            return "a dead sensor?"
+        if not self.meant:
+            return "no unit that we know explains it"
+        if self.off_by:
+            return f"off by a factor of 10^{self.off_by}? {self.meant[0][0]:g} {self.unit} would be usual"
+        was = ", ".join(f"{self.size:g} {given_in} is {meant:g} {self.unit}" for meant, given_in in self.meant)
+        return f"{was}: was it given in {' or '.join(given_in for _, given_in in self.meant)}?"
+
+
+class ImplausibleD33(StrEnum):
+    """Why a d33 is implausible."""
+
+    TOO_LARGE = "too_large"
+    TOO_SMALL = "too_small"
+    NEGATIVE = "negative"
+    NOT_PVDF = "not_pvdf"
+
+    @property
+    def words(self) -> str:
+        """Why, and what may be wrong."""
+        return {
+            self.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
+            self.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
+            self.NEGATIVE: "negative: is the sign of charge or force turned?",
+            self.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
+        }[self]
+
+
+class DefectKind(StrEnum):
+    """What a run of damaged samples does."""
+
+    OVERLOAD = "overload"
+    HELD_SAMPLES = "held_samples"
+    JUMP = "jump"
+
+    @property
+    def words(self) -> str:
+        """What the samples do."""
+        return {
+            DefectKind.OVERLOAD: "stay at the end of the range: overload",
+            DefectKind.HELD_SAMPLES: "repeat one value: samples were dropped and the last one held",
+            DefectKind.JUMP: "break the signal's course: samples were dropped, or a spike",
+        }[self]
+
+
+_MOST_SENSORS = 3  # named one by one
+_MOST_LISTED = 6
+
+
+def counted_negative(fields: Sequence[str], more: int, may_be_pulled: bool) -> str:
+    """Force, displacement or both fall during loading."""
+    named = " and ".join({"force_n": "force", "displacement_mm": "displacement"}[name] for name in fields)
+    are, channel = ("are", "those channels") if len(fields) > 1 else ("is", "that channel")
+    negative = f"{named} {are} counted negative as it is pressed, where compression and depth count positive"
+    unless = (
+        ": right for a sample that is pulled, else reverse the signs of both channels"
+        if may_be_pulled
+        else f"; turned round here, reverse the sign of {channel}"
+    )
+    return f"{negative}{unless}{more_alike(more, 'recording')}"
+
+
+def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> str:
+    """A force channel at the end of its range."""
+    limits = " or ".join(f"{limit:.4g} N" for limit in limits_n)
+    return (
+        f"the force channel saturates: {samples} samples, {percent:.2g} % of all, read {limits} while the travel goes "
+        "on; they were left out (record with a larger range)"
+    )
+
+
+def thickness_unknown(answer: str, is_tried: bool) -> str:
+    """An undeclared thickness, and what it leaves open."""
+    layer = "a thin layer on a stiff base (layered contact)"
+    undeclared = "the thickness of the sample is not declared"
+    if answer == "layered contact":
+        alike = "a thick sample that stiffens with strain can look alike"
+        return f"{undeclared}: that of {layer} was fitted, and {alike}; declare thickness_mm"
+    tried = "whose thickness was fitted" if is_tried else "which was not tried"
+    return f"{undeclared}, and {layer}, {tried}, stiffens a curve much like {answer}: declare thickness_mm"
+
+
+def more_alike(count: int, noun: str) -> str:
+    """The number of further cases, in brackets; empty for 0."""
+    return f" ({count} more {noun}{'s' if count > 1 else ''} like it)" if count else ""
+
+
+def listed_sensors(ids: Sequence[str]) -> str:
+    """Some sensors by their ids."""
+    if len(ids) > _MOST_SENSORS:
+        return f"sensors {', '.join(ids[:_MOST_SENSORS])} and {len(ids) - _MOST_SENSORS} more"
+    return f"sensors {', '.join(ids[:-1])} and {ids[-1]}"
+
+
+def listed(ids: Sequence[str], noun: str) -> str:
+    """The first ids of a list, and the number of further ones."""
+    if len(ids) > _MOST_LISTED:
+        return f"{noun} {', '.join(ids[:_MOST_LISTED])} and {len(ids) - _MOST_LISTED} more"
+    return f"{noun if len(ids) > 1 else noun.removesuffix('s')} {', '.join(ids)}"
+
+
+def all_conjugated(lag_us: float | None) -> str:
+    """All FRFs in the other sign convention, or a force channel that lags."""
+    if lag_us is not None:
+        return (
+            "the phase over frequency leads: either the FRFs are conjugated, in the convention e^(-iωt), or the force "
+            f"channel lags by {float(f'{lag_us:.2g}'):g} µs; these recordings cannot tell which, and nothing was "
+            "changed"
+        )
+    return (
+        "the phase over frequency is one that no sensor or amplifier can have unless its sign is reversed: the FRFs "
+        "look conjugated, in the convention e^(-iωt); all were conjugated back"
+    )
+
+
+def elastomer(modulus_mpa: float, low_mpa: float, high_mpa: float, guess: UnitGuess) -> str:
+    """A modulus that no elastomer has."""
+    word = "stiffer" if modulus_mpa > high_mpa else "softer"
+    usual = f"({low_mpa:g} to {high_mpa:g} MPa)"
+    return f"{modulus_mpa:g} MPa is {word} than elastomers are {usual}: {guess}"
+
+
+def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> str:
+    """Lines where the force has little power."""
+    of = "one recording" if recordings == 1 else f"{recordings} recordings"
+    beyond = f"; so are {beside} whose noise the next line shares" if beside else ""
+    why = "the force has little power there, or the charge does not follow it"
+    return f"{faint} of {measured} lines of {of} are left out: {why}{beyond}"
+
+
+def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
+    """Noise that biases an estimator."""
+    channel = {"H1": "the force", "H2": "the charge", "Hv": "force and charge"}[estimator]
+    size = "small" if percent < 0 else "large"
+    text = f"noise in {channel} makes {estimator} too {size} by {in_digits(abs(percent), 2)} %: that was taken off"
+    return f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open" if unsure_percent >= 0.1 else text
+
+
+def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
+    """A band behind filters."""
+    filters = [f"a high-pass of about {in_digits(high_pass_hz, 2)} Hz"] if high_pass_hz > 0 else []
+    filters += [f"a low-pass of about {in_digits(low_pass_hz, 2)} Hz"] if low_pass_hz < float("inf") else []
+    return (
+        f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind {' and '.join(filters)}, and does not "
+        f"reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a diagnosis "
+        "takes the filter into account, or record a band further off its corner"
+    )
+
+
+def parameter_at_bound(mechanism: str, parameter: str, low: float, high: float, unit: str) -> str:
+    """A parameter at the end of its range."""
+    limits = f"{low:g} to {high:g} {unit.strip('-')}".rstrip()
+    called = parameter.replace("_", " ")
+    return f"{mechanism}: {called} lies at or beyond an end of its search ({limits}), which is no result"
+
+
+def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float) -> str:
+    """Mechanisms that predict held-out groups no better."""
+    omitted = " and ".join(groups) if len(groups) <= 2 else f"each of {len(groups)} parts in turn"
+    before, after = (float(f"{percent:.4g}") for percent in (before_percent, after_percent))  # as the report has them
+    return (
+        f"what was left out ({omitted}) is predicted no better with {' and '.join(mechanisms)}: "
+        f"{before:.3g} % before, {after:.3g} % after; do not extrapolate with it"
+    )
+
+
+def no_simple_law(
+    tried: int, law: str = "", part: str = "", after_percent: float = 0.0, before_percent: float = 0.0
+) -> str:
+    """The held-out prediction by the best of the laws of one form over one axis."""
+    if not law:
+        return f"none of {tried} simple laws of one quantity over one axis gains anything"
+    if after_percent >= before_percent:
+        return (
+            f"none of {tried} simple laws of one quantity over one axis predicts {part} held out better than without "
+            f"it: the nearest, {law}, predicts them to {after_percent:.2g} % instead of {before_percent:.2g} %"
+        )
+    return (
+        f"none of {tried} simple laws of one quantity over one axis stands out enough to be stated: the nearest, "
+        f"{law}, predicts {part} held out to {after_percent:.2g} % instead of {before_percent:.2g} %"
+    )
+
+
+_AS_A_SLIP = 0.05  # largest difference of the logarithm of a factor from that of 2 or 1/2
+
+
+def sensor_alone(sensor: str, share: float, recordings: int) -> str:
+    """A sensor whose level differs from the common one of the others."""
+    doubled = min(abs(math.log(share / 2)), abs(math.log(2 * share))) < _AS_A_SLIP
+    causes = "its own d33, its cable, or peak-to-peak beside amplitudes" if doubled else "its own d33 or its cable"
+    return (
+        f"sensor {sensor!r} responds with {share:.2f} times the others' charge, and they are alike: {causes}; "
+        f"taken to their level by this factor ({recordings} recordings)"
+    )
+
+
+def labels_permuted(sensors: Sequence[str], places: Sequence[str], since: str | None, recordings: int) -> str:
+    """More than two sensors, each of which answers where another one was pressed."""
+    start = f"from recording {since!r} on, in the order of time, " if since else ""
+    moved = ", ".join(f"{sensor!r} where {place!r} was pressed" for sensor, place in zip(sensors, places, strict=True))
+    return (
+        f"{start}{len(sensors)} sensors answer where another one of them was pressed ({moved}): their labels or "
+        f"cables look rotated, as by a plug that is off by one; put right ({recordings} recordings)"
+    )
+
+
+def labels_contradict_places(sensors: Sequence[str], recordings: int) -> str:
+    """Sensors that respond where others were pressed, without an exchange that explains all of it."""
+    answer = f"{listed(sensors, 'sensors')} answer{'s' if len(sensors) == 1 else ''} where others were pressed"
+    return f"{answer}, and no exchange explains it: labels or places are wrong; left out ({recordings} recordings)"
+
 
 Words = str | Callable[..., str]
 OPTIONAL: Mapping[str, Any] = {
@@ -49,11 +280,11 @@ _WORDS: Mapping[str, Callable[[Any, str], str]] = {
     "significant": lambda value, digits: significant(value, int(digits)),
     "or": lambda texts, _: ", or ".join(texts),
     "count": lambda ids, _: str(len(ids)),
-    "listed": sentences.listed,
-    "sensors": lambda ids, _: sentences.listed_sensors(ids),
-    "more": sentences.more_alike,
-    "defect": lambda kind, _: sentences.DefectKind(kind).words,
-    "implausible": lambda kind, _: sentences.ImplausibleD33(kind).words,
+    "listed": listed,
+    "sensors": lambda ids, _: listed_sensors(ids),
+    "more": more_alike,
+    "defect": lambda kind, _: DefectKind(kind).words,
+    "implausible": lambda kind, _: ImplausibleD33(kind).words,
 }
 
 
@@ -159,7 +390,7 @@ ENGLISH: Mapping[Reason, Words] = {
     "other: is force or displacement of one of them off by 1000?",
     Reason.MODULUS_BESIDE_DECLARED: f"{_NEEDED} {{declared_mpa:g}} MPa is declared",
     Reason.MODULUS_BESIDE_RUBBER: f"{_NEEDED} Rubber has {{low_mpa:g}} to {{high_mpa:g}} MPa",
-    Reason.MODULUS_OF_NO_ELASTOMER: sentences.elastomer,
+    Reason.MODULUS_OF_NO_ELASTOMER: elastomer,
     Reason.DECLARED_UNUSUAL: _UNUSUAL,
     Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
     Reason.PRELOADS_SMALL: "no preload is above {highest_n:g} N: they look 1000 × too small; were they given in kN?",
@@ -202,11 +433,11 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.NARROW_MAP: "the map spans {span_mm:g} mm, on sensors {diameter_mm:g} mm across: is it in mm?",
     Reason.UNUSUAL_MAGNITUDE: _UNUSUAL,
     Reason.UNUSUAL_MEDIAN_FRF: f"FRF, median of the recordings: {_UNUSUAL}",
-    Reason.CURVE_COUNTED_NEGATIVE: sentences.counted_negative,
+    Reason.CURVE_COUNTED_NEGATIVE: counted_negative,
     Reason.ROWS_REVERSED: "its rows begin where it is deepest and end in the air: it was read from the last row to "
     "the first"
     "{is_timed:, without its times, since a way out alone does not tell what relaxes|}",
-    Reason.FORCE_SATURATES: sentences.force_saturates,
+    Reason.FORCE_SATURATES: force_saturates,
     Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
     "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "
     "screw or an encoder{frequency_hz:; or hum, or a vibration of {frequency_hz:.3g} Hz|}); it was subtracted",
@@ -219,7 +450,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.RECORDINGS_REVERSED: "the sign of {reversed_recordings:count} of {recordings} recordings is the opposite "
     "of the "
     "others', with no order in it: reversed ({reversed_recordings:listed recordings})",
-    Reason.ALL_CONJUGATED: sentences.all_conjugated,
+    Reason.ALL_CONJUGATED: all_conjugated,
     Reason.RECORDINGS_CONJUGATED: "the phase over frequency of {conjugated:count} of {recordings} recordings is that "
     "of the "
     "others with its sign turned: they look conjugated, and were conjugated back ({conjugated:listed recordings})",
@@ -230,8 +461,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CABLES_EXCHANGED: "from recording {since!r} on, in the order of time, sensors {first!r} and {second!r} "
     "answer as each "
     "other: their cables look exchanged; put right ({recordings} recordings)",
-    Reason.LABELS_PERMUTED: sentences.labels_permuted,
-    Reason.LABELS_CONTRADICT_PLACES: sentences.labels_contradict_places,
+    Reason.LABELS_PERMUTED: labels_permuted,
+    Reason.LABELS_CONTRADICT_PLACES: labels_contradict_places,
     Reason.SILENT_TOGETHER: "sensors {first!r} and {second!r} both show no response since recording {since!r}, in the "
     "order of "
     "time: cables exchanged, or a connector or amplifier that they share; left out ({recordings} recordings)",
@@ -266,7 +497,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.D33_OF_ROW: f"d33 is {{d33_pc_per_n:.3g}} pC/N, {{kind:implausible}}{_MORE_ROWS}",
     Reason.DEFECT: DEFECT,
     Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",
-    Reason.LINES_LEFT_OUT: sentences.lines_left_out,
+    Reason.LINES_LEFT_OUT: lines_left_out,
     Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
     "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "
     "percent; a drive that repeats itself at least four times gives them all",
@@ -276,19 +507,19 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.EXCITED_AT_MAINS: "in {affected} of {recordings} recordings the force acts near a multiple of the mains "
     "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge cannot be told from the response there, and "
     "d33 holds only if there is none; record at other frequencies",
-    Reason.NOISE_IN_FRF: sentences.noise_in_frf,
-    Reason.BEHIND_FILTER: sentences.behind_filter,
+    Reason.NOISE_IN_FRF: noise_in_frf,
+    Reason.BEHIND_FILTER: behind_filter,
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
-    Reason.PARAMETER_AT_BOUND: sentences.parameter_at_bound,
-    Reason.THICKNESS_UNKNOWN: sentences.thickness_unknown,
+    Reason.PARAMETER_AT_BOUND: parameter_at_bound,
+    Reason.THICKNESS_UNKNOWN: thickness_unknown,
     Reason.LINE_NOISE_LEVEL: "the lines scatter {level:digits 2} times more about the stated answer than about their "
     "own "
     "neighbours: part of the misfit along frequency may have been taken for noise",
     Reason.REMAINDER: "a smooth part of about {percent:.2g} % of the largest force, {times:.0f} times a sample's "
     "noise, is left that no mechanism here describes",
-    Reason.HELD_OUT_NO_BETTER: sentences.held_out,
-    Reason.NO_SIMPLE_LAW: sentences.no_simple_law,
+    Reason.HELD_OUT_NO_BETTER: held_out,
+    Reason.NO_SIMPLE_LAW: no_simple_law,
     Reason.UNUSUAL_SCATTER: "the gain of the recordings scatters by {percent:.2g} %, and by {usual:.2g} % on a poor "
     "rig: something that no recording states changes from one to the next",
     Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for {mechanisms}: a platen that is "
@@ -307,8 +538,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.WEAK: f"weak: {_OF_ARRAY}",
     Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
     "cable or its range, beyond any spread; left out ({recordings} recordings)",
-    Reason.SENSOR_WEAKER: sentences.sensor_alone,
-    Reason.SENSOR_STRONGER: sentences.sensor_alone,
+    Reason.SENSOR_WEAKER: sensor_alone,
+    Reason.SENSOR_STRONGER: sensor_alone,
     Reason.STRONG: f"strong: {_OF_ARRAY}",
     Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
     Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",

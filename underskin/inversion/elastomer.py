@@ -2,15 +2,23 @@
 recording separately (recordings/modulus.py). Curves are prepared by curve_preparation.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from underskin.errors import InvalidInput, unusable
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import (
+    Campaign,
+    CompressionRecording,
+    CurveRecording,
+    IndentationRecording,
+    SkinDescription,
+)
 from underskin.recordings.curve_preparation import prepared, reject_exchanged_columns
 from underskin.recordings.modulus import CompressionModulus, IndentationModulus, of_compression, of_indentation
-from underskin.surrogate.contact_table import load_contact
+from underskin.surrogate.tables import load_contact
 
 
 @dataclass(frozen=True)
@@ -24,28 +32,40 @@ class RecordingModulus:
 
 def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
     """The modulus by each recording of kind `compression` or `indentation`."""
-    moduli = []
-    skin = campaign.skin
-    for recording in prepared(campaign).campaign.recordings:
-        result: CompressionModulus | IndentationModulus | InvalidInput
-        try:
-            if isinstance(recording, CompressionRecording | IndentationRecording):
-                reject_exchanged_columns(recording)
-            if isinstance(recording, CompressionRecording):
-                _require_height(recording)
-                result = of_compression(recording)
-            elif isinstance(recording, IndentationRecording):
-                result = of_indentation(recording, skin.poisson_ratio, skin.thickness_mm, load_contact().softening)
-            else:
-                continue
-            if not result.modulus > 0:
-                raise unusable("force_n", None, "must rise with the displacement: no modulus follows from a fall")
-        except InvalidInput as error:
-            result = error
-        except (ArithmeticError, ValueError) as error:  # NumPy's among them
-            result = unusable("force_n", None, f"no modulus can be computed from these numbers ({error})")
-        moduli.append(RecordingModulus(recording.id, recording.kind, result))
-    return moduli
+    return [
+        RecordingModulus(curve.id, curve.kind, _modulus_or_reason(curve, campaign.skin))
+        for curve in prepared(campaign).campaign.curves
+    ]
+
+
+def _modulus_or_reason(
+    curve: CurveRecording, skin: SkinDescription
+) -> CompressionModulus | IndentationModulus | InvalidInput:
+    try:
+        reject_exchanged_columns(curve)
+        result = _MODULUS[curve.kind](curve, skin)
+    except InvalidInput as error:
+        return error
+    except (ArithmeticError, ValueError) as error:  # NumPy's among them
+        return unusable("force_n", None, f"no modulus can be computed from these numbers ({error})")
+    if not result.modulus > 0:
+        return unusable("force_n", None, "must rise with the displacement: no modulus follows from a fall")
+    return result
+
+
+def _of_indentation(curve: IndentationRecording, skin: SkinDescription) -> IndentationModulus:
+    return of_indentation(curve, skin.poisson_ratio, skin.thickness_mm, load_contact().softening)
+
+
+def _of_compression(curve: CompressionRecording, _: SkinDescription) -> CompressionModulus:
+    _require_height(curve)
+    return of_compression(curve)
+
+
+_MODULUS: Mapping[str, Callable[[Any, SkinDescription], CompressionModulus | IndentationModulus]] = {
+    "indentation": _of_indentation,
+    "compression": _of_compression,
+}
 
 
 def _require_height(recording: CompressionRecording) -> None:

@@ -23,18 +23,23 @@ from scipy.special import chdtrc, stdtr
 from underskin.errors import InvalidInput
 from underskin.findings import english
 from underskin.findings.codes import Reason
+from underskin.findings.english import ImplausibleD33
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
-from underskin.findings.sentences import ImplausibleD33
 from underskin.inversion import mixed_model
-from underskin.inversion.many_sensors import ROBUST
-from underskin.inversion.mixed_model import SDS_OF_95, Estimate, LevelRows, MixedModel
-from underskin.physics.charge_response import gain
-from underskin.physics.skin import Indenter
-from underskin.prediction import plausibility, pressed_skin
-from underskin.prediction.declared_values import UNUSED_FOR_D33, unlikely
-from underskin.prediction.exchanged_values import exchanged_values
-from underskin.prediction.pressed_skin import DECLARED, declared_skin, log_slopes, transmission, usable
+from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
+from underskin.physics.charge_response import Indenter, gain
+from underskin.prediction import pressed_skin
+from underskin.prediction.answers import OTHER, STATED
+from underskin.prediction.pressed_skin import (
+    DECLARED,
+    declared_skin,
+    exchanged_values,
+    log_slopes,
+    transmission,
+    usable,
+)
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
 from underskin.recordings.frf.estimation import common_delay, exchanged_channels, lines_of, without_delay
 from underskin.recordings.frf.flat_zone import (
@@ -48,9 +53,10 @@ from underskin.recordings.frf.flat_zone import (
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
-from underskin.recordings.plausibility import at_reading
-from underskin.surrogate.contact_model import ContactModel
+from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
+from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 from underskin.units import Floats, Indices, Mask, force_unit, to_lab, to_si, unusual
 
 _DEAD = 0.05  # of the array's d33
@@ -410,7 +416,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     NoD33
         No frf recording lies within the domain of the table, has a line in the flat zone, and any charge.
     """
-    recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
+    recorded = campaign.of(FrfRecording)
     if not recorded:
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     for excess in excesses(campaign.skin):
@@ -612,3 +618,29 @@ def _cells(rows: RecordingD33, good: Indices) -> tuple[Indices, Indices, Indices
     keys = np.column_stack([rows.sensor, rows.indenter_radius, rows.preload])[good]
     _, where, cell, count = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
     return cell.reshape(-1), good[where], count
+
+
+def array_d33_by_other(
+    campaign: Campaign,
+    table: SigmaTable,
+    band_hz: tuple[float, float] | None,
+    inversion: Inversion,
+    requested: ContactName = "paper",
+) -> Estimate | None:
+    """`absolute_d33` by the other contact model; None where there is none, or it differs by at most 1 %.
+
+    Parameters
+    ----------
+    campaign, band_hz
+        The data of `inversion`, which used the contact model `requested`.
+    table
+        The σ table, with the contact table in the same folder; raises TableError where that cannot be read.
+    """
+    estimate = inversion.absolute_d33
+    if estimate is None:
+        return None
+    try:
+        other = invert(campaign, contact_model(table, OTHER[requested]), band_hz).absolute_d33
+    except InvalidInput:  # all recordings lie outside its domain
+        return None
+    return other if other is not None and abs(other.value / estimate.value - 1) > STATED else None

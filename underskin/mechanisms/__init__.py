@@ -4,11 +4,20 @@ model = compose(["moving_contact_edge", "contact_resonance"], campaign, table)
 prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
 """
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Unsupported, Values
+from underskin.mechanisms.base import (
+    HeavyTailed,
+    Kind,
+    Mechanism,
+    Normal,
+    Parameter,
+    Stage,
+    Uniform,
+    Unsupported,
+    Values,
+)
 from underskin.mechanisms.models.composed import Model, Prediction, compose
 from underskin.mechanisms.models.contact_state import Contacts, FrfState
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.registry import CATALOGUE
 
 __all__ = [

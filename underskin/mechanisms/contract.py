@@ -4,7 +4,7 @@ A test checks the mechanisms of this package against it; those of other packages
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar, get_args
 
@@ -13,13 +13,12 @@ import numpy as np
 from underskin.errors import InvalidInput, not_finite, not_unique
 from underskin.extensions import described
 from underskin.mechanisms import base
-from underskin.mechanisms.base import Kind, Mechanism, Stage
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Uniform
 from underskin.mechanisms.models.composition import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
+from underskin.mechanisms.models.contact_state import joined
 from underskin.mechanisms.models.curves import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.models.frf_design import joined
 from underskin.mechanisms.models.indentation import IndentationModel
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
@@ -159,7 +158,7 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     if _result_of(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
         return
     field = f"law ({kind})"
-    model = _result_of(field, lambda: _model(mechanism, campaign, kind))
+    model = _result_of(field, lambda: _MODELS[kind](mechanism, campaign))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
     values = []
@@ -192,10 +191,11 @@ def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
             _require(f"{field} at several points", None, same, allowed)
 
 
-def _model(mechanism: Mechanism, campaign: Campaign, kind: Kind) -> FrfModel | IndentationModel | CompressionModel:
-    if kind == "frf":
-        return FrfModel([mechanism], campaign, load_table())
-    return (IndentationModel if kind == "indentation" else CompressionModel)([mechanism], campaign)
+_MODELS: Mapping[Kind, Callable[[Mechanism, Campaign], FrfModel | IndentationModel | CompressionModel]] = {
+    "frf": lambda mechanism, campaign: FrfModel([mechanism], campaign, load_table()),
+    "indentation": lambda mechanism, campaign: IndentationModel([mechanism], campaign),
+    "compression": lambda mechanism, campaign: CompressionModel([mechanism], campaign),
+}
 
 
 def _points(parameters: Sequence[Parameter], nuisances: Sequence[Parameter]) -> Iterator[tuple[Floats, str]]:

@@ -1,5 +1,7 @@
 """One synthetic campaign of each kind, on which every law can be evaluated: all axes vary, all fields are given."""
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
 from underskin.mechanisms.base import Kind
@@ -8,6 +10,7 @@ from underskin.recordings.campaign import (
     CompressionRecording,
     FrfRecording,
     IndentationRecording,
+    Recording,
     Sensor,
     SkinDescription,
 )
@@ -21,8 +24,7 @@ _SKIN = SkinDescription(
 
 def reference_campaign(kind: Kind) -> Campaign:
     """A campaign with recordings of one kind on a skin of 2.5 mm and 2 MPa."""
-    recordings = _frf() if kind == "frf" else _indentations() if kind == "indentation" else _compressions()
-    return Campaign(f"reference {kind}", _SKIN, recordings)
+    return Campaign(f"reference {kind}", _SKIN, _RECORDINGS[kind]())
 
 
 def _frf() -> tuple[FrfRecording, ...]:
@@ -78,3 +80,10 @@ def _compressions() -> tuple[CompressionRecording, ...]:
         )
         for number, height in enumerate((30.0, 15.0))
     )
+
+
+_RECORDINGS: Mapping[Kind, Callable[[], tuple[Recording, ...]]] = {
+    "frf": _frf,
+    "indentation": _indentations,
+    "compression": _compressions,
+}

@@ -169,7 +169,7 @@ def _load() -> _Loaded:
 
 def _add_declared(mechanisms: list[Mechanism], packages: dict[str, str]) -> list[FileError]:
     """Add the mechanisms of the lab's folder with their file names; return the errors of unusable ones."""
-    from underskin.mechanisms.declared.folder import in_folder  # the models, which few callers need
+    from underskin.mechanisms.declared.document import in_folder  # the models, which few callers need
 
     folder = in_folder()
     refused = [*folder.refused]

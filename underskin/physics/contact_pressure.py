@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
-from underskin.physics.contact_integral_equation import ContactEquation
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactEquation, curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
@@ -30,7 +29,7 @@ class SpherePressure:
     radius : float
         Contact radius a [m].
     shape : ndarray, (modes,)
-        Legendre coefficients of f, as in `contact_integral_equation`.
+        Legendre coefficients of f, as in `contact_curves`.
     """
 
     radius: float

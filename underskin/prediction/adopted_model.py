@@ -13,16 +13,15 @@ import numpy as np
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
-from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Stage
+from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Parameter, Stage
 from underskin.mechanisms.laws import misalignment
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
-from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE, current_name
 from underskin.mechanisms.unlisted.grammar import CAMPAIGN_SPECIFIC_AXES, Grammar, bound_to
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
-from underskin.prediction import plausibility
 from underskin.prediction.forward_model import needed_fields, require_fields
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, SkinDescription, frf_of, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -161,19 +160,19 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     reason = implausible_d33(report)
     if reason is not None:
         raise InvalidInput("diagnosis_id", "a diagnosis", f"its d33 cannot be right: {reason}")
-    if not any(isinstance(recording, FrfRecording) for recording in campaign.recordings):
+    if not campaign.of(FrfRecording):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {
         current_name(stated["name"]): {
             current_name(parameter["name"]): float(parameter["value"]) for parameter in stated["parameters"]
         }
         for stated in report["mechanisms"]
-        if not _is_for_curves_only(stated["name"])
+        if stated["name"] not in CATALOGUE or CATALOGUE[stated["name"]].acts_on_frfs
     }
     if report["mechanisms"] and not parameters:
         allowed = "must be of mechanisms that act on FRFs: those of curves alone predict none"
         raise InvalidInput("diagnosis_id", report["mechanisms"][0]["name"], allowed)
-    frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
+    frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and mechanism.acts_on_frfs]
     current = parameters_together(frf, campaign, "frf")
     for name, values in parameters.items():
         # Parameters that move no prediction are not used; those of older reports may be others.
@@ -187,10 +186,6 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     relative_deviation = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
     model = AdoptedModel(campaign.skin, parameters, relative_deviation)
     return model if report["verdict"] in ("explained", "ambiguous") else replace(model, **_law(report, campaign, table))
-
-
-def _is_for_curves_only(name: str) -> bool:
-    return name in CATALOGUE and "frf" not in CATALOGUE[name].kinds
 
 
 def not_adopted(report: Mapping[str, Any]) -> str | None:

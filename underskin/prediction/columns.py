@@ -1,13 +1,24 @@
-"""Columns in lab units between a client and the library: their common length, and CSV out."""
+"""Columns in lab units between a client and the library: their common length, and CSV in and out.
+
+CSV comes in as spreadsheets and users write it; headings and cells are read like those of the CSV template of
+campaigns.
+"""
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
+from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement, wrong_type
+from underskin.recordings.readers import template_columns, text
+from underskin.recordings.readers import template_columns as polar_columns
+from underskin.recordings.readers import template_columns as template_lines
+from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE
 from underskin.units import Floats, Mask
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -64,3 +75,234 @@ def _cells(column: Floats | Sequence[Any]) -> Sequence[Any]:
     if not isinstance(column, np.ndarray):
         return column
     return ["NaN" if value != value else repr(value) for value in column.tolist()]
+
+
+REAL = "frf_pc_per_n"  # which has no imaginary part
+_SAYS_NOTHING = re.compile(r'\s*(#|"?sep=.?"?\s*$)', re.IGNORECASE)
+_LABELS = ("id", "sensor", "name", "recorded_at")  # columns that only label rows, also by numbers
+
+
+class CsvError(ValueError):
+    """A text is no CSV of columns; the message says what it must be."""
+
+
+@dataclass(frozen=True)
+class CsvColumn:
+    """One column: its heading as written, the cells, the lines of the text on which they stand (from 1), the factor to
+    the unit of its field, and the decimal mark."""
+
+    heading: str
+    cells: Sequence[str]
+    lines: Sequence[int]
+    factor: float
+    decimal: str
+
+    def numbers(self, field: str) -> list[float]:
+        """Its values in the field's unit; raises InvalidInput that names the field, the row and the line."""
+        values = [_number(cell, self.decimal) for cell in self.cells]
+        if None in values:
+            raise self._refused(field, [row for row, value in enumerate(values) if value is None])
+        return [value * self.factor for value in values if value is not None]
+
+    def _refused(self, field: str, rows: Sequence[int]) -> InvalidInput:
+        """The error for the first of these rows without a number, with the count of the others."""
+        cell = self.cells[rows[0]]
+        more = f", and {len(rows) - 1} more in this column" if len(rows) > 1 else ""
+        hint = f"; {cell} {text.ungrouped(cell)}" if text.is_grouped(cell) else ""
+        return wrong_type(field, cell, f"must be a number (line {self.lines[rows[0]]}{more}){hint}", rows[0])
+
+
+@dataclass(frozen=True)
+class RealPart:
+    """The real part of an FRF in columns of its magnitude [pC/N] and its phase [rad]."""
+
+    magnitude: CsvColumn
+    phase: CsvColumn
+
+    @property
+    def heading(self) -> str:
+        """Both headings as written."""
+        return f"{self.magnitude.heading}, {self.phase.heading}"
+
+    @property
+    def cells(self) -> Sequence[str]:
+        """The cells of the magnitude."""
+        return self.magnitude.cells
+
+    def numbers(self, _field: str) -> list[float]:
+        """Its values in pC/N; raises InvalidInput that names magnitude or phase, the row and the line."""
+        polar = zip(self.magnitude.numbers(MAGNITUDE), self.phase.numbers(self.phase.heading), strict=True)
+        return [size * math.cos(angle) for size, angle in polar]
+
+
+@dataclass(frozen=True)
+class CsvColumns:
+    """The columns by field; by heading, the cells of `unknown` columns, which hold numbers and name no field, and of
+    `labels`, which only label rows; `notes`: what was left out or interpreted."""
+
+    fields: dict[str, CsvColumn | RealPart]
+    unknown: dict[str, list[str]]
+    labels: dict[str, list[str]]
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The header, the rows with as many cells, their lines, and the separator; `notes` are the lines left out."""
+
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    separator: str
+    notes: list[str]
+
+    def columns(self) -> list[list[str]]:
+        return [[row[index] for row in self.rows] for index in range(len(self.header))]
+
+
+def from_csv(data: bytes, field_names: Collection[str]) -> CsvColumns:
+    """The columns of a text whose first line names the fields; `field_names` are those that there are.
+
+    The text is UTF-8, UTF-16 or Latin-1. Cells are separated by commas, or by semicolons or tabs where the header is;
+    the decimal mark follows from `text.decimal_mark`. Headings are read in capitals or not, with units in brackets or
+    in the name; magnitude and phase of an FRF become its real part, `frf_pc_per_n`, where that is a field. A first line
+    `sep=;`, lines that begin with #, empty lines, and a column without a heading that is empty or counts the rows are
+    ignored. Words below a blank line under the table are a note.
+
+    Raises:
+        CsvError: the text is no CSV, a field comes twice, or a row has too many or too few cells.
+    """
+    table = _table(data)
+    result = CsvColumns({}, {}, {}, table.notes)
+    columns = table.columns()
+    values = [cells for heading, cells in zip(table.header, columns, strict=True) if not _is_named_label(heading)]
+    decimal = text.decimal_mark(values, table.separator)
+    polar = (MAGNITUDE, PHASE) if REAL in field_names else ()
+    parts: dict[str, CsvColumn] = {}
+    meanings = template_columns.fields_of(table.header, field_names)
+    for index, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
+        if meant is None and polar and polar_columns.is_phase_without_unit(heading):
+            meant = PHASE, _angle(heading, cells, decimal, result.notes)
+        if meant is not None and meant[0] in (*field_names, *polar):
+            field, factor = meant
+            if field in (fields := parts if field in polar else result.fields):
+                raise _twice(field, fields[field].heading, heading)
+            fields[field] = CsvColumn(heading, cells, table.lines, factor, decimal)
+        elif _only_counts(index, heading, cells):
+            continue
+        elif _is_label(heading, cells, decimal):
+            if heading in result.labels:
+                raise CsvError(f"must name each column once; its header has {heading!r} twice")
+            result.labels[heading] = cells
+        else:
+            result.unknown[heading] = cells
+    result.notes.extend(template_columns.halved(column.heading for column in result.fields.values()))
+    if parts:
+        real = _real_part(parts)
+        if REAL in result.fields:
+            raise _twice(REAL, result.fields[REAL].heading, real.heading)
+        result.fields[REAL] = real
+        result.notes.append(f"{real.heading}: the real part is taken as {REAL}")
+    return result
+
+
+def _twice(field: str, first: str, second: str) -> CsvError:
+    twice = f"{first!r} and {second!r} are the same"
+    return CsvError(f"must name each field once; its header has {field!r} twice: {twice}")
+
+
+def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -> float:
+    """The factor to rad of a phase without a unit, by its values; adds a note."""
+    numbers = [abs(number) for cell in cells if (number := _number(cell, decimal)) is not None]
+    try:
+        factor = polar_columns.angle_by_values(heading, max(numbers, default=0.0))
+    except ValueError as error:
+        raise CsvError(f"has a phase that is not clear: {error}") from None
+    notes.append(f"{heading!r} {template_columns.READ_AS_DEGREES}")
+    return factor
+
+
+def _real_part(parts: Mapping[str, CsvColumn]) -> RealPart:
+    """The real part from magnitude and phase; raises CsvError where one is missing."""
+    if len(parts) == 1:
+        ((field, column),) = parts.items()
+        raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {polar_columns.lacking(field)}")
+    return RealPart(parts[MAGNITUDE], parts[PHASE])
+
+
+def _table(data: bytes) -> _Table:
+    try:
+        content = text.decode(data, "the text")
+    except FileError as error:
+        raise CsvError(f"must be readable as CSV ({error.place}: {error.reason})") from None
+    numbered = [
+        (number, line)
+        for number, line in enumerate(text.lines(content), start=1)
+        if line.strip() and not _SAYS_NOTHING.match(line)
+    ]
+    separator = next((mark for mark in ";\t" if numbered and mark in numbered[0][1]), ",")
+    reader = csv.reader((line + "\n" for _, line in numbered), strict=True, delimiter=separator)
+    table, lines = [], []
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if any(cells):
+                table.append(cells)
+                lines.append(numbered[reader.line_num - 1][0])
+    except csv.Error as error:
+        raise CsvError(f"must be readable as CSV ({error})") from error
+    header = _without_empty_end(table[0], 1) if table else []
+    notes = _notes_under(table, lines) if len(header) > 1 else []
+    if len(table) < 2:
+        raise CsvError("must have a header of field names and at least one row")
+    for row, line in zip(table[1:], lines[1:], strict=True):
+        if len(_without_empty_end(row, len(header))) != len(header):
+            raise CsvError(f"must have as many cells in each row as in the header: {len(row)} on line {line}, "
+                           f"{len(header)} in the header")  # fmt: skip
+    return _Table(header, table[1:], lines[1:], separator, notes)
+
+
+def _notes_under(table: list[list[str]], lines: list[int]) -> list[str]:
+    """Remove rows of words below a blank line under a table; returns a message on each."""
+    end = len(table)
+    while end > 2 and template_lines.is_note(table[end - 1]):
+        end -= 1
+    start = next((row for row in range(end, len(table)) if lines[row] > lines[row - 1] + 1), len(table))
+    notes = [template_lines.note_message(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
+    del table[start:], lines[start:]
+    return notes
+
+
+def _without_empty_end(cells: list[str], least: int) -> list[str]:
+    """The cells without empty ones at the end, as spreadsheets write them, but at least `least` of them."""
+    while len(cells) > least and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _only_counts(index: int, heading: str, cells: Sequence[str]) -> bool:
+    """Whether it is an index of the rows, as spreadsheets write it, or an empty column."""
+    if heading.lower() not in template_columns.NO_NAME:
+        return False
+    counts = [[str(first + row) for row in range(len(cells))] for first in (0, 1)]
+    return not any(cells) or (index == 0 and list(cells) in counts)
+
+
+def _is_named_label(heading: str) -> bool:
+    lower = heading.lower()
+    return lower in _LABELS or lower.startswith(template_columns.FURTHER)
+
+
+def _is_label(heading: str, cells: Sequence[str], decimal: str) -> bool:
+    if _is_named_label(heading):
+        return True
+    return bool(heading) and all(_number(cell, decimal) is None for cell in cells)
+
+
+def _number(cell: str, decimal: str) -> float | None:
+    if decimal == "." and cell.isascii() and "_" not in cell:
+        try:
+            return float(cell)  # most cells, in less time
+        except ValueError:
+            pass
+    return text.number(cell, decimal)

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.errors import conflicting, not_one_of, out_of_range, required, wrong_type
-from underskin.mechanisms.base import NEEDED_FIELDS, Kind, Mechanism
+from underskin.mechanisms.base import NEEDED_FIELDS, Kind, Mechanism, Parameter
 from underskin.mechanisms.models.composed import Model, forward_model
-from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
-from underskin.mechanisms.parameter import Parameter
+from underskin.mechanisms.models.composition import D33, chosen, kind_of, parameters_together
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Conditions, FrfConditions
 from underskin.surrogate.sigma_table import SigmaTable
@@ -94,7 +93,8 @@ def predict(
         require_fields(acting, conditions)
     model = forward_model(acting, conditions, table, kind)
     declared = conditions.skin.d33_pc_per_n
-    values = {} if declared is None or kind != "frf" else {"d33": declared}
+    has_d33 = any(parameter.name == D33.name for parameter in model.parameters)
+    values = {D33.name: declared} if declared is not None and has_d33 else {}
     values |= parameters
     mechanism_count = sum(map(len, parameters_together(acting, conditions, kind).values()))
     fit = _fit_coordinates(model, values, mechanism_count)

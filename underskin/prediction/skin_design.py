@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.physics.skin import Indenter, Skin
+from underskin.physics.charge_response import Indenter, Skin
 from underskin.prediction.pressed_skin import Transmission, transmission
-from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import sigma_off_centre
+from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import Floats, Mask
 
 _SWEEP = 61  # points of a sweep

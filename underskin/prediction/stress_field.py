@@ -19,13 +19,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.physics import charge_response, elastic_layer
-from underskin.physics.contact_integral_equation import ContactEquation
+from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
+from underskin.physics.contact_curves import ContactEquation
 from underskin.physics.contact_pressure import SpherePressure
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.layer_stress import layer_stress
-from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
 from underskin.prediction.pressed_skin import Transmission, in_words, of_pressed, transmission
-from underskin.surrogate.contact_model import ContactModel
+from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import Floats, checked
 
 _AROUND_CONTACT, _AROUND_SENSOR, _LEAST = 2.0, 1.0, 3.0  # thicknesses that a section shows

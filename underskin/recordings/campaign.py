@@ -11,22 +11,24 @@ stars. `units_checked` does not admit them.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import KW_ONLY, asdict, dataclass, fields, replace
 from datetime import datetime
 from functools import cache
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from underskin import errors
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, out_of_range, too_few, wrong_type
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import validation as field
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.validation import Further, shown
 from underskin.units import Complexes, Floats, checked, finite, non_negative, to_si
+
+DEFAULT_KIND = "frf"  # of a recording whose document states none
 
 
 @dataclass(frozen=True)
@@ -91,8 +93,29 @@ class SkinDescription:
     sensors: Sensors = ()
 
 
+class _OfAKind:
+    """What kinds of recordings differ in beside their fields."""
+
+    needed_of_skin: ClassVar[tuple[str, ...]] = ()  # fields of the skin that must be declared
+    has_sphere: ClassVar[bool] = True
+
+    @property
+    def height_mm(self) -> float:
+        """The height of a sample between platens [mm], which no compression exceeds; infinite under a sphere."""
+        return math.inf
+
+    @classmethod
+    def form_errors(cls, document: Mapping[str, Any]) -> list[InvalidInput]:  # noqa: ARG003
+        """Errors of a document whose fields do not go together."""
+        return []
+
+    def with_estimator(self, estimator: Estimator) -> Self:  # noqa: ARG002
+        """With this estimator of the FRF; itself where it is no time series of one."""
+        return self
+
+
 @dataclass(frozen=True, eq=False)
-class FrfConditions:
+class FrfConditions(_OfAKind):
     """The skin is pressed by `preload_n` and shaken by `dynamic_force_n` (peak amplitude) at `frequency_hz`.
 
     A `dynamic_force_n` of 0 is the limit of a small oscillation. `frequency_hz` is None for a time series, whose lines
@@ -104,13 +127,14 @@ class FrfConditions:
     indenter_radius_mm: field.Declared
     preload_n: field.Declared
     dynamic_force_n: field.Positive
-    kind: field.Name = "frf"
+    kind: field.Name = DEFAULT_KIND
     recorded_at: field.TimeOfDay | None = None
     load_cycles: field.Count | None = None
     dwell_s: field.NotNegative | None = None
     position_mm: field.Position | None = None
     frequency_hz: field.Frequencies | None = None
     conditions: Further | None = None
+    needed_of_skin = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
 
     def without_measurements(self, **changes: Any) -> "FrfConditions":
         """The conditions without measurements, with some of them changed."""
@@ -122,7 +146,7 @@ _OF_FRF = [model_field.name for model_field in fields(FrfConditions)]
 
 
 @dataclass(frozen=True, eq=False)
-class IndentationConditions:
+class IndentationConditions(_OfAKind):
     """A sphere pressed in and drawn back by `displacement_mm`, loading and unloading in order.
 
     `displacement_mm` is that of the sphere. `stage_stiffness_n_per_mm` is that of a stage or cantilever whose
@@ -145,7 +169,7 @@ class IndentationConditions:
 
 
 @dataclass(frozen=True, eq=False)
-class CompressionConditions:
+class CompressionConditions(_OfAKind):
     """A cylinder between platens that approach each other by `displacement_mm`; tension negative."""
 
     id: field.Name
@@ -159,10 +183,19 @@ class CompressionConditions:
     load_cycles: field.Count | None = None
     dwell_s: field.NotNegative | None = None
     conditions: Further | None = None
+    has_sphere = False
+
+    @property
+    def height_mm(self) -> float:
+        """The height of the sample [mm]."""
+        return self.sample_height_mm
 
 
 CurveConditions = IndentationConditions | CompressionConditions
 RecordingConditions = FrfConditions | IndentationConditions | CompressionConditions
+
+
+_Kind = TypeVar("_Kind")
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +205,10 @@ class Conditions:
     name: str
     skin: SkinDescription
     recordings: tuple[RecordingConditions, ...]
+
+    def of(self, recorded: type[_Kind]) -> list[_Kind]:
+        """The recordings of one class, in order."""
+        return [recording for recording in self.recordings if isinstance(recording, recorded)]
 
 
 def frf_conditions(
@@ -273,7 +310,7 @@ def _rows(columns: Mapping[str, ArrayLike]) -> list[dict[str, Any]]:
 
 def frf_of(conditions: Conditions) -> list[FrfConditions]:
     """The conditions of FRF recordings, in order; raises InvalidInput where there is none."""
-    recordings = [recording for recording in conditions.recordings if isinstance(recording, FrfConditions)]
+    recordings = conditions.of(FrfConditions)
     if not recordings:
         raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
@@ -396,6 +433,10 @@ def read_estimator(name: str, value: Any, units_checked: bool) -> Estimator:  # 
     return checked_estimator(name, shown(value))
 
 
+LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
+TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
+
+
 @dataclass(frozen=True, eq=False)
 class FrfRecording(FrfConditions):
     """Charge over force under these conditions.
@@ -420,6 +461,23 @@ class FrfRecording(FrfConditions):
         attributes = vars(conditions.without_measurements(frequency_hz=frequency))
         real, imaginary = 1e12 * values.real, 1e12 * values.imag
         return cls(**attributes, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary, coherence=coherence)
+
+    @classmethod
+    def form_errors(cls, document: Mapping[str, Any]) -> list[InvalidInput]:
+        """Errors unless a recording holds either a complete FRF or a complete time series."""
+        series = [name for name in TIME_SERIES if document.get(name) is not None]
+        lines = [name for name in (*LINES, "coherence") if document.get(name) is not None]
+        if document.get("estimator") is not None and not series:
+            allowed = "must be absent where there is no time series"
+            return [errors.conflicting("estimator", shown(document["estimator"]), allowed)]
+        if series and lines:
+            return [errors.conflicting(series[0], "given", "must be absent where the FRF itself is given")]
+        needed = TIME_SERIES if series else LINES
+        return [errors.required(name) for name in needed if document.get(name) is None]
+
+    def with_estimator(self, estimator: Estimator) -> Self:
+        """With this estimator of the FRF; itself where it holds its lines."""
+        return self if self.sample_rate_hz is None else replace(self, estimator=estimator)
 
 
 @dataclass(frozen=True, eq=False)
@@ -462,6 +520,16 @@ class Campaign(Conditions):
     recordings: tuple[Recording, ...]
     units_checked: bool = False
 
+    @property
+    def curves(self) -> list[CurveRecording]:
+        """The indentations and compressions, in order."""
+        return [recording for recording in self.recordings if isinstance(recording, CurveRecording)]
+
+    def with_curves(self, change: Callable[[CurveRecording], CurveRecording]) -> "Campaign":
+        """The campaign with each curve changed."""
+        recordings = (change(one) if isinstance(one, CurveRecording) else one for one in self.recordings)
+        return replace(self, recordings=tuple(recordings))
+
 
 @dataclass(frozen=True)
 class RecordingProblem:
@@ -486,7 +554,7 @@ def samples_of(curve: CurveRecording, rows: NDArray[Any]) -> CurveRecording:
 
 def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
     """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
-    recordings = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
+    recordings = campaign.of(FrfRecording)
     if not recordings:
         raise errors.too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
@@ -557,7 +625,7 @@ def _plain(model: Any) -> dict[str, Any]:
             document[name] = value.tolist()
         elif isinstance(value, Tolerances):
             document[name] = asdict(value)
-        elif value not in (None, ()) and (name, value) != ("kind", "frf"):
+        elif value not in (None, ()) and (name, value) != ("kind", DEFAULT_KIND):
             document[name] = list(value) if isinstance(value, tuple) else value
     return document
 
@@ -567,12 +635,12 @@ def _recording(given: Any, skin: SkinDescription, units_checked: bool) -> tuple[
         document = field.mapping("recording", given)
     except InvalidInput as refusal:
         return None, [refusal]
-    kind = shown(document.get("kind")) or "frf"
+    kind = shown(document.get("kind")) or DEFAULT_KIND
     if kind not in KINDS:
         return None, [errors.not_one_of("kind", kind, KINDS)]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
     refused_fields = {error.field for error in refused}
-    together = [*_unmet_needs(kind, document, values, skin), *_unequal_lengths(values)]
+    together = [*_unmet_needs(KINDS[kind], document, values, skin), *_unequal_lengths(values)]
     refused += [error for error in together if error.field not in refused_fields]
     if refused_fields:
         return None, refused
@@ -581,40 +649,21 @@ def _recording(given: Any, skin: SkinDescription, units_checked: bool) -> tuple[
 
 
 def _unmet_needs(
-    kind: str, document: Mapping[str, Any], values: Mapping[str, Any], skin: SkinDescription
+    kind: type[Recording], document: Mapping[str, Any], values: Mapping[str, Any], skin: SkinDescription
 ) -> list[InvalidInput]:
     """The missing requirements of the recording's kind on the skin and its own fields; `values`: the valid fields."""
     refused = []
-    sensor = None if kind == "compression" else values.get("sensor")
+    sensor = values.get("sensor")
     if sensor is not None and sensor not in (skin_sensor.id for skin_sensor in skin.sensors):
         refused.append(
             InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors", code=ErrorCode.NOT_ONE_OF)
         )
-    if kind == "frf":
-        refused += [
-            errors.required(f"skin.{name}", "required by a recording of kind frf")
-            for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
-            if getattr(skin, name) is None
-        ]
-        refused += _form_errors(document)
-    return refused
-
-
-LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
-TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
-
-
-def _form_errors(document: Mapping[str, Any]) -> list[InvalidInput]:
-    """Errors unless a recording holds either a complete FRF or a complete time series."""
-    series = [name for name in TIME_SERIES if document.get(name) is not None]
-    lines = [name for name in (*LINES, "coherence") if document.get(name) is not None]
-    if document.get("estimator") is not None and not series:
-        allowed = "must be absent where there is no time series"
-        return [errors.conflicting("estimator", shown(document["estimator"]), allowed)]
-    if series and lines:
-        return [errors.conflicting(series[0], "given", "must be absent where the FRF itself is given")]
-    needed = TIME_SERIES if series else LINES
-    return [errors.required(name) for name in needed if document.get(name) is None]
+    refused += [
+        errors.required(f"skin.{name}", "required by a recording of kind frf")
+        for name in kind.needed_of_skin
+        if getattr(skin, name) is None
+    ]
+    return [*refused, *kind.form_errors(document)]
 
 
 def _unequal_lengths(values: Mapping[str, Any]) -> list[InvalidInput]:

@@ -8,7 +8,7 @@ first sample; for a sphere 3 (1 − ν²) F/(4 √R u^1.5) at the deepest sample
 magnitude matters.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
@@ -422,9 +422,8 @@ def implausible(campaign: Campaign) -> list[Finding]:
     if campaign.units_checked:
         return []
     kinds: dict[str, list[CurveRecording]] = {}
-    for recording in campaign.recordings:
-        if isinstance(recording, IndentationRecording | CompressionRecording):
-            kinds.setdefault(recording.kind, []).append(recording)
+    for curve in campaign.curves:
+        kinds.setdefault(curve.kind, []).append(curve)
     return [finding for curves in kinds.values() for finding in contradictions(campaign.skin, curves)]
 
 
@@ -470,14 +469,12 @@ def apparent_mpa(curve: CurveRecording, poisson_ratio: float) -> float:
     force: Floats = curve.force_n[finite]
     if len(displacement) < 2:
         return float("nan")
-    if isinstance(curve, IndentationRecording):
-        load, moved = _indentation_from_contact(displacement, force)
-        return float(0.75 * (1 - poisson_ratio**2) * load / (np.sqrt(curve.indenter_radius_mm) * moved**1.5))
-    at = int(np.argmax(np.abs(force)))
-    load, moved = abs(force[at] - force[0]), abs(displacement[at] - displacement[0])
-    if not load or not moved:
-        return float("nan")
-    return float(load / (np.pi / 4 * curve.sample_diameter_mm**2) / (moved / curve.sample_height_mm))
+    return _APPARENT[curve.kind](curve, displacement, force, poisson_ratio)
+
+
+def _of_sphere(curve: IndentationRecording, displacement: Floats, force: Floats, poisson_ratio: float) -> float:
+    load, moved = _indentation_from_contact(displacement, force)
+    return float(0.75 * (1 - poisson_ratio**2) * load / (np.sqrt(curve.indenter_radius_mm) * moved**1.5))
 
 
 def _indentation_from_contact(displacement: Floats, force: Floats) -> tuple[float, float]:
@@ -488,3 +485,17 @@ def _indentation_from_contact(displacement: Floats, force: Floats) -> tuple[floa
     contact_point = float(displacement[before[-1]]) if len(before) else float(displacement[0])
     load, moved = float(force[landmarks.turn]) - landmarks.zero, float(displacement[landmarks.turn]) - contact_point
     return (load, moved) if load > 0 and moved > 0 else (float("nan"), 1.0)
+
+
+def _of_cylinder(curve: CompressionRecording, displacement: Floats, force: Floats, _: float) -> float:
+    at = int(np.argmax(np.abs(force)))
+    load, moved = abs(force[at] - force[0]), abs(displacement[at] - displacement[0])
+    if not load or not moved:
+        return float("nan")
+    return float(load / (np.pi / 4 * curve.sample_diameter_mm**2) / (moved / curve.sample_height_mm))
+
+
+_APPARENT: Mapping[str, Callable[[Any, Floats, Floats, float], float]] = {
+    "indentation": _of_sphere,
+    "compression": _of_cylinder,
+}

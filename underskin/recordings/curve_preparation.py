@@ -15,7 +15,7 @@ material does that: by Hertz depth grows as F^(2/3), never with an exponent abov
 as it is: it may be in tension.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,14 +23,7 @@ import numpy as np
 from underskin.errors import unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import (
-    Campaign,
-    CurveRecording,
-    FrfRecording,
-    IndentationRecording,
-    Recording,
-    samples_of,
-)
+from underskin.recordings.campaign import Campaign, CurveRecording, samples_of
 from underskin.recordings.curve_course import is_one_sided, roughness
 from underskin.units import Floats, Indices, Mask
 
@@ -74,10 +67,8 @@ def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
 def orientation(recording: CurveRecording) -> Orientation:
     """The signs of a recording by its finite samples; `turns` are indices among these."""
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
-    if isinstance(recording, IndentationRecording):
-        return _oriented(force, travel, sphere=True)
-    oriented = _oriented(force, travel, sphere=False)
-    is_pulled = oriented.may_be_pulled and np.nanmax(np.abs(travel)) > _LONGEST * recording.sample_height_mm
+    oriented = _oriented(force, travel, sphere=recording.has_sphere)
+    is_pulled = oriented.may_be_pulled and np.nanmax(np.abs(travel)) > _LONGEST * recording.height_mm
     return replace(oriented, negative=(), may_be_pulled=False) if is_pulled else oriented
 
 
@@ -219,7 +210,7 @@ def _first_movement(travel: Floats) -> int:
 
 def findings(campaign: Campaign) -> list[Finding]:
     """One finding for the first curve of each kind and set of negative columns, with the number of further ones."""
-    return _counted((curve, orientation(curve)) for curve in _curves(campaign).values())
+    return _counted((curve, orientation(curve)) for curve in campaign.curves)
 
 
 def _counted(curves: Iterable[tuple[CurveRecording, Orientation]]) -> list[Finding]:
@@ -240,23 +231,14 @@ def _counted(curves: Iterable[tuple[CurveRecording, Orientation]]) -> list[Findi
 
 def turned(campaign: Campaign) -> tuple[Campaign, int]:
     """The campaign with negative columns of its curves sign-reversed, and the number of curves changed."""
-    changed = 0
-    recordings: list[Recording] = []
-    for recording in campaign.recordings:
-        fields = () if isinstance(recording, FrfRecording) else counted_negative(recording)
-        changed += bool(fields)
-        recordings.append(recording if isinstance(recording, FrfRecording) else with_turned(recording, fields))
-    return replace(campaign, recordings=tuple(recordings)), changed
+    changed = sum(bool(counted_negative(curve)) for curve in campaign.curves)
+    return campaign.with_curves(lambda curve: with_turned(curve, counted_negative(curve))), changed
 
 
 def with_turned(recording: CurveRecording, fields: tuple[str, ...]) -> CurveRecording:
     """A curve with the signs of these columns reversed."""
     columns = {name: -np.asarray(getattr(recording, name)) for name in fields}
     return replace(recording, **columns) if columns else recording  # type: ignore[arg-type]
-
-
-def _curves(campaign: Campaign) -> Mapping[str, CurveRecording]:
-    return {recording.id: recording for recording in campaign.recordings if not isinstance(recording, FrfRecording)}
 
 
 _LEAST_IN = 32  # samples of the approach
@@ -281,8 +263,7 @@ def reject_exchanged_columns(recording: CurveRecording) -> None:
 
 def are_exchanged(recording: CurveRecording) -> bool:
     """Whether force and displacement of a curve look exchanged."""
-    is_sphere = isinstance(recording, IndentationRecording)
-    return look_exchanged(recording.displacement_mm, recording.force_n, sphere=is_sphere)
+    return look_exchanged(recording.displacement_mm, recording.force_n, sphere=recording.has_sphere)
 
 
 def look_exchanged(displacement: Floats, force: Floats, *, sphere: bool) -> bool:
@@ -581,21 +562,21 @@ def prepared(campaign: Campaign) -> PreparedCurves:
     """The campaign with its curves prepared; other recordings are unchanged."""
     findings: list[Finding] = []
     oriented_curves: list[tuple[CurveRecording, Orientation]] = []
-    recordings: list[Recording] = []
-    for recording in campaign.recordings:
-        if isinstance(recording, FrfRecording) or are_exchanged(recording):
-            recordings.append(recording)
-            continue
-        curve, curve_findings = _without_saturation(recording)
+
+    def changed(curve: CurveRecording) -> CurveRecording:
+        if are_exchanged(curve):
+            return curve
+        curve, curve_findings = _without_saturation(curve)
+        findings.extend(curve_findings)
         oriented = orientation(curve)
         oriented_curves.append((curve, oriented))
         for step in (_turned, _forwards, _without_periodic_error):
-            curve, step_findings = step(curve, oriented)
-            curve_findings += step_findings
-        recordings.append(curve)
-        findings += curve_findings
-    counted = _counted(oriented_curves)
-    return PreparedCurves(replace(campaign, recordings=tuple(recordings)), (*counted, *findings))
+            curve, curve_findings = step(curve, oriented)
+            findings.extend(curve_findings)
+        return curve
+
+    changed_campaign = campaign.with_curves(changed)
+    return PreparedCurves(changed_campaign, (*_counted(oriented_curves), *findings))
 
 
 def _turned(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
@@ -617,7 +598,7 @@ def _forwards(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecord
 def _is_backwards(curve: CurveRecording) -> bool:
     """Whether the rows of a monotonic curve begin at the deepest sample, without the adhesive pull of a withdrawal."""
     travel, force = (column[np.isfinite(column)] for column in (curve.displacement_mm, curve.force_n))
-    if isinstance(curve, IndentationRecording):
+    if curve.has_sphere:
         shallow = float(np.median(force[np.argsort(travel, kind="stable")[: max(1, len(force) // _SHALLOW)]]))
         if len(travel) != len(force) or force.min() < shallow - _STICKS * np.ptp(force):
             return False
@@ -630,7 +611,7 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
     if len(finite) < _LEAST:
         return curve, []
     travel, force = curve.displacement_mm[finite], curve.force_n[finite]
-    at_limit = saturated(travel, force, sphere=isinstance(curve, IndentationRecording))
+    at_limit = saturated(travel, force, sphere=curve.has_sphere)
     if not at_limit.any():
         return curve, []
     limits = np.unique(force[at_limit])
@@ -644,7 +625,7 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
 
 
 def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
-    if not isinstance(curve, IndentationRecording):
+    if not curve.has_sphere:
         return curve, []
     finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
     if len(finite) < _LEAST:

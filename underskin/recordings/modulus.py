@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.sphere_law import PARABOLOID, Softening, SphereLaw
 from underskin.recordings.campaign import CompressionRecording, IndentationRecording
 from underskin.recordings.curve_course import is_one_sided, roughness

@@ -24,7 +24,6 @@ from underskin.recordings import curve_preparation, rig_mapping, validation
 from underskin.recordings.campaign import (
     COLUMNS,
     Campaign,
-    FrfRecording,
     Recording,
     RecordingProblem,
     SkinDescription,
@@ -107,14 +106,8 @@ class Reading:
         """
         if estimator is None:
             return self
-        recordings: list[Recording] = []
-        others = 0
-        for recording in self.campaign.recordings:
-            if isinstance(recording, FrfRecording) and recording.sample_rate_hz is not None:
-                recordings.append(replace(recording, estimator=estimator))
-            else:
-                recordings.append(recording)
-                others += 1
+        recordings = [recording.with_estimator(estimator) for recording in self.campaign.recordings]
+        others = sum(new is old for new, old in zip(recordings, self.campaign.recordings, strict=True))
         messages = [f"{estimator} is for time series, which {others} of {len(recordings)} recordings are not"]
         campaign = replace(self.campaign, recordings=tuple(recordings))
         return replace(self, campaign=campaign, warnings=[*self.warnings, *(messages if others else [])])
@@ -160,11 +153,11 @@ def _holds_frfs(contents: Contents) -> bool:
 def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
     """A file's channels, or its campaign document, before a rig description is applied; raises FileError."""
     with _opened(source, name) as stream:
-        kind = formats.detect(stream, name)
+        file_format = formats.detect(stream, name)
         size = stream.seek(0, io.SEEK_END)
-        if formats.is_parsed_apart(kind) or (kind != "JSON" and size > LARGEST_TEXT):
-            return parse_apart(kind, stream, name)
-        return formats.parse(kind, stream, name)
+        if formats.is_parsed_apart(file_format) or (file_format != "JSON" and size > LARGEST_TEXT):
+            return parse_apart(file_format, stream, name)
+        return formats.parse(file_format, stream, name)
 
 
 def sheet_text(content: bytes, name: str, sheet: str | None = None) -> str:

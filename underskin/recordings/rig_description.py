@@ -31,22 +31,25 @@ from underskin.errors import (
     InvalidInput,
     Mention,
     Requirement,
+    SeveralInvalid,
+    all_of,
     conflicting,
+    errors_of,
     not_one_of,
+    noting,
     out_of_range,
     required,
     too_few,
 )
 from underskin.recordings import validation as field
-from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
+from underskin.recordings.campaign import COLUMNS, DEFAULT_KIND, KINDS, SkinDescription
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.readers import channel_arithmetic, json_file, text
-from underskin.recordings.readers.calendar_times import time_zone, with_zone
 from underskin.recordings.readers.expressions import Expression
 from underskin.recordings.readers.sandbox import call_apart
+from underskin.recordings.readers.text import time_zone, with_zone
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
 from underskin.recordings.validation import mapping, named, shown
-from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
 from underskin.units import LAB
 
 _FULL_PERCENT = 100.0  # %
@@ -222,7 +225,7 @@ def from_dict(document: Any) -> RigDescription:
     document = field.of_schema("rig description", document, SCHEMA, _FIELDS)
     if "recordings" in document:
         return _with_entries(document)
-    kind, get = document.get("kind", "frf"), document.get
+    kind, get = document.get("kind", DEFAULT_KIND), document.get
     if not isinstance(kind, str) or kind not in KINDS:
         raise not_one_of("kind", shown(kind), KINDS)
     of_skin = {model_field.name for model_field in fields(SkinDescription)}
@@ -272,10 +275,13 @@ def _with_entries(document: Mapping[str, Any]) -> RigDescription:
     return dataclasses.replace(first, document=document, entries=tuple(entries.values()))
 
 
+_FURTHER_CHANNELS = {"frf": {COMPLEX_FRF, MAGNITUDE, PHASE, "time_s"}}  # beside the columns of a kind
+
+
 def channel_fields(kind: str) -> set[str]:
     """The fields of a kind that channels may hold; `time_s` of an frf defines its sample rate."""
     columns = {model_field.name for model_field in fields(KINDS[kind])} & set(COLUMNS)
-    return columns | {COMPLEX_FRF, MAGNITUDE, PHASE, "time_s"} if kind == "frf" else columns
+    return columns | _FURTHER_CHANNELS.get(kind, set())
 
 
 def _built(model: type[_Model], prefix: str, value: Any) -> _Model:

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from underskin.errors import FileError, Mention, Requirement
-from underskin.recordings.campaign import SCHEMA
+from underskin.recordings.campaign import KINDS, SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
-from underskin.recordings.common_samples import aligned, with_joined
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.channel_arithmetic import FIELD
@@ -31,11 +30,13 @@ from underskin.recordings.readers.unit_labels import (
     unit,
 )
 from underskin.recordings.regular_samples import (
+    aligned,
     complete_lines,
     evenly_sampled,
     longest_complete,
     mean_step,
     sorted_spectrum,
+    with_joined,
 )
 from underskin.recordings.rig_description import (
     AUTOMATIC,
@@ -138,18 +139,23 @@ class MappedBlock:
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
         self._require_stated_sign(columns)
-        if self.rig.kind == "frf":
-            return self._frf(columns)
+        return self._of_kind(columns)
+
+    def _of_kind(self, columns: dict[str, Any]) -> dict[str, Any]:
+        """Curves with the times that the sample rate gives."""
         rate = self.block.sample_rate_hz
         if rate is not None and "time_s" not in columns:
             columns["time_s"] = np.arange(len(columns[next(iter(columns))])) / rate
         return columns
 
+    def _is_series(self, columns: Mapping[str, Floats]) -> bool:  # noqa: ARG002
+        """Whether the samples are those of a time series that must not have gaps."""
+        return False
+
     def _complete(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """The columns without lines, or parts of a time series, that hold no number."""
-        is_series = self.rig.kind == "frf" and "frequency_hz" not in columns
         try:
-            complete, note = (longest_complete if is_series else complete_lines)(columns)
+            complete, note = (longest_complete if self._is_series(columns) else complete_lines)(columns)
         except ValueError as error:
             raise self._error("", str(error)) from None
         self.warnings += [note] if note else []
@@ -182,14 +188,8 @@ class MappedBlock:
                 raise self._error(f"property {name!r}", f"is {value!r}: {_NO_DECIBELS}")
 
     def spring(self) -> dict[str, float]:
-        """The stiffness of the spring whose deflection was subtracted: it determines the pull-off of adhesive
-        contacts."""
-        force = self.rig.channels.get("force_n", ChannelMapping(""))
-        displacement = self.rig.channels.get("displacement_mm", ChannelMapping(""))
-        spring = force.spring_constant_n_per_m
-        if self.rig.kind != "indentation" or displacement.deflection is None or spring is None:
-            return {}
-        return {"stage_stiffness_n_per_mm": 1e-3 * spring_constant(spring, self.stated, self.file)}
+        """The stiffness of the spring whose deflection was subtracted, where the recording has a field for it."""
+        return {}
 
     def _values(self, field: str, mapping: ChannelMapping) -> Values:
         spring = mapping.spring_constant_n_per_m
@@ -249,7 +249,7 @@ class MappedBlock:
         force = self.block.headed((self.rig.channels["force_n"] if is_travel else mapping).channel)
         assert travel is not None
         assert force is not None
-        falls = falling(force.values.real, travel.values.real, sphere=self.rig.kind == "indentation")
+        falls = falling(force.values.real, travel.values.real, sphere=KINDS[self.rig.kind].has_sphere)
         if ("displacement_mm" if is_travel else "force_n") not in falls:
             return 1
         self.warnings.append(f"channel {mapping.channel!r} falls as it is pressed, and was turned round")
@@ -266,7 +266,7 @@ class MappedBlock:
         self.taken[field] += f", less {readable(field, zero)}, its mean over {part}"
         words = field.rpartition("_")[0]
         self.warnings.append(f"the {words} is 0 on average over {part} of each curve: it was tared so")
-        rise = rise_of(column, len(tared)) if field == "force_n" and self.rig.kind != "frf" else None
+        rise = self._rise_of(column, len(tared)) if field == "force_n" else None
         if rise is not None:
             shown_in, count = readable_unit(field, abs(rise.height))
             self.warnings.append(
@@ -385,10 +385,39 @@ class MappedBlock:
                 hint += f"; if it is {name!r} that is reversed, turn it in the formula of {of} too"
         return hint
 
-    def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
+    def _rise_of(self, column: Floats, count: int) -> Rise | None:
+        """As `rise_of`, where the tared samples should be in the air."""
+        return rise_of(column, count)
+
+    def _error(self, place: str, reason: str | Requirement) -> FileError:
+        return FileError(self.file, place, reason)
+
+
+class IndentationBlock(MappedBlock):
+    """A sphere, whose pull-off from an adhesive contact the spring determines."""
+
+    def spring(self) -> dict[str, float]:
+        """`stage_stiffness_n_per_mm`, where a deflection was subtracted."""
+        force = self.rig.channels.get("force_n", ChannelMapping(""))
+        displacement = self.rig.channels.get("displacement_mm", ChannelMapping(""))
+        spring = force.spring_constant_n_per_m
+        if displacement.deflection is None or spring is None:
+            return {}
+        return {"stage_stiffness_n_per_mm": 1e-3 * spring_constant(spring, self.stated, self.file)}
+
+
+class FrfBlock(MappedBlock):
+    """An FRF, or the time series of one, which is tared under the preload."""
+
+    def _is_series(self, columns: Mapping[str, Floats]) -> bool:
+        return "frequency_hz" not in columns
+
+    def _rise_of(self, column: Floats, count: int) -> Rise | None:  # noqa: ARG002
+        return None
+
+    def _of_kind(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""
-        time = given.get("time_s")
-        columns = {name: column for name, column in given.items() if name != "time_s"}
+        time = columns.pop("time_s", None)
         if "frequency_hz" in columns:
             columns = self._sorted(columns)
         frequency = columns.get("frequency_hz")
@@ -440,8 +469,8 @@ class MappedBlock:
         self.warnings += [note] if note else []
         return even, rate
 
-    def _error(self, place: str, reason: str | Requirement) -> FileError:
-        return FileError(self.file, place, reason)
+
+_BLOCKS = {"frf": FrfBlock, "indentation": IndentationBlock, "compression": MappedBlock}
 
 
 def _centred(column: Floats) -> Floats:
@@ -571,7 +600,7 @@ def _applied(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         common = {name: common_value(name, value, stated, file) for name, value in rig.recording.items()}
         skins.append({name: common_value(name, value, stated, file) for name, value in rig.skin.items()})
         recorded_at = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
-        mapped = MappedBlock(rig, block, stated, file)
+        mapped = _BLOCKS[rig.kind](rig, block, stated, file)
         estimated = {} if rig.estimator is None else {"estimator": rig.estimator}
         identity = {"id": label, "kind": rig.kind, **recorded_at, **estimated}
         recordings.append({**identity, **mapped.spring(), **common, **mapped.fields()})

@@ -18,7 +18,7 @@ import numpy as np
 
 from underskin import errors
 from underskin.errors import ErrorCode, InvalidInput
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.units import Floats, checked
 
 LONGEST_NAME = 200  # characters

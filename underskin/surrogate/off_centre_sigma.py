@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from underskin.surrogate.contact_model import ContactModel
+from underskin.surrogate.sigma_table import ContactModel
 from underskin.surrogate.tensor_spline import CubicAxis
 from underskin.units import Floats
 

@@ -1,15 +1,194 @@
-"""The finite-element table of σ under a dead Hertz pressure, as a contact model: `paper`."""
+"""Contact models: the radius of a sphere's contact with the skin, and σ(a/h, rT/h, L) with derivatives, error and
+domain; and the one from the finite-element table of σ under a dead Hertz pressure, `paper`.
 
-import os
+a/h is that of the contact at small strain, at the given force; L = F/(R² E) measures finite strain. A cubic spline in
+a/h, rT/h and L^(1/3) interpolates σ at nodes; σ is smooth in L^(1/3), which is proportional to the strain (a/R,
+Seminara 2018, equation 16). Rows outside the domain are NaN, never extrapolated.
+"""
+
+import math
+import sys
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import make_interp_spline
 
+from underskin.autodiff import contiguous
 from underskin.physics import hertz
-from underskin.surrogate.contact_model import ContactModel, ContactRadius
-from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Table
+from underskin.physics.charge_response import Sigma
+from underskin.surrogate.tables import SIGMA_SCHEMA, Table, tables_folder
+from underskin.surrogate.tensor_spline import TensorSpline
 from underskin.units import Floats
+
+ContactName = Literal["paper", "solved"]
+
+
+@dataclass(frozen=True)
+class ContactRadius:
+    """`small_strain_over_h`: a/h at small strain, over which σ is tabulated; `radius`: a [m] with finite strain."""
+
+    small_strain_over_h: Floats
+    radius: Floats
+
+
+class ContactModel(ABC):
+    """Radius of a sphere's contact, and σ(a/h, rT/h, L) and the stress profile on the base from nodes.
+
+    Attributes
+    ----------
+    name : str
+        The name in requests.
+    sha256 : str
+        Of its table.
+    axes : tuple of ndarray
+        a/h, rT/h and L^(1/3) of the nodes.
+    """
+
+    name: ClassVar[ContactName]
+    sha256: str
+
+    @abstractmethod
+    def radius(
+        self, force: Floats, indenter_radius: Floats, youngs_modulus: Floats, poisson_ratio: Floats, thickness: Floats
+    ) -> ContactRadius:
+        """The contact of a force F [N] on a sphere R [m] with a layer of E [Pa], ν and h [m], columns of one shape."""
+
+    @abstractmethod
+    def load_over_cube(self, a_over_h: Floats) -> tuple[Floats, Floats]:
+        """P/(a/h)³ of the contact at small strain, P = F R (1 − ν²)/(E h³), and d ln a/d ln P."""
+
+    def _tabulate(
+        self, axes: tuple[Floats, Floats, Floats], sigma: Floats, rel_error: Floats, radii: Floats, profile: Floats
+    ) -> None:
+        """Set up the splines of σ and the profile (a/h, radii, L^(1/3)), and the bound on σ's error in each cell."""
+        self.axes = axes
+        self._sigma = TensorSpline.through(axes, sigma)
+        self._cell_error = _largest_at_corners(rel_error)
+        self._radii = radii
+        self._profile = TensorSpline.through((axes[0], radii, axes[2]), profile)
+        self._over_radius = make_interp_spline(radii, np.moveaxis(profile, 1, 0), k=3)
+
+    @property
+    def domain(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest a_over_h, rt_over_h and load_parameter, limits included."""
+        a, rho, x = self.axes
+        return {
+            "a_over_h": (float(a[0]), float(a[-1])),
+            "rt_over_h": (float(rho[0]), float(rho[-1])),
+            "load_parameter": (float(x[0]) ** 3, float(x[-1]) ** 3),
+        }
+
+    @property
+    def profile_end(self) -> float:
+        """The largest r/h of the profile, included."""
+        return float(self._radii[-1])
+
+    def sigma(self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Sigma:
+        """The transmission factor: charge = d33 · (3/2) (rT/h)² · σ · F.
+
+        Parameters
+        ----------
+        a_over_h, rt_over_h
+            Contact radius and sensor radius over the thickness [-].
+        load_parameter
+            L = F/(R² E) [-]; 0 is the linear layer. The arguments broadcast.
+
+        Returns
+        -------
+        Sigma
+            σ, the bound on its relative error, and which rows are inside; NaN where not.
+        """
+        columns = np.asarray(a_over_h, dtype=float), np.asarray(rt_over_h, dtype=float), np.cbrt(load_parameter)
+        shape = np.broadcast_shapes(*(column.shape for column in columns))
+        if math.prod(shape) == 1:
+            sigma, rel_error = (np.full(shape, x) for x in self._at_point(*(column.item() for column in columns)))
+            return Sigma(sigma, rel_error, np.isfinite(sigma))
+        from underskin.surrogate.spline_kernel import sigma_rows
+
+        full = (c if c.size == 1 or c.shape == shape else np.broadcast_to(c, shape) for c in columns)
+        sigma, rel_error = np.empty(shape), np.empty(shape)
+        flat = (contiguous(column.ravel()) for column in full)
+        sigma_rows(*self._sigma.compiled, self._cell_error, *flat, sigma.ravel(), rel_error.ravel())
+        return Sigma(sigma, rel_error, np.isfinite(sigma))
+
+    def at(self, a_over_h: float, rt_over_h: float, load_parameter: float = 0.0) -> tuple[float, float] | None:
+        """σ and the bound on its relative error at one point; None outside the domain."""
+        sigma, rel_error = self._at_point(a_over_h, rt_over_h, math.cbrt(load_parameter))
+        return None if math.isnan(sigma) else (sigma, rel_error)
+
+    def _at_point(self, *point: float) -> tuple[float, float]:
+        """σ and the bound at a/h, rT/h and L^(1/3), NaN outside: by compiled code where that is loaded, since it is
+        faster; the bits are the same."""
+        sigma_rows = getattr(sys.modules.get("underskin.surrogate.spline_kernel"), "sigma_rows", None)
+        if sigma_rows is None:
+            sigma, cell = self._sigma.at_point(*point)
+            return sigma, math.nan if math.isnan(sigma) else float(self._cell_error[cell])
+        at, answer = np.array(point), np.empty(2)
+        sigma_rows(*self._sigma.compiled, self._cell_error, at[:1], at[1:2], at[2:], answer[:1], answer[1:])
+        sigma, rel_error = answer.tolist()
+        return sigma, rel_error
+
+    def gradient(
+        self, a_over_h: ArrayLike, rt_over_h: ArrayLike, load_parameter: ArrayLike = 0.0
+    ) -> tuple[Floats, Floats, Floats]:
+        """The derivatives of σ.
+
+        Parameters
+        ----------
+        a_over_h, rt_over_h, load_parameter
+            As for `sigma`.
+
+        Returns
+        -------
+        tuple
+            ∂σ/∂(a/h), ∂σ/∂(rT/h) and ∂σ/∂L, NaN outside the domain. ∂σ/∂L is infinite at L = 0, where σ grows like
+            L^(1/3).
+        """
+        x = np.cbrt(load_parameter)
+        by_a, by_rho, by_x = self._sigma.gradient(a_over_h, rt_over_h, x)
+        with np.errstate(divide="ignore"):
+            return by_a, by_rho, by_x / (3 * x**2)
+
+    def profile(self, r_over_h: ArrayLike, a_over_h: ArrayLike, load_parameter: ArrayLike = 0.0) -> Floats:
+        """The normal stress on the base: T3 = −(3F/2πh²) · profile. A sensor averages it over its disc.
+
+        Parameters
+        ----------
+        r_over_h
+            Distance from the contact's axis over the thickness [-].
+        a_over_h, load_parameter
+            As for `sigma`; the arguments broadcast.
+
+        Returns
+        -------
+        array
+            In σ's scale, NaN outside the domain.
+        """
+        return self._profile.values(a_over_h, r_over_h, np.cbrt(load_parameter))
+
+    def profile_over(self, r_over_h: Floats) -> Floats:
+        """The profile at distances inside the domain (r,), for all contacts of `contact_axes`: (a, L^(1/3), r)."""
+        return np.moveaxis(np.asarray(self._over_radius(r_over_h)), 0, -1)
+
+    @property
+    def contact_axes(self) -> tuple[Floats, Floats]:
+        """a/h and L^(1/3) of the contacts whose profiles the table holds."""
+        return self.axes[0], self.axes[2]
+
+
+def _largest_at_corners(values: Floats) -> Floats:
+    """The largest value at the corners of each cell of the grid."""
+    for axis in range(values.ndim):
+        count = values.shape[axis]
+        low, high = (np.take(values, range(first, count - 1 + first), axis=axis) for first in (0, 1))
+        values = np.maximum(low, high)
+    return values
+
 
 SIGMA_TABLE = "sigma.h5"
 
@@ -39,16 +218,6 @@ class SigmaTable(ContactModel, Table):
     def load_over_cube(self, a_over_h: Floats) -> tuple[Floats, Floats]:
         """4/3 and 1/3, by Hertz."""
         return np.full_like(a_over_h, 4 / 3), np.full_like(a_over_h, 1 / 3)
-
-
-def tables_folder() -> Path:
-    """The folder of the tables: `UNDERSKIN_TABLES`, else in the installed package, else next to it in a checkout."""
-    override = os.environ.get("UNDERSKIN_TABLES")
-    if override:
-        return Path(override)
-    package = Path(__file__).parents[1]
-    shipped = package / "tables"
-    return shipped if shipped.is_dir() else package.parent / "tables"
 
 
 def load_table(path: Path | None = None) -> SigmaTable:

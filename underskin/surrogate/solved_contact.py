@@ -1,8 +1,10 @@
 """A rigid sphere in frictionless contact with the bonded incompressible layer itself, as a contact model: `solved`.
 
-The contact of the linear layer at the given force is exact (contact_integral_equation): its radius α = a/h, the
-transform p̂ of its pressure, and with M of the bonded layer the stress on the base (hankel_transform). What finite
-strain adds is in the contact table, over α and L^(1/3), L = F/(R² E):
+The contact of the linear layer at the given force is exact at nodes (contact_curves): its radius α = a/h, where with
+P = F R/(E' h³) P = (4/3) α³ A(α), A(0) = 1; the transform p̂ of its pressure; and with M of the bonded layer the stress
+on the base (hankel_transform). A is interpolated by a spline, and beyond the last node α is continued as a power of P,
+sufficient to state how far a contact is beyond a limit. What finite strain adds is in the contact table, over α and
+L^(1/3), L = F/(R² E):
 
     σ(α, ρ, L) = (1/3) ∫ p̂(k) M(k) [2 J1(kρ)/(kρ)] k dk + (2/ρ²) ∫₀^ρ correction(r; α, L) r dr
 
@@ -17,15 +19,46 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 from scipy.special import j0
 
-from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
+from underskin.physics.charge_response import INCOMPRESSIBLE
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
-from underskin.physics.layered_radius import LayeredRadius
-from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.surrogate.contact_model import ContactModel, ContactName, ContactRadius
-from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.sigma_table import ContactModel, ContactName, ContactRadius, SigmaTable
+from underskin.surrogate.tables import CONTACT_TABLE, ContactTable, load_contact
 from underskin.units import Floats
+
+_NODES = 97
+
+
+class LayeredRadius:
+    """α of P, and P of α; solving takes hundredths of a second."""
+
+    def __init__(self) -> None:
+        """Solve at the nodes, which are densest at small contacts."""
+        alpha = LARGEST_A_OVER_H * np.linspace(0.0, 1.0, _NODES) ** 1.5
+        force = np.append(1.0, ContactEquation(alpha[1:]).solve(Layer()).sphere_force.value)
+        self._ratio = make_interp_spline(alpha, force, k=3)
+        root = np.cbrt(4 / 3 * force)  # of P, over α
+        self._end = float(alpha[-1] * root[-1])
+        self._over_root = make_interp_spline(alpha * root, 1 / root, k=3)
+        self._power = 1 / float(self.log_slope(np.array(LARGEST_A_OVER_H)))  # exponent of α in P at the end
+
+    def alpha(self, load: Floats) -> Floats:
+        """a/h of P."""
+        root = np.cbrt(load)
+        inside = np.minimum(root, self._end)
+        return np.asarray(inside * self._over_root(inside) * (root / inside) ** (3 / self._power))
+
+    def load_over_cube(self, alpha: Floats) -> Floats:
+        """P/α³ of α = a/h."""
+        inside = np.minimum(alpha, LARGEST_A_OVER_H)
+        return np.asarray(4 / 3 * self._ratio(inside) * (alpha / inside) ** (self._power - 3))
+
+    def log_slope(self, alpha: Floats) -> Floats:
+        """d ln α/d ln P: 1/3 for small contacts, less for wide ones."""
+        inside = np.minimum(alpha, LARGEST_A_OVER_H)
+        return np.asarray(1 / (3 + inside * self._ratio(inside, nu=1) / self._ratio(inside)))
+
 
 _RHO = 3.0 * np.linspace(0.0, 1.0, 65) ** 1.5  # rT/h of the nodes: as far as the σ table's
 _DISC_POINTS = 12  # of Gauss' rule along the disc's radius

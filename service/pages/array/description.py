@@ -16,10 +16,9 @@ from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
-from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
+from underskin.errors import InvalidInput, UnderskinError, all_of, noting, out_of_range, wrong_type
 from underskin.findings.codes import Reason
 from underskin.recordings.validation import not_negative
-from underskin.several_errors import all_of, noting
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
@@ -133,7 +132,7 @@ def charge_figure(
     answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], radius_mm: float, numbers: str
 ) -> Drawn:
     """The sensors coloured by charge, with the loads if they have positions; `radius_mm`: sensor radius."""
-    from underskin.figures.array_discs import disc_size
+    from underskin.figures.array_map import disc_size
     from underskin.figures.loads import loaded_array
 
     x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))

@@ -28,9 +28,8 @@ from service.pages.shared.wrong_fields import errors_together
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, BaseStress, base_stress
 from underskin.array_stress.request import LabContact, read_request
-from underskin.errors import out_of_range, wrong_type
+from underskin.errors import noting, out_of_range, wrong_type
 from underskin.recordings.validation import check_fields
-from underskin.several_errors import noting
 from underskin.units import Floats
 
 router = APIRouter(prefix="/loads")

@@ -25,10 +25,9 @@ from service.pages.shared.wrong_fields import errors_together
 from service.store import Database
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
-from underskin.errors import UnderskinError, out_of_range
+from underskin.errors import UnderskinError, noting, out_of_range
 from underskin.prediction.columns import to_spreadsheet
 from underskin.recordings.readers import text
-from underskin.several_errors import noting
 
 router = APIRouter(prefix="/loads/map")
 

@@ -66,8 +66,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
     """d33 against preload, per sensor and as a map; if `show` is a sensor, only its points against preload, and it
     is marked."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
-    from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, significance_note
+    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
 
     if answer["band"] is None:
         return []

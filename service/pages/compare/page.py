@@ -188,8 +188,7 @@ def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
     """The maps of both with a common colour scale, and that of the difference; none if no d33 is known."""
-    from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, significance_note
+    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
 
     if not rows or not all(answer["sensors"] for answer in answers):
         return []

@@ -18,8 +18,7 @@ from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, qu
 from service.problems import parsed
 from service.schemas.design import DesignDemand
 from service.usecases.design_search import NEARLY, Offer, Searched, search
-from underskin.errors import UnderskinError
-from underskin.several_errors import noting
+from underskin.errors import UnderskinError, noting
 
 router = APIRouter(prefix="/design/search")
 
@@ -113,7 +112,7 @@ def region_csv(table: Table, typed: TypedInQuery) -> Response:
 
 
 def _figure(searched: Searched, typed: Typed) -> Drawn:
-    from underskin.figures.design_region import Offered, design_region
+    from underskin.figures.design import Offered, design_region
 
     region = searched.region
     offered = [

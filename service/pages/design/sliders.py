@@ -14,8 +14,7 @@ from service.problems import parsed
 from service.schemas.design import DesignRequest
 from service.usecases.design import require_apart
 from service.usecases.materials import MATERIALS
-from underskin.errors import InvalidInput, not_one_of
-from underskin.several_errors import noting
+from underskin.errors import InvalidInput, not_one_of, noting
 
 # Field, words, unit, the slider's ends.
 SLIDERS = (

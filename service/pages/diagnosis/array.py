@@ -58,8 +58,7 @@ def shown_array(
 
 
 def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None) -> Drawn:
-    from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, significance_note
+    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
 
     names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
         rows, "sensor", *_D33, "x_mm", "y_mm", "reasons"

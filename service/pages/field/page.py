@@ -18,8 +18,8 @@ from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import UNITS, shown
 from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, wrong_fields
 from underskin.errors import TableError, UnderskinError
+from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
 from underskin.physics.hertz import peak_pressure
-from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
 from underskin.prediction.answers import STATED, pressed
 from underskin.prediction.stress_field import StressField, stress_field
 from underskin.surrogate.sigma_table import SigmaTable

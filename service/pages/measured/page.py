@@ -21,12 +21,11 @@ from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
 from service.store import Database
 from service.usecases.pressed_skin import d33
-from underskin.errors import InvalidInput, TableError, UnderskinError, conflicting, required, wrong_type
+from underskin.errors import InvalidInput, TableError, UnderskinError, conflicting, noting, required, wrong_type
 from underskin.prediction.answers import other_contact
 from underskin.prediction.pressed_skin import beyond
 from underskin.recordings.validation import Check, declared, not_negative
 from underskin.recordings.validation import number as finite
-from underskin.several_errors import noting
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")

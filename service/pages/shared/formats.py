@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from underskin.diagnosis.reporting.page_styles import in_readable_units, with_minus
 from underskin.findings.formatting import in_digits, in_percent, significant
-from underskin.recordings.readers.calendar_times import in_lab
+from underskin.recordings.readers.text import in_lab
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 

@@ -20,13 +20,14 @@ from underskin.errors import (
     InvalidInput,
     Mention,
     Requirement,
+    SeveralInvalid,
     UnderskinError,
+    noting,
     out_of_range,
     required,
     wrong_type,
 )
 from underskin.recordings.readers import text
-from underskin.several_errors import SeveralInvalid, noting
 from underskin.units import LAB
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field

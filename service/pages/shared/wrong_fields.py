@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 
 from service.pages.shared.forms import number
-from underskin.errors import InvalidInput, UnderskinError
+from underskin.errors import InvalidInput, SeveralInvalid, UnderskinError, all_of, errors_of, noting
 from underskin.recordings.validation import declared, poisson_ratio
-from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
 from underskin.units import LAB
 
 _MOST_LISTED_ERRORS = 20

@@ -11,8 +11,8 @@ from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, sensor
 from service.pages.shared.history import RESTS, By
 from service.schemas.skins import History, SensorHistory, TrendAnswer
 from service.store import AnyRow
-from underskin.inversion.trend import interval
-from underskin.recordings.readers.calendar_times import in_lab
+from underskin.inversion.array_history import interval
+from underskin.recordings.readers.text import in_lab
 
 _MOST_NAMED = 5  # sensors, in a sentence
 
@@ -81,8 +81,7 @@ def drawn_map(
     root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By, sensor: str | None
 ) -> Drawn:
     """The sensors of `map_rows` at their positions, one of them chosen; `row`: the campaign of the answer."""
-    from underskin.figures.array_discs import disc_size
-    from underskin.figures.array_map import Quantity, array_map, significance_note
+    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
 
     value, uncertainty, name, unit, against = _QUANTITIES[show]
     # With few campaigns a slope's uncertainty is smaller than Student's t allows, so its own test decides.

@@ -19,9 +19,8 @@ from service.pages.upload.pending_uploads import PendingUpload, PendingUploads, 
 from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns, skins
 from service.usecases import d33_cache
-from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.errors import ErrorCode, FileError, InvalidInput, errors_of
 from underskin.recordings import curve_preparation
-from underskin.several_errors import errors_of
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 

@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import Any
 
 from underskin.errors import InvalidInput, wrong_type
-from underskin.recordings.readers.calendar_times import in_lab, time_zone, with_zone
+from underskin.recordings.readers.text import in_lab, time_zone, with_zone
 
 FIELD = "recorded_at"
 _NAMES = (

@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 from tests.service.pages.conftest import Visit
 from tests.support.cases import first
 from tests.support.store_server import Server
-from underskin.figures.design_region import design_region
+from underskin.figures.design import design_region
 
 
 def cell(visitor: Visit, name: str, column: str) -> str:

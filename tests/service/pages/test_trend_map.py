@@ -11,7 +11,7 @@ from scipy import stats
 from service.pages.skin.figures import drawn_map, map_rows
 from service.schemas.skins import History, Point, SensorHistory, TrendAnswer
 from service.store import AnyRow
-from underskin.inversion.trend import SIGNIFICANT, holm, trend
+from underskin.inversion.array_history import SIGNIFICANT, holm, trend
 
 GREY = "#cfd4d9"
 

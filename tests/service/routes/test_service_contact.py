@@ -9,7 +9,7 @@ import pytest
 import underskin
 from tests.cli.commands import SKIN as PRESSED
 from tests.cli.commands import run
-from underskin.physics.skin import Indenter, Skin
+from underskin.physics.charge_response import Indenter, Skin
 from underskin.prediction.pressed_skin import Transmission, transmission
 from underskin.prediction.stress_field import stress_field
 from underskin.surrogate.sigma_table import load_table

@@ -31,8 +31,8 @@ from underskin.diagnosis.noise import (
     line_noise,
     path_fractions,
 )
+from underskin.findings.codes import Lacking
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
 from underskin.mechanisms.registry import ActiveCatalogue

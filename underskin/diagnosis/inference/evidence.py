@@ -24,9 +24,9 @@ from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
 from underskin.diagnosis.noise import NoiseLevels
+from underskin.mechanisms.base import Uniform
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import Uniform
 from underskin.units import Floats
 
 _NEAR = 4.0  # standard deviations: bounds farther than this from the mean are left out

@@ -31,14 +31,13 @@ from underskin.diagnosis.inference.hypothesis import (
 from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, Plateau
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Unsupported
+from underskin.inversion.mixed_model import NO_POSITION_SCATTER, POSITION_RANGE
+from underskin.mechanisms.base import Parameter, Unsupported
 from underskin.mechanisms.laws.adhesion import Adhesion
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unlisted.laws import UnlistedLaw
 from underskin.recordings.campaign import curves_of
-from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask
 

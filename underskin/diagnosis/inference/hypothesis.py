@@ -42,11 +42,11 @@ from underskin.diagnosis.noise import (
     SeveralLevels,
     level_prior,
 )
+from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from underskin.autodiff import Differentiated, contiguous
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.noise import SeveralLevels
-from underskin.mechanisms.models.frf_design import FrfDesign, Pickup, Response
+from underskin.mechanisms.models.contact_state import FrfDesign, Pickup, Response
 from underskin.units import Array, Floats, Indices
 from underskin.weak_cache import cached_while_alive
 

@@ -29,10 +29,9 @@ from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, parameter_slices
 from underskin.diagnosis.inference.products import CurveProducts
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.mechanisms.parameter import Normal
-from underskin.physics.skin import INCOMPRESSIBLE, Indenter
+from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter
 from underskin.prediction.pressed_skin import declared_skin, log_slopes
 from underskin.recordings.campaign import Tolerances, frf_of
 from underskin.units import Array, Floats, Indices, to_si

@@ -26,17 +26,16 @@ from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Power
-from underskin.findings.codes import FindingCode, Reason
+from underskin.findings.codes import FindingCode, Lacking, Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
-from underskin.findings.lacking import Lacking
 from underskin.mechanisms.base import Mechanism, Stage
 from underskin.mechanisms.laws import contact_creep, strain_stiffening
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.expressions import CurveLaw
 from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
-from underskin.prediction import plausibility
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign
 
 _STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})

@@ -34,8 +34,7 @@ from underskin.diagnosis.reporting.recording_figures import (
     styled,
 )
 from underskin.findings.formatting import capital, in_percent
-from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
-from underskin.inversion.mixed_model import SDS_OF_95
+from underskin.inversion.mixed_model import MOST_NAMED, SDS_OF_95, many_sensors
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Complexes, Floats, readable_unit
 

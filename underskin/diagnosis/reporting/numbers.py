@@ -24,9 +24,8 @@ from underskin.diagnosis.slips.levels import LEAST_LEVELS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
-from underskin.inversion.many_sensors import ROBUST
-from underskin.inversion.mixed_model import SDS_OF_95, mixture_quantile
-from underskin.mechanisms.parameter import Parameter
+from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, mixture_quantile
+from underskin.mechanisms.base import Parameter
 from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.units import Floats
 

@@ -33,7 +33,7 @@ from underskin.diagnosis.reporting.page_styles import (
     with_minus,
 )
 from underskin.inversion.mixed_model import SDS_OF_95
-from underskin.mechanisms.parameter import Parameter
+from underskin.mechanisms.base import Parameter
 from underskin.units import Floats, readable_unit
 
 _TEMPLATE = go.layout.Template(pio.templates["plotly_white"]).update(

@@ -28,10 +28,9 @@ from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLa
 from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
-from underskin.findings.codes import FindingCode
+from underskin.findings.codes import FindingCode, Lack, Lacking
 from underskin.findings.english import lacking
 from underskin.findings.formatting import clause, in_digits, in_percent, of_clauses, small
-from underskin.findings.lacking import Lack, Lacking
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.curves import CurveModel
@@ -42,7 +41,7 @@ from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, acted_on, followed
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import IndentationRecording
-from underskin.recordings.readers.calendar_times import time_zone
+from underskin.recordings.readers.text import time_zone
 from underskin.units import Floats
 
 _INSUFFICIENT = "The recordings cannot tell anything: "
@@ -432,10 +431,10 @@ def _size(leading: LeadingLaw) -> str:
     where = f" {location}" if (location := _where(leading, at)) else ""
     if law.description.acts_on in ("force", "position"):
         return f"{_signed(ends, ' N' if law.description.acts_on == 'force' else ' mm')}{where}"
-    if isinstance(law, LagLaw) and law.kind == "corner":
+    if isinstance(law, LagLaw) and law.dispersion == "corner":
         value, low, high = law.lowest_hz * ends
         return f"lines below a corner of {value:.3g} Hz ({low:.3g} to {high:.3g}) fall off{where}"
-    if isinstance(law, LagLaw) and law.kind == "power":
+    if isinstance(law, LagLaw) and law.dispersion == "power":
         return f"by a power of frequency of {_signed(-ends[[0, 2, 1]], '')}{where}"
     if leading.is_phase:
         return f"the phase by {_signed(np.degrees(ends), '°')}{where}"

@@ -31,9 +31,8 @@ from underskin.diagnosis.selection.unlisted_search import law_of
 from underskin.diagnosis.validation import cross_validation
 from underskin.findings.formatting import in_percent
 from underskin.inversion.mixed_model import SDS_OF_95
-from underskin.mechanisms.unlisted.axes import Axis
 from underskin.mechanisms.unlisted.expressions import CurveLaw, change_along, expression, wave
-from underskin.mechanisms.unlisted.forms import EVERYWHERE
+from underskin.mechanisms.unlisted.forms import EVERYWHERE, Axis
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.mechanisms.unlisted.vocabulary import AXES

@@ -17,9 +17,9 @@ from underskin.diagnosis.noise import (
     POSITION_PRIOR,
     START_GAIN,
 )
+from underskin.inversion.mixed_model import NO_POSITION_SCATTER, POSITION_RANGE
+from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.frf import FAINT
-from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.units import Array, Floats, Indices, Mask
 
 _GAINS = np.geomspace(0.005, 0.5, 17)  # fine enough for 65 recordings, which determine the scatter to 9 %

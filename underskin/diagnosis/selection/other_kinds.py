@@ -23,7 +23,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.gaussian import Gaussian, moments
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence, log_prior
-from underskin.mechanisms.base import Kind, Mechanism, Unsupported, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
 from underskin.mechanisms.laws import platen_friction, strain_stiffening
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.thickness_error import ThicknessError
@@ -31,7 +31,6 @@ from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.composition import WIDE_SD, fit_coordinates
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import Campaign, Conditions
 from underskin.surrogate.sigma_table import SigmaTable

@@ -31,12 +31,11 @@ from underskin.diagnosis.inference.residuals import (
 )
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.gain_residual import GainResidual
+from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
-from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unlisted.axes import Axis
 from underskin.mechanisms.unlisted.expressions import CurveLaw, Extent, curve_laws, of_samples
-from underskin.mechanisms.unlisted.forms import Shape
+from underskin.mechanisms.unlisted.forms import Axis, Shape
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw, Grammar, combination
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.recordings.campaign import curves_of
@@ -125,7 +124,7 @@ class Screening:
 
         self._of_recordings = _Group.of(laws_of(RecordingLaw), lambda law: law.description.acts_on)
         self._over_frequency = _Group.of(laws_of(FrequencyLaw), lambda _: "")
-        self._lags = _Group.of(laws_of(LagLaw), lambda law: law.kind)
+        self._lags = _Group.of(laws_of(LagLaw), lambda law: law.dispersion)
 
     def scores(self, explanation: Explanation) -> list[Score]:
         """Of every law, averaged over the grid of its shape parameters."""

@@ -25,7 +25,7 @@ from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.numbers import parameter_index
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Search
 from underskin.diagnosis.selection.priors import log_prior
-from underskin.mechanisms.parameter import Parameter
+from underskin.mechanisms.base import Parameter
 from underskin.units import Floats
 
 _OF_SKIN = ("youngs_modulus", "thickness")  # parameters of the base model that belong to the skin

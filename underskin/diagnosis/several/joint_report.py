@@ -29,8 +29,7 @@ from underskin.diagnosis.several.sensors import (
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_percent, listed, of_clauses
-from underskin.inversion.array_course import FEWEST_DATES
-from underskin.inversion.array_history import TWO_DATES, array_change_in_words
+from underskin.inversion.array_history import FEWEST_DATES, TWO_DATES, array_change_in_words
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.units import Floats
 

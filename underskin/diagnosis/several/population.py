@@ -28,11 +28,10 @@ from underskin.diagnosis.inference.hypothesis import curvature_of_prior, paramet
 from underskin.diagnosis.noise import Plateau
 from underskin.diagnosis.reporting.numbers import QUANTILES_OF_95
 from underskin.diagnosis.several.histories import CampaignFits
-from underskin.inversion.mixed_model import mixture_quantile
+from underskin.inversion.mixed_model import NO_POSITION_SCATTER, mixture_quantile
 from underskin.mechanisms.models import composition
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats
 
 _NEGLIGIBLE = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals

@@ -21,14 +21,14 @@ from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.several.histories import USUAL_CHANGE, log_normal
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode, Reason
-from underskin.inversion.array_course import FEWEST_DATES, FEWEST_SENSORS, ArrayLevels, array_levels
-from underskin.inversion.array_course import changes as changes_between_ends
+from underskin.inversion.array_history import FEWEST_DATES, FEWEST_SENSORS, ArrayLevels, array_levels
+from underskin.inversion.array_history import changes as changes_between_ends
 from underskin.inversion.invert import invert
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.prediction.adopted_model import AdoptedModel
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.readers.calendar_times import time_zone
+from underskin.recordings.readers.text import time_zone
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab
 

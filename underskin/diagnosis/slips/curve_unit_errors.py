@@ -10,9 +10,8 @@ from functools import partial
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Inspected
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import (
     Campaign,

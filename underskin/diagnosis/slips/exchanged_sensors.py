@@ -28,7 +28,7 @@ from underskin.diagnosis.slips.levels import GAIN, LEAST_LEVELS, POSITION_MM
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
-from underskin.mechanisms.unlisted.axes import recording_order
+from underskin.mechanisms.unlisted.forms import recording_order
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats

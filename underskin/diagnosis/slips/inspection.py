@@ -27,15 +27,13 @@ from underskin.diagnosis.slips.unit_errors import (
     single_unit_errors,
     unlikely_d33,
 )
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.models.composed import compose
-from underskin.prediction.declared_values import unlikely
-from underskin.prediction.exchanged_values import exchanged_values
+from underskin.prediction.pressed_skin import exchanged_values
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.plausibility import loose_sphere, overlapping_sensors
+from underskin.recordings.plausibility import loose_sphere, overlapping_sensors, unlikely
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes
 

@@ -31,14 +31,13 @@ from scipy.stats import qmc
 from underskin.diagnosis.noise import GAIN_FALL, Plateau
 from underskin.diagnosis.slips.comparison import LEAST_RESPONSE, flat_level
 from underskin.findings.finding import Finding
-from underskin.mechanisms.base import Unsupported
+from underskin.inversion.mixed_model import GAIN_RANGE
+from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unlisted.axes import axes_of, recording_order
+from underskin.mechanisms.unlisted.forms import axes_of, recording_order
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, offsets
-from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices
 
@@ -68,11 +67,11 @@ def smooth_along(axis: Floats) -> Floats:
     return np.asarray(_SIZE * np.cos(np.pi * np.outer(share, np.arange(1, _TERMS + 1))))
 
 
-_SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s, about the range of a rig's gain (recordings/usual_scatter.py)
+_SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s, about the range of a rig's gain (inversion/mixed_model.py)
 _SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 SPREADS = (0.01, 0.06, 0.25)  # t, of calibrated, of good and of poled sensors
 _SMOOTH_SIZES = (0.1, 0.4, 1.0)  # of all smooth functions together
-POSITION_MM = (0.0, 0.1, 0.3)  # p, of a stage (recordings/usual_scatter.py)
+POSITION_MM = (0.0, 0.1, 0.3)  # p, of a stage (inversion/mixed_model.py)
 SEARCHED = tuple(product((0.04, 0.12), (0.03, 0.3)))  # s, and size of smooth functions, at which slips are tried
 _OVERALL = 3.0  # prior standard deviation of ln of the gain, the d33 of all sensors
 

@@ -8,9 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from underskin.diagnosis.data.dataset import Inspected
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
 from underskin.recordings.campaign import Campaign, FrfRecording, SkinDescription, excesses
 
 _WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below

@@ -16,7 +16,7 @@ import numpy as np
 from underskin.diagnosis.slips.comparison import Comparison, aligned_lines, no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.unlisted.axes import recording_order
+from underskin.mechanisms.unlisted.forms import recording_order
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Mask

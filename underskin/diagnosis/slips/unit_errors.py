@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.diagnosis.slips.comparison import LEAST_RECORDINGS
-from underskin.findings.codes import Reason
+from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.models.composition import D33
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of

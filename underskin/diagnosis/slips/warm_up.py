@@ -12,7 +12,7 @@ import numpy as np
 from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, Alternative, Levels, Undone
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.unlisted.axes import recording_order
+from underskin.mechanisms.unlisted.forms import recording_order
 from underskin.recordings.campaign import FrfRecording
 
 _TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings: half an hour or less

@@ -35,14 +35,13 @@ from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.selection.priors import SHOWS, least_evidence, log_prior
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.base import Kind, Stage, Unsupported
+from underskin.inversion.mixed_model import USUAL_GAIN
+from underskin.mechanisms.base import Kind, Normal, Parameter, Stage, Unsupported
 from underskin.mechanisms.laws.contact_creep import ContactCreep
 from underskin.mechanisms.laws.strain_stiffening import StrainStiffening
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Campaign, CompressionRecording, Recording, samples_of
-from underskin.recordings.usual_scatter import USUAL_GAIN
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats
 

@@ -19,12 +19,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from underskin.autodiff import Differentiated, chain, constant, exp, log, where
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import FrfState
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfDesign, FrfState
 from underskin.mechanisms.models.curve_state import Curve, SampleLaw, Samples, numbers
-from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.mechanisms.parameter import Parameter
-from underskin.mechanisms.unlisted.axes import every_axis
+from underskin.mechanisms.unlisted.forms import every_axis
 from underskin.mechanisms.unlisted.laws import LevelTables, log_of, log_positive
 from underskin.mechanisms.unlisted.vocabulary import ActsOn
 from underskin.recordings.campaign import Conditions, IndentationConditions, curves_of

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
 from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import to_si

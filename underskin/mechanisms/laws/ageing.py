@@ -3,9 +3,8 @@
 import numpy as np
 
 from underskin.autodiff import Differentiated, chain, log
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.recordings.campaign import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series

@@ -1,8 +1,7 @@
 """The mechanism `amplifier_high_pass`."""
 
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Mechanism, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "charge amplifiers have corners of 0.01 to some Hz, 0.5 Hz within a factor of 4.5; probes up to some hundred"
 

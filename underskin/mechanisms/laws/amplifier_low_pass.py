@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import HeavyTailed, Parameter, Uniform
 from underskin.recordings.campaign import Conditions, FrfConditions
 from underskin.weak_cache import cached_while_alive
 

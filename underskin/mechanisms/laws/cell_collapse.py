@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve, numbers
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import CompressionConditions, CompressionRecording, Conditions
 from underskin.units import Floats
 

@@ -1,10 +1,9 @@
 """The mechanism `compressible_layer`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Parameter, Uniform
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings.campaign import Conditions
 
 _REASON = "solid elastomers 0.48 to 0.5, filled and slightly porous ones 0.4, foams 0.3"

@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.autodiff import exp
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.recordings.campaign import CompressionConditions, Conditions, CurveConditions, IndentationConditions
 from underskin.recordings.curve_course import presses_again
 from underskin.units import Floats

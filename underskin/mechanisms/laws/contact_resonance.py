@@ -5,10 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.autodiff import constant
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts, FrfState, press, stiffness
-from underskin.mechanisms.models.frf_design import frf_design
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.models.contact_state import Contacts, FrfState, frf_design, press, stiffness
 from underskin.physics.contact_curves import curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.recordings.campaign import Conditions, FrfRecording

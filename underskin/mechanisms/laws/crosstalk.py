@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.models.frf_design import frf_design
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Parameter, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfState, frf_design
 from underskin.recordings.campaign import Conditions
 from underskin.units import to_si
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.curve_state import Curve, numbers
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.recordings.campaign import CompressionConditions, Conditions
 from underskin.recordings.curve_course import presses_again
 from underskin.units import Floats

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Conditions, IndentationConditions
 
 _REASON = (

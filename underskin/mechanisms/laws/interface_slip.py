@@ -2,9 +2,8 @@
 
 import math
 
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Mechanism, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "(G_glue/G) (h/t): a tape 0.1 mm thick, 1000 times softer, has 0.02; above 50 no effect"
 

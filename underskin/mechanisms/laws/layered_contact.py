@@ -5,10 +5,9 @@ from collections.abc import Collection
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Conditions, IndentationConditions
 
 _THICKNESS = "layer_thickness"

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.laws.contact_creep import time_runs_with_displacement
 from underskin.mechanisms.models.curve_state import Curve, SampleLaw, numbers, speeds
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
 
 _REASON = (

@@ -6,10 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.models.frf_design import FrfDesign, Pickup, frequencies
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
+from underskin.mechanisms.models.contact_state import FrfDesign, FrfState, Pickup, frequencies
 from underskin.recordings.campaign import Conditions, FrfRecording, frf_of
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.frf.line_choice import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ

@@ -5,10 +5,8 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from underskin.errors import conflicting
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.models.frf_design import LARGEST_OFFSET_MM
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Parameter, Stage, Values
+from underskin.mechanisms.models.contact_state import LARGEST_OFFSET_MM, FrfState
 from underskin.recordings.campaign import Conditions, frf_of, offsets
 
 _REASON = "a tip centred by eye is off by some tenths of a millimetre to a millimetre"

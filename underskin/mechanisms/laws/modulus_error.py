@@ -1,9 +1,8 @@
 """The mechanism `modulus_error`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.campaign import Conditions
 
 LARGEST_FACTOR = 4.0  # true over declared, or the inverse: beyond, another unit or material is more likely

@@ -1,8 +1,7 @@
 """The mechanism `moving_contact_edge`."""
 
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import Parameter, Uniform
 
 _REASON = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Parameter, Uniform
 from underskin.recordings.campaign import CompressionConditions, Conditions
 
 _LEAST_SHAPE_RATIO = 1.05  # of S²: with a smaller ratio, friction and modulus cannot be separated

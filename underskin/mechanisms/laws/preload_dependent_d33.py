@@ -3,9 +3,8 @@
 import numpy as np
 
 from underskin.autodiff import chain
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 
 _SLOPE = "the paper's array, 14 to 22 pC/N from 1 to 3 N, needs 5 to 6 per MPa; ceramics about -0.01"
 _SATURATION = "no saturation has been published; 1 MPa is ten times the stress of a firm touch"

@@ -3,9 +3,8 @@
 import numpy as np
 
 from underskin.autodiff import exp
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 
 _REFERENCE = 30.0  # Hz
 _EXPONENT = "tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it"

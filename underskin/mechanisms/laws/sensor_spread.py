@@ -1,8 +1,7 @@
 """The mechanism `sensor_spread`."""
 
-from underskin.mechanisms.base import Kind, Mechanism, Stage
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
-from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.campaign import Conditions, frf_of
 
 _REASON = "poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5"

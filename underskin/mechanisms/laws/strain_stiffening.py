@@ -5,10 +5,9 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from underskin.autodiff import Differentiated, chain, exp, log, where
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.physics.uniaxial import neo_hookean
 from underskin.physics.uniaxial import stiffening as nominal_stress
 from underskin.recordings.campaign import CompressionRecording, Conditions

@@ -1,9 +1,7 @@
 """The mechanism `thickness_error`."""
 
-from underskin.mechanisms.base import Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import LARGEST_STRETCH
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
+from underskin.mechanisms.base import HeavyTailed, Mechanism, Parameter, Stage, Values
+from underskin.mechanisms.models.contact_state import LARGEST_STRETCH, Contacts
 
 _REASON = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
 

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.autodiff import exp
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.campaign import Conditions, FrfRecording
 from underskin.recordings.frf.estimation import common_delay, lines_of
 from underskin.recordings.frf.spectra import stacked

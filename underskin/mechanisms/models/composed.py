@@ -1,6 +1,6 @@
 """A model of recordings: the base model composed with a set of mechanisms in a fixed order."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.mechanisms.base import Kind, Mechanism
@@ -19,6 +19,11 @@ __all__ = ["Model", "Prediction", "compose"]
 # decided by the declared values, before any fit: False where the contact or its offset lies beyond the tables from the
 # start; such rows are predicted by continuation and should not be fitted.
 Model = FrfModel | IndentationModel | CompressionModel
+_MODELS: Mapping[Kind, Callable[[Sequence[Mechanism], Conditions, SigmaTable], Model]] = {
+    "frf": FrfModel,
+    "indentation": lambda mechanisms, conditions, _: IndentationModel(mechanisms, conditions),
+    "compression": lambda mechanisms, conditions, _: CompressionModel(mechanisms, conditions),
+}
 
 
 def compose(
@@ -66,11 +71,7 @@ def forward_model(mechanisms: Sequence[Mechanism], conditions: Conditions, table
     Raises InvalidInput for a kind of which there is no recording, and where a declared value is missing.
     """
     _require_kind(conditions, kind)
-    if kind == "frf":
-        return FrfModel(mechanisms, conditions, table)
-    if kind == "indentation":
-        return IndentationModel(mechanisms, conditions)
-    return CompressionModel(mechanisms, conditions)
+    return _MODELS[kind](mechanisms, conditions, table)
 
 
 def _require_kind(conditions: Conditions, kind: Kind) -> None:

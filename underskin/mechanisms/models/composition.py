@@ -13,8 +13,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, log
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, required
-from underskin.mechanisms.base import Kind, Mechanism, Unsupported, Values
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Uniform, Unsupported, Values
 from underskin.recordings.campaign import Conditions, SkinDescription
 from underskin.units import Array, Floats, Indices, Mask, to_lab
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from underskin.autodiff import constant
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Kind, Mechanism, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import (
     Composition,
     Prediction,
@@ -24,10 +24,9 @@ from underskin.mechanisms.models.composition import (
     modulus_parameter,
     required_modulus,
 )
+from underskin.mechanisms.models.contact_state import Pickup
 from underskin.mechanisms.models.curve_state import Curve, memories, numbers
-from underskin.mechanisms.models.frf_design import Pickup
-from underskin.mechanisms.parameter import Parameter
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.uniaxial import neo_hookean, stiffening
 from underskin.recordings.campaign import (
     CompressionConditions,

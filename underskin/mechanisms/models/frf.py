@@ -20,16 +20,20 @@ from underskin.autodiff import Differentiated, chain, constant, sum_rows
 from underskin.errors import ErrorCode, InvalidInput, required
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.composition import Composition, Prediction, frf_nuisances
-from underskin.mechanisms.models.contact_state import Contacts, FrfState, layer_curves, press, stiffness
-from underskin.mechanisms.models.frf_design import (
+from underskin.mechanisms.models.contact_state import (
     LARGEST_OFFSET_MM,
     LARGEST_STRETCH,
+    Contacts,
     FrfDesign,
+    FrfState,
     Pickup,
     Response,
     frf_design,
     joined,
     largest_offset,
+    layer_curves,
+    press,
+    stiffness,
     together,
 )
 from underskin.mechanisms.models.sigma_curves import (

@@ -50,7 +50,7 @@ from scipy.interpolate import CubicSpline
 
 from underskin.autodiff import constant, contiguous
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Mechanism, Values
+from underskin.mechanisms.base import Mechanism, Parameter, Values
 from underskin.mechanisms.laws.adhesion import Adhesion as AdhesionLaw
 from underskin.mechanisms.models.composition import (
     STRAIN_SHARE,
@@ -68,14 +68,13 @@ from underskin.mechanisms.models.sphere_kernels import (
     pull_off_rows,
     radius_rows,
 )
-from underskin.mechanisms.parameter import Parameter
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
 from underskin.recordings.curve_course import curve_landmarks, snap_in_interval, touch, visible_contact
 from underskin.recordings.modulus import estimate
-from underskin.surrogate.contact_table import load_contact
+from underskin.surrogate.tables import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
 
 _SMALLEST = 1e-12  # m of depth, below which a radius counts as 0
@@ -595,7 +594,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
     estimates, contact_points, refused = [], [], None
     for recording in recordings:
         span = float(np.ptp(to_si("displacement_mm", recording.displacement_mm)))
-        contact = 0.0
+        contact, interval = 0.0, None
         if isinstance(recording, IndentationRecording):
             features = curve_landmarks(recording.displacement_mm, recording.force_n, recording.time_s)
             force = recording.force_n - features.drift * times_of(recording)
@@ -611,12 +610,12 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
                 contact = float(to_si("displacement_mm", touch(recording.displacement_mm, features.snap_in)))
             if refused is not None and span == 0:
                 raise refused
+            if sticks:
+                interval = snap_in_interval(recording.displacement_mm, recording.force_n, recording.time_s)
         sd, bound = _CONTACT_SD * span, _CONTACT_BOUND * span
-        if sticks and isinstance(recording, IndentationRecording):
-            interval = snap_in_interval(recording.displacement_mm, recording.force_n, recording.time_s)
-            if interval is not None:
-                before, contact, after = (float(to_si("displacement_mm", place)) for place in interval)
-                sd, bound = 0.5 * (after - before), after - before
+        if interval is not None:
+            before, contact, after = (float(to_si("displacement_mm", place)) for place in interval)
+            sd, bound = 0.5 * (after - before), after - before
         contact_points.append(contact_point(recording.id, contact, sd, bound))
     if refused is not None and not estimates:
         raise refused

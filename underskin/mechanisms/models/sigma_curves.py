@@ -30,12 +30,12 @@ from scipy.special import j0
 
 from underskin.autodiff import Differentiated, chain, contiguous, log
 from underskin.mechanisms.models.contact_state import Contacts, PressedContacts
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.contact_curves import ContactCurves, CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average
-from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.surrogate.contact_table import load_contact
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.tables import load_contact
 from underskin.surrogate.tensor_spline import CubicAxis, TensorSpline, joined
 from underskin.units import Floats, Indices, Mask
 

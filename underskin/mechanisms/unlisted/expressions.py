@@ -16,11 +16,9 @@ from typing import ClassVar
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Kind, Stage, Values
+from underskin.mechanisms.base import Kind, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve, SampleLaw, Samples
-from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unlisted.axes import Axis
-from underskin.mechanisms.unlisted.forms import EVERYWHERE, Feature, Shape, reference, shapes
+from underskin.mechanisms.unlisted.forms import EVERYWHERE, Axis, Feature, Shape, reference, shapes
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
 from underskin.mechanisms.unlisted.laws import PREFIX, LagLaw, LawDescription, RecordingLaw, UnlistedLaw, changes
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, AXES, ActsOn, Form
@@ -300,11 +298,11 @@ def _of_lag(law: LagLaw, values: Numbers) -> str:
         change = f"{number(amplitudes[0])}·({symbol(law.axis)}/{middle})^{number(values['law_exponent'])}"
     else:
         change = change_text(law, values, amplitudes).removeprefix("+ ")
-    if law.kind == "angle":
+    if law.dispersion == "angle":
         return f"FRF = FRF0·exp(−i·({change}))"
-    if law.kind == "delay":
+    if law.dispersion == "delay":
         return f"FRF = FRF0·exp(−i·({change})·f/{number(law.highest_hz)} Hz)"
-    if law.kind == "corner":
+    if law.dispersion == "corner":
         return f"FRF = FRF0/(1 + ({change})·{number(law.lowest_hz)} Hz/(i·f))"
     return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^(−({change}))"
 

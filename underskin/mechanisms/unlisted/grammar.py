@@ -19,13 +19,11 @@ from operator import add
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp, log
-from underskin.mechanisms.base import Stage, Values
+from underskin.mechanisms.base import Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import FrfState
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.mechanisms.unlisted.axes import Axis, axes_of, every_axis
-from underskin.mechanisms.unlisted.forms import Shape, constant, shapes
+from underskin.mechanisms.unlisted.forms import Axis, Shape, axes_of, constant, every_axis, shapes
 from underskin.mechanisms.unlisted.laws import (
-    LAG_KINDS,
+    DISPERSIONS,
     PREFIX,
     LagLaw,
     LawDescription,
@@ -325,7 +323,7 @@ def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, listed: Col
             if _makes_sense(acts_on, axis, shape, listed)
         ]
         if len(lines) >= 2 and shape.form != "free":
-            laws += [LagLaw(kind, axis, shape, lines) for kind in LAG_KINDS]
+            laws += [LagLaw(dispersion, axis, shape, lines) for dispersion in DISPERSIONS]
     if axis.name == "preload_n":
         lost = Shape("threshold", lambda x, _: [-np.ones_like(x)], variant="lost", share=_CONSTANT)
         laws.append(RecordingLaw("force", axis, lost, tables))

@@ -20,12 +20,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from underskin.autodiff import Differentiated, chain, exp
-from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unlisted.axes import Axis
-from underskin.mechanisms.unlisted.forms import Feature, Shape
+from underskin.mechanisms.unlisted.forms import Axis, Feature, Shape
 from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form, acted_on, followed
 from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
@@ -176,8 +174,8 @@ def _over(levels: Floats, base: Floats) -> Floats:
 
 
 PREFIX = "unnamed_"
-LagKind = Literal["angle", "delay", "power", "corner"]
-LAG_KINDS: tuple[LagKind, ...] = get_args(LagKind)
+Dispersion = Literal["angle", "delay", "power", "corner"]
+DISPERSIONS: tuple[Dispersion, ...] = get_args(Dispersion)
 _USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a position in mm, of a lag in rad
     "gain": 0.2,
     "modulus": 0.4,
@@ -357,23 +355,23 @@ def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
 class LagLaw(UnlistedLaw):
     """A phase lag, or a fall-off over the lines, that follows an axis of the recordings.
 
-    `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. For a lag
-    φ the factors are exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
+    `dispersion`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. For a
+    lag φ the factors are exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
     """
 
     stage = Stage.LINES
     order = 200
     reads = ("id",)
 
-    def __init__(self, kind: LagKind, axis: Axis, shape: Shape, lines: Floats) -> None:
+    def __init__(self, dispersion: Dispersion, axis: Axis, shape: Shape, lines: Floats) -> None:
         """Over the band of these lines [Hz]."""
-        self.name = _name("frequency_response", axis, shape, kind)
+        self.name = _name("frequency_response", axis, shape, dispersion)
         self.description = LawDescription("frequency_response", axis.name, shape.form)
-        self.axis, self.shape, self.kind = axis, shape, kind
-        self.share = shape.share / len(LAG_KINDS)
+        self.axis, self.shape, self.dispersion = axis, shape, dispersion
+        self.share = shape.share / len(DISPERSIONS)
         self.lowest_hz, self.highest_hz = float(lines[0]), float(lines[-1])
         self.middle_hz = float(np.exp(np.log(lines).mean()))
-        usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(kind, 1.0)
+        usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(dispersion, 1.0)
         power = shape.logarithmic
         lags = changes("law_lag", "-", usual, shape.count)
         self.amplitudes = tuple(parameter.name for parameter in lags)
@@ -399,11 +397,11 @@ class LagLaw(UnlistedLaw):
         ids = [design.ids[number] for number in design.contact_recording]
         lag = self.lag(ids, values).spread(len(ids))[design.line_contact]
         pattern = self.pattern(design.line_frequency)
-        state.factor = 1.0 / (1.0 - lag * pattern) if self.kind == "corner" else exp(lag * pattern)
+        state.factor = 1.0 / (1.0 - lag * pattern) if self.dispersion == "corner" else exp(lag * pattern)
 
     def pattern(self, frequency: Floats) -> Array:
         """∂ ln factor by the lag, where that is 0."""
-        match self.kind:
+        match self.dispersion:
             case "angle":
                 return np.full(len(frequency), -1j)
             case "delay":

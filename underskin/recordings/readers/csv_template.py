@@ -32,7 +32,6 @@ from underskin.errors import FileError
 from underskin.recordings.campaign import COLUMNS, KINDS, SCHEMA, SkinDescription, Tolerances
 from underskin.recordings.channels import Document
 from underskin.recordings.readers import template_columns, text
-from underskin.recordings.readers.calendar_times import iso_time, of_two_cells, time_zone
 from underskin.recordings.readers.template_columns import (
     CLOCK,
     DATE,
@@ -44,6 +43,7 @@ from underskin.recordings.readers.template_columns import (
     Column,
     NoField,
 )
+from underskin.recordings.readers.text import iso_time, of_two_cells, time_zone
 from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
 from underskin.recordings.validation import CellText
 from underskin.units import LAB, Floats, LabField

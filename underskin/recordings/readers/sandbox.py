@@ -22,9 +22,9 @@ from underskin.errors import ErrorCode, FileError
 from underskin.parallel import limit_process
 from underskin.recordings.channels import Block, Channel, Contents, Document
 from underskin.recordings.readers import parsing_limits
-from underskin.recordings.readers.calendar_times import TIME_ZONE
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.readers.parsing_limits import ParsingLimits
+from underskin.recordings.readers.text import TIME_ZONE
 from underskin.recordings.validation import CellText, shown
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE, parsing_limits.EXPANSION)

@@ -32,7 +32,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     with damage_said(file, "", lambda error: f"no universal file: {error}"):
         universal = pyuff.UFF(f"/dev/fd/{stream.fileno()}")  # pyuff takes a path: the open file's own
         types = [int(number) for number in universal.get_set_types()]
-    functions = [_function(universal, index, file) for index, kind in enumerate(types) if kind == _FUNCTION]
+    functions = [_function(universal, index, file) for index, number in enumerate(types) if number == _FUNCTION]
     if not functions:
         raise FileError(file, "", f"holds no whole dataset {_FUNCTION}; its datasets: {types or 'none'}")
     if len(functions) < len(types):

@@ -19,8 +19,8 @@ import openpyxl
 from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.readers import csv_file, csv_template, text
-from underskin.recordings.readers.calendar_times import time_zone
 from underskin.recordings.readers.parsing_limits import EXPANSION, ParsingLimits
+from underskin.recordings.readers.text import time_zone
 
 SEPARATOR = "\t"
 _WORKBOOK = "xl/workbook.xml"
