@@ -46,6 +46,13 @@ _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's 
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _LEAST_CURVATURE = 1e-10
+_LEVEL_STEP = 0.05  # of the finite differences in the logarithms of noise levels
+_LARGEST_LEVEL_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
+_TRIES, _SHORTER, _LEAST_GAIN = (
+    4,
+    4.0,
+    1e-3,
+)  # tries of a step without gain, its shortening, and the gain that ends them
 _MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
 CostToBeat = Callable[[Evaluated], Floats]  # costs (points,) that points must get below
 
@@ -236,10 +243,6 @@ class Fitter:
 
         Where mechanisms have covariance parameters these are correlated, so the steps are joint.
         """
-        if isinstance(at.products, FrfProducts) and not self.covariance_indices.size and self.model.pickup is None:
-            return self._update_independently(at, at.products, steps)
-        from underskin.diagnosis.inference.kernels import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
-
         low, high = self._lowest, self._highest
         points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
         products = at.products.values
@@ -252,10 +255,10 @@ class Fitter:
             here = part.points.covariance
             outwards = ((here <= low) & (step < 0)) | ((here >= high) & (step > 0))
             step = np.where(outwards, 0.0, step)
-            step *= np.minimum(1.0, LARGEST_STEP / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+            step *= np.minimum(1.0, _LARGEST_LEVEL_STEP / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
             covariance, reached, gained = here.copy(), part.cost.copy(), np.zeros(len(part))
             trying = np.arange(len(part))
-            for _ in range(TRIES):
+            for _ in range(_TRIES):
                 tried = np.clip(here[trying] + step[trying], low, high)
                 costs = self.costs(part.subset(trying), tried[:, None])[:, 0]
                 lower = costs < part.cost[trying]
@@ -265,69 +268,36 @@ class Fitter:
                 trying = trying[~lower]
                 if not len(trying):
                     break
-                step = step / SHORTER
+                step = step / _SHORTER
             all_covariances = points.covariance.copy()
             all_covariances[moving] = covariance
             points = self.with_covariance(points, all_covariances)
             cost[moving] = reached
-            moving = moving[gained >= LEAST_GAIN]
+            moving = moving[gained >= _LEAST_GAIN]
             if not len(moving):
                 break
         return Evaluated(points, at.products, cost, at.log_slope_gradient)
 
-    def _update_independently(self, at: Evaluated, products: FrfProducts, steps: int) -> Evaluated:
-        """The same where no mechanism acts on the covariance: each parameter takes its own steps."""
-        from underskin.diagnosis.inference.kernels import update_noise_levels
-
-        covariance, cost = at.points.covariance.copy(), at.cost.copy()
-        about_means, numbers = self.lines.about_means
-        slopes = products.place_slopes
-        squared_slopes = (
-            np.zeros((len(at), 0))
-            if slopes is None or not self.has_position_scatter
-            else slopes[0] ** 2 + slopes[1] ** 2
-        )
-        update_noise_levels(
-            *map(contiguous, (products.level, products.uu, products.uy, products.yy, squared_slopes)),
-            self.lines.sensor,
-            contiguous(at.points.sensor_log_gain),
-            self.curvature.laplacian,
-            self.curvature.square,
-            about_means,
-            float(numbers),
-            SENSOR_SPREAD,
-            self.has_position_scatter,
-            self._covariance_prior,
-            self._lowest,
-            self._highest,
-            steps,
-            covariance,
-            cost,
-        )
-        return replace(at, points=replace(at.points, covariance=covariance), cost=cost)
-
     def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
         """Gradient and Hessian of the costs in the covariance parameters, by differences; without the mixed terms of
         parameters before `first_mixed`."""
-        from underskin.diagnosis.inference.kernels import STEP
-
         here = at.points.covariance
         count = here.shape[1]
-        steps = STEP * np.eye(count)
+        steps = _LEVEL_STEP * np.eye(count)
         # Far enough inside the bounds for the differences
-        centre = np.clip(here, self._lowest + 2 * STEP, self._highest - 2 * STEP)
+        centre = np.clip(here, self._lowest + 2 * _LEVEL_STEP, self._highest - 2 * _LEVEL_STEP)
         pairs = [(a, b) for a in range(count) for b in range(first_mixed, a)]
         both = [steps[a] + steps[b] for a, b in pairs]
         shifts = np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)])
         costs = self.costs(at, centre[:, None] + shifts)
         middle, up, down = costs[:, :1], costs[:, 1 : count + 1], costs[:, count + 1 : 2 * count + 1]
         second_differences = up + down - 2 * middle
-        gradient = (up - down) / (2 * STEP)
-        hessian = second_differences[:, :, None] / STEP**2 * np.eye(count)
+        gradient = (up - down) / (2 * _LEVEL_STEP)
+        hessian = second_differences[:, :, None] / _LEVEL_STEP**2 * np.eye(count)
         mixed_differences = costs[:, 2 * count + 1 :].reshape(len(at), 2, -1).sum(axis=1) - 2 * middle
         for index, (a, b) in enumerate(pairs):
             hessian[:, a, b] = (mixed_differences[:, index] - second_differences[:, a] - second_differences[:, b]) / (
-                2 * STEP**2
+                2 * _LEVEL_STEP**2
             )
             hessian[:, b, a] = hessian[:, a, b]
         return gradient + np.einsum("nij,nj->ni", hessian, here - centre), hessian

@@ -1,5 +1,4 @@
-"""Compiled parts of the fit (see `hypothesis` for the model of the noise): likelihood, priors, steps of noise levels
-and normal equations.
+"""Compiled parts of the fit (see `hypothesis` for the model of the noise): likelihood, priors and normal equations.
 
 Arrays are (points, sets, recordings); an axis of length 1 stands for all. The inverse of the covariance is applied by
 Sherman and Morrison's identity, first for each recording, with its direction u and the derivatives J of its
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.compiled import compiled
-from underskin.units import Array, Floats, Mask
+from underskin.units import Floats, Mask
 
 _TOGETHER = 8  # factors of a determinant that share one logarithm: below 1e38 each, they do not overflow
 _NONE = 1e-300  # u*u where u is 0
@@ -174,160 +173,6 @@ def log_priors(
                 log_prior -= 0.5 * (square if tail == np.inf else (tail + 1) * np.log1p(square / tail))
         for number in range(covariances.shape[1]):
             totals[point, number] += log_prior + log_plateaus(covariances[point, number], plateaus)
-
-
-STEP = 0.05  # of the finite differences in the covariance's logarithms
-LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
-TRIES, SHORTER, LEAST_GAIN = (
-    4,
-    4.0,
-    1e-3,
-)  # tries of a step without gain, its shortening, and the gain that ends the steps
-
-
-@compiled()
-def _cost(
-    covariance: Floats,
-    noise: Floats,
-    of_point: tuple[Array, ...],
-    sums: tuple[Floats, Floats],
-    constants: tuple[float, float, bool, Floats],
-) -> float:
-    """The cost with covariance parameters (parameters,), up to terms without noise levels; `noise` and `sums` are
-    overwritten.
-    """
-    about_means, numbers, has_position_scatter, plateaus = constants
-    noise[0], noise[1] = np.exp(covariance[0]), np.exp(covariance[1])
-    if has_position_scatter:
-        noise[2] = np.exp(covariance[2])
-    of_lines = -numbers * covariance[1] - 0.5 * about_means / noise[1] ** 2
-    return -(of_lines + log_likelihood(*of_point, noise, *sums) + log_plateaus(covariance, plateaus))
-
-
-@compiled()
-def _move_within_bounds(here: Floats, step: Floats, lowest: Floats, highest: Floats, moved: Floats) -> None:
-    """Set `moved` to `here` + `step`, clipped to the bounds (parameters,)."""
-    for parameter in range(len(here)):
-        moved[parameter] = min(max(here[parameter] + step[parameter], lowest[parameter]), highest[parameter])
-
-
-@compiled()
-def _newton_step(
-    here: Floats,
-    lowest: Floats,
-    highest: Floats,
-    noise: Floats,
-    of_point: tuple[Array, ...],
-    sums: tuple[Floats, Floats],
-    constants: tuple[float, float, bool, Floats],
-    step: Floats,
-) -> None:
-    """Set `step` to each parameter's own Newton step, by central differences; 0 where it would leave the bounds."""
-    centre = np.empty(len(here))
-    _move_within_bounds(
-        here, 0 * here, lowest + 2 * STEP, highest - 2 * STEP, centre
-    )  # far enough inside for the differences
-    middle = _cost(centre, noise, of_point, sums, constants)
-    largest = 1e-12
-    for parameter in range(len(here)):
-        value = centre[parameter]
-        centre[parameter] = value + STEP
-        up = _cost(centre, noise, of_point, sums, constants)
-        centre[parameter] = value - STEP
-        down = _cost(centre, noise, of_point, sums, constants)
-        centre[parameter] = value
-        curvature = (up + down - 2 * middle) / STEP**2
-        slope = (up - down) / (2 * STEP) + curvature * (here[parameter] - value)
-        step[parameter] = -slope / max(abs(curvature), 1.0)
-        low, high = here[parameter] <= lowest[parameter], here[parameter] >= highest[parameter]
-        if (low and step[parameter] < 0) or (high and step[parameter] > 0):
-            step[parameter] = 0.0
-        largest = max(largest, abs(step[parameter]))
-    step *= min(1.0, LARGEST_STEP / largest)
-
-
-@compiled(
-    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], int64[::1], "
-    "float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, boolean, float64[:, ::1], float64[::1], "
-    "float64[::1], int64, float64[:, ::1], float64[::1])"
-)
-def update_noise_levels(
-    level: Floats,
-    uu: Floats,
-    uy: Floats,
-    yy: Floats,
-    squared_slopes: Floats,
-    sensor: NDArray[np.int64],
-    sensor_log_gain: Floats,
-    laplacian: Floats,
-    square: Floats,
-    about_means: float,
-    numbers: float,
-    spread: float,
-    has_position_scatter: bool,
-    plateaus: Floats,
-    lowest: Floats,
-    highest: Floats,
-    steps: int,
-    covariance: Floats,
-    cost: Floats,
-) -> None:
-    """Newton steps of gain, level and, if `has_position_scatter`, position scatter, each on its own: `covariance`
-    (points, parameters) and `cost` (points,) are overwritten with the results.
-
-    Parameters
-    ----------
-    level, uu, uy, squared_slopes
-        (points, recordings); `squared_slopes` may be (points, 0).
-    yy, sensor, laplacian, square
-        (recordings,).
-    sensor_log_gain
-        (points, sensors).
-    about_means, numbers
-        Sum of squares of lines about their recordings' means, and how many real numbers all lines are.
-    spread
-        Of the sensors' gains.
-    plateaus, lowest, highest
-        Prior (parameters, 5) and bounds (parameters,).
-    steps
-        Most steps.
-    """
-    count = covariance.shape[1]
-    noise, step, tried = np.zeros(4), np.empty(count), np.empty(count)
-    noise[3] = spread
-    sums = np.empty(sensor_log_gain.shape[1]), np.empty(sensor_log_gain.shape[1])
-    for point in range(len(cost)):
-        if not np.isfinite(cost[point]):
-            continue
-        here = covariance[point]
-        of_point = (
-            level[point],
-            uu[point],
-            uy[point],
-            yy,
-            squared_slopes[point],
-            sensor,
-            sensor_log_gain[point],
-            laplacian,
-            square,
-        )
-        constants = about_means, numbers, has_position_scatter, plateaus
-        best = initial_cost = _cost(here, noise, of_point, sums, constants)
-        for _ in range(steps):
-            _newton_step(here, lowest, highest, noise, of_point, sums, constants, step)
-            gained = 0.0
-            for _ in range(TRIES):
-                _move_within_bounds(here, step, lowest, highest, tried)
-                reached = _cost(tried, noise, of_point, sums, constants)
-                if reached < best:
-                    gained = best - reached
-                    best = reached
-                    here[:] = tried
-                    break
-                step /= SHORTER
-            if gained < LEAST_GAIN:
-                break
-        cost[point] += best - initial_cost
 
 
 _FROM_SLOPES = 1e-3  # m: the slopes dominate where the response changes by more than itself over this distance
