@@ -31,7 +31,7 @@ PIP_INSTALL = $(PYTHON) $(PIP)
 
 # Parts of the set-up that do not wait for each other run side by side.
 MAKEFLAGS += --jobs=2
-.PHONY: help serve unit test check docs tables paper tour mechanisms ledger house proof bench soak lock clean
+.PHONY: help serve unit test check docs tables paper tour real mechanisms ledger house proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -75,6 +75,9 @@ tour: $(VENV)/.dev ## regenerate docs/tour.md, its screenshots and the picture o
 	@scripts/system-packages.sh chromium
 	$(PYTHON) -m docs.tour
 	$(PYTHON) -m docs.reading
+
+real: $(VENV)/.dev ## diagnose the open real recordings and write docs/real.md
+	$(PYTHON) -m docs.real
 
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms

@@ -298,9 +298,13 @@ class Real(Item):
 
     def grade(self, report: Report, _truth: Truth, /) -> str:
         """By the judge's words."""
-        judging = _module(data_folder(_RECORDINGS) / "real" / "judge.py")
-        word = judging.judge(self.recorded_truth, None if report["verdict"] == "refused" else report)[0]
+        word = self.word(None if report["verdict"] == "refused" else report)
         return next(grade for grade, words in _GRADES.items() if word in words)
+
+    def word(self, report: Report | None) -> str:
+        """What the judge says of a report; None where the recording was refused."""
+        judging = _module(data_folder(_RECORDINGS) / "real" / "judge.py")
+        return str(judging.judge(self.recorded_truth, report)[0])
 
 
 def _concealed(kind: type[Concealed], folder: str, truths: str) -> list[Item]:
