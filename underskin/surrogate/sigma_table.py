@@ -21,7 +21,7 @@ from scipy.interpolate import make_interp_spline
 from underskin.autodiff import contiguous
 from underskin.physics import hertz
 from underskin.physics.charge_response import Sigma
-from underskin.surrogate.tables import SIGMA_SCHEMA, Table, tables_folder
+from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Table, tables_folder
 from underskin.surrogate.tensor_spline import TensorSpline
 from underskin.units import Floats
 

@@ -23,8 +23,8 @@ from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactEquation, mode_transforms
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
+from underskin.surrogate.hdf5_format import CONTACT_TABLE, ContactTable, load_contact
 from underskin.surrogate.sigma_table import ContactModel, ContactName, ContactRadius, SigmaTable
-from underskin.surrogate.tables import CONTACT_TABLE, ContactTable, load_contact
 from underskin.units import Floats
 
 _NODES = 97

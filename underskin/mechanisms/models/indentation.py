@@ -74,7 +74,7 @@ from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
 from underskin.recordings.curve_course import curve_landmarks, snap_in_interval, touch, visible_contact
 from underskin.recordings.modulus import estimate
-from underskin.surrogate.tables import load_contact
+from underskin.surrogate.hdf5_format import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
 
 _SMALLEST = 1e-12  # m of depth, below which a radius counts as 0
