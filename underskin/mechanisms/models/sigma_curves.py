@@ -34,8 +34,7 @@ from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.elastic_layer import ContactCurves, CurveGrid, Layer
 from underskin.physics.hankel_transform import disc_average
 from underskin.surrogate.hdf5_format import load_contact
-from underskin.surrogate.sigma_table import SigmaTable
-from underskin.surrogate.tensor_spline import CubicAxis, TensorSpline, joined
+from underskin.surrogate.sigma_table import CubicAxis, SigmaTable, TensorSpline, joined
 from underskin.units import Floats, Indices, Mask
 
 PROFILE_END = 8.0
