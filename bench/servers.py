@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from underskin.surrogate.hdf5_format import tables_folder
 from underskin.surrogate.sigma_table import SIGMA_TABLE
-from underskin.surrogate.tables import tables_folder
 
 CHECKOUT = Path(__file__).parent.parent
 TABLE = tables_folder() / SIGMA_TABLE

@@ -10,7 +10,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service import durable
 from underskin.recordings.readers.parsing_limits import ParsingLimits
-from underskin.surrogate.tables import tables_folder
+from underskin.surrogate.hdf5_format import tables_folder
 
 _PREFIX = "UNDERSKIN_"
 _PLAIN_UNFOLDS = 4  # times: a number of two bytes, be it a digit and a comma, is kept in eight

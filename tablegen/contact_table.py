@@ -37,7 +37,7 @@ from tablegen.left_out_nodes import left_out_errors
 from tablegen.neo_hookean import NEO_HOOKEAN, Material
 from tablegen.sweep import Arrays, run_pieces, sources_hash
 from underskin.physics import hankel_transform, hertz
-from underskin.surrogate.tables import CONTACT_SCHEMA, Dataset, data_hash, write_table
+from underskin.surrogate.hdf5_format import CONTACT_SCHEMA, Dataset, data_hash, write_table
 from underskin.units import Floats
 
 ORDER = 5

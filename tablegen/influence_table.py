@@ -19,7 +19,7 @@ from tablegen import discretisation, faces, influence, left_out_nodes, newton
 from tablegen.influence import RIM, influence_mesh, solve_influence
 from tablegen.left_out_nodes import left_out_errors
 from tablegen.sweep import Arrays, run_pieces, sources_hash
-from underskin.surrogate.tables import INFLUENCE_SCHEMA, Dataset, data_hash, write_table
+from underskin.surrogate.hdf5_format import INFLUENCE_SCHEMA, Dataset, data_hash, write_table
 from underskin.units import Floats
 
 ORDER = 6

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from underskin.surrogate.tables import interpolation_weights
+from underskin.surrogate.influence_table import interpolation_weights
 from underskin.units import Floats
 
 _GAIN = 4.0  # a spline through all nodes is at least as much better than one with a node left out

@@ -1,7 +1,7 @@
 """The exact linear contact of a frictionless sphere with the bonded layer: radius, depth, stress on the base.
 
 Lengths in thicknesses, forces in G h², E' = E/(1 − ν²) = 2 G/(1 − ν). The pressure is that of
-`underskin.physics.contact_curves` under the same force, and the stress on the base its transform times the layer's
+`underskin.physics.elastic_layer` under the same force, and the stress on the base its transform times the layer's
 transmission:
 s(r) = (1/3) ∫₀^∞ p̂(k; α) M(k) J0(kr) k dk.
 """
@@ -13,8 +13,7 @@ from scipy.special import j0
 
 from tablegen import linear_layer
 from underskin.physics.charge_response import INCOMPRESSIBLE
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import LARGEST_A_OVER_H, CurveGrid, Layer
 from underskin.physics.hankel_transform import disc_average, wave_numbers
 from underskin.units import Floats
 

@@ -24,8 +24,8 @@ from tablegen.mesh import RIM, layer_mesh
 from tablegen.sigma import Column, Nodes, solve_column
 from tablegen.sweep import Arrays, run_pieces, sources_hash
 from underskin.physics import hankel_transform, hertz
-from underskin.surrogate.tables import SIGMA_SCHEMA, Dataset, data_hash, write_table
-from underskin.surrogate.tensor_spline import TensorSpline
+from underskin.surrogate.hdf5_format import SIGMA_SCHEMA, Dataset, data_hash, write_table
+from underskin.surrogate.sigma_table import TensorSpline
 from underskin.units import Floats
 
 ORDER = 5

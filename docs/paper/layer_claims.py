@@ -7,7 +7,7 @@ import numpy as np
 from docs.paper.markdown import percent
 from docs.paper.prototype import INDENTERS_MM, RHO, SKIN
 from underskin.physics import elastic_layer
-from underskin.physics.contact_curves import ContactEquation
+from underskin.physics.elastic_layer import ContactEquation
 from underskin.units import Floats
 
 _THICKER_MM = np.linspace(1.5, 5.0, 8)

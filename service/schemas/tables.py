@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from underskin.surrogate.tables import SIGMA_SCHEMA
+from underskin.surrogate.hdf5_format import SIGMA_SCHEMA
 
 
 class TableAxis(BaseModel):

@@ -124,7 +124,7 @@ def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
 
 def _without_d33(campaign: Campaign, fields: dict[str, Any], table: SigmaTable) -> list[str]:
     """A sentence if a campaign's FRFs, or some of them, will give no d33; and the load parameter L."""
-    frfs = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings)
+    frfs = len(campaign.of(FrfRecording))
     reasons = [exclusion["reason"] for exclusion in fields["left_out"] if exclusion["recording"] is None]
     if not frfs or (fields["status"] == "ok" and not reasons):
         return []

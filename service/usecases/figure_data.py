@@ -25,7 +25,7 @@ def numbers(
 ) -> dict[str, Any]:
     """`recordings`: columns of FRF against preload; `spreads`: FRFs of equal recordings over all lines, independent
     of the band and therefore possibly `known_spreads`; None if they are few."""
-    few = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings) <= MOST_SINGLE
+    few = len(campaign.of(FrfRecording)) <= MOST_SINGLE
     lines = [] if known_spreads or few else measured(campaign)
     alike = [_plain(spread) for spread in spreads_of(lines)] if len(lines) > MOST_SINGLE else None
     return {
@@ -40,8 +40,8 @@ def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Fr
     from underskin.recordings.frf.estimation import lines_of
 
     pairs = []
-    for recording in campaign.recordings:
-        if isinstance(recording, FrfRecording) and show in ("", recording.sensor, recording.id):
+    for recording in campaign.of(FrfRecording):
+        if show in ("", recording.sensor, recording.id):
             try:
                 pairs.append((recording, lines_of(recording)))
             except InvalidInput:

@@ -5,7 +5,7 @@ from service.schemas.columns import Columns
 from underskin.array_stress.answer import answer
 from underskin.array_stress.request import LoadCase
 from underskin.errors import TableError
-from underskin.surrogate.tables import InfluenceTable
+from underskin.surrogate.influence_table import InfluenceTable
 
 
 def stress(table: InfluenceTable, request: LoadCase) -> Columns:

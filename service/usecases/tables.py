@@ -10,16 +10,10 @@ import numpy as np
 from service.problems import Refusal
 from service.schemas.tables import TableAxis, TableEntry, Tables
 from underskin.errors import TableError
+from underskin.surrogate.hdf5_format import CONTACT_TABLE, ContactTable, load_contact
+from underskin.surrogate.influence_table import INFLUENCE_TABLE, InfluenceTable, load_influence
 from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
 from underskin.surrogate.solved_contact import contact_model
-from underskin.surrogate.tables import (
-    CONTACT_TABLE,
-    INFLUENCE_TABLE,
-    ContactTable,
-    InfluenceTable,
-    load_contact,
-    load_influence,
-)
 
 _Table = TypeVar("_Table")
 _NAMED = {"schema", "data_sha256", "default"}

@@ -8,7 +8,7 @@ from underskin.array_stress.answer import answer, base_stress
 from underskin.array_stress.request import read_request
 from underskin.physics import elastic_layer
 from underskin.physics.elastic_layer import Layer
-from underskin.surrogate.tables import load_influence
+from underskin.surrogate.influence_table import load_influence
 
 TABLE = load_influence()
 UNIT_MPA = 1.5 / np.pi / 2.5**2  # of 1 N on 2.5 mm

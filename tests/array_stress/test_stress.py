@@ -21,7 +21,7 @@ from underskin.array_stress.request import read_request
 from underskin.physics import elastic_layer, half_space
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import normal_stress
-from underskin.surrogate.tables import load_influence
+from underskin.surrogate.influence_table import load_influence
 from underskin.units import Floats
 
 TABLE = load_influence()

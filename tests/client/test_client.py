@@ -15,7 +15,7 @@ from tests.support import preloaded
 from tests.support.server import running
 from underskin import Client, Indenter, ServiceError, Skin, Unreachable
 from underskin.physics import half_space
-from underskin.surrogate.tables import load_influence
+from underskin.surrogate.influence_table import load_influence
 from underskin.units import to_lab, to_si
 
 SKIN: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}

@@ -26,8 +26,8 @@ from tests.support.slip_campaigns import looked_at
 from underskin import Conditions, SkinDescription, load_table, predict
 from underskin.physics.sphere_law import SphereLaw
 from underskin.recordings.campaign import Campaign, IndentationConditions, IndentationRecording, parse
+from underskin.surrogate.hdf5_format import load_contact
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.surrogate.tables import load_contact
 from underskin.units import Floats
 
 CAMPAIGNS = os.environ.get("UNDERSKIN_CAMPAIGNS")

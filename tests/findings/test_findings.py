@@ -13,10 +13,8 @@ import pytest
 from tests.support.repository import ROOT
 from underskin.array_stress.request import read_request
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_one_of, required, unequal_lengths, wrong_type
-from underskin.findings import english
 from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
-from underskin.findings.english import ImplausibleD33, UnitGuess
-from underskin.findings.finding import Finding
+from underskin.findings.finding import ENGLISH, LACKING, OPTIONAL, Finding, ImplausibleD33, UnitGuess, Words, lacking
 from underskin.recordings.campaign import from_dict, parse
 from underskin.units import checked
 
@@ -34,12 +32,12 @@ def findings_made() -> Iterator[tuple[Path, ast.Call]]:
                 yield path, node
 
 
-def names_of(words: english.Words) -> tuple[set[str], set[str]]:
+def names_of(words: Words) -> tuple[set[str], set[str]]:
     """The arguments that words need, and those that they may have."""
     if isinstance(words, str):
         fields = [(field, spec or "") for _, field, spec, _ in string.Formatter().parse(words) if field is not None]
         named = {field for field, _ in fields}.union(*(names_of(spec)[1] for _, spec in fields))
-        return named - set(english.OPTIONAL), named
+        return named - set(OPTIONAL), named
     parameters = inspect.signature(words).parameters.values()
     return {one.name for one in parameters if one.default is one.empty}, {one.name for one in parameters}
 
@@ -54,13 +52,13 @@ def test_the_page_explains_each_code_once() -> None:
 def test_code_reason_reason_words() -> None:
     """Each code has a reason and each reason words."""
     assert {reason.code for reason in Reason} == set(FindingCode)
-    assert set(english.ENGLISH) == set(Reason)
-    assert set(english.LACKING) == set(Lack)
+    assert set(ENGLISH) == set(Reason)
+    assert set(LACKING) == set(Lack)
 
 
 def test_each_reason_is_used() -> None:
     """As `Reason.NAME` somewhere beside the enumeration and the words."""
-    own = {"codes.py", "english.py"}
+    own = {"codes.py", "finding.py"}
     text = "".join(path.read_text(encoding="utf-8") for path in SOURCES if path.name not in own)
     assert [reason.name for reason in Reason if f"Reason.{reason.name}" not in text] == []
 
@@ -76,7 +74,7 @@ def test_arguments_findings_words_need() -> None:
         if not isinstance(reason, ast.Attribute) or not isinstance(arguments, ast.Dict):
             continue
         given = {ast.literal_eval(key) for key in arguments.keys if key is not None}
-        needed, possible = names_of(english.ENGLISH[Reason[reason.attr]])
+        needed, possible = names_of(ENGLISH[Reason[reason.attr]])
         if None not in arguments.keys:
             assert needed <= given, f"{path}:{call.lineno}: {needed - given}"
         assert given <= possible or "arguments" in possible or "bounds" in possible, f"{path}:{call.lineno}"
@@ -124,9 +122,9 @@ def test_a_guess_at_the_unit(guess: UnitGuess, words: str) -> None:
 
 def test_a_lack_says_what_was_refused_before() -> None:
     few = {"recordings": 1, "least": 2}
-    assert english.lacking(Lacking(Lack.FEW_RECORDINGS, few)).startswith("usable recordings: 1; at least 2")
+    assert lacking(Lacking(Lack.FEW_RECORDINGS, few)).startswith("usable recordings: 1; at least 2")
     refused = Lacking(Lack.NO_RECORDING, {}, refused_recordings=3, refused_fields=("preload_n", "force_n"))
-    assert english.lacking(refused) == (
+    assert lacking(refused) == (
         "3 recording(s) were refused for their preload_n and force_n (see findings), which leaves no recording can be "
         "used"
     )

@@ -12,7 +12,7 @@ from underskin.mechanisms.models.indentation import Layers, Sphere, Stiffening, 
 from underskin.mechanisms.models.sphere_kernels import LARGEST_CBRT_LOAD
 from underskin.physics.sphere_law import SphereLaw
 from underskin.recordings.campaign import Campaign, IndentationRecording
-from underskin.surrogate.tables import load_contact
+from underskin.surrogate.hdf5_format import load_contact
 from underskin.units import Floats
 
 E_MPA, H_MM = 2.0, 2.5

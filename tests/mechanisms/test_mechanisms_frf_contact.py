@@ -25,7 +25,7 @@ from underskin.mechanisms import compose
 from underskin.physics import hertz
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import hertz_transform, normal_stress, punch_transform
-from underskin.surrogate.tables import load_contact
+from underskin.surrogate.hdf5_format import load_contact
 
 
 @NEEDS_ORACLE

@@ -13,8 +13,7 @@ from tests.support.oracle import NEEDS_ORACLE
 from tests.support.sphere_contact import SphereContact, SphereOnLayer
 from underskin.errors import InvalidInput
 from underskin.physics import elastic_layer, hertz
-from underskin.physics.contact_curves import ContactEquation, mode_transforms
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import ContactEquation, Layer, mode_transforms
 from underskin.physics.hankel_transform import normal_stress
 from underskin.units import Floats
 

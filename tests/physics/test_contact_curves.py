@@ -5,8 +5,14 @@ import pytest
 from scipy.special import j0
 
 from tests.support.sphere_contact import SphereOnLayer
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactEquation, ContactRows, CurveGrid, mode_transforms
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import (
+    LARGEST_A_OVER_H,
+    ContactEquation,
+    ContactRows,
+    CurveGrid,
+    Layer,
+    mode_transforms,
+)
 from underskin.physics.hankel_transform import disc_average
 from underskin.units import Floats
 

@@ -8,8 +8,7 @@ import pytest
 from tests.support.sphere_curves import campaign, hertz, pressed, ways
 from underskin.errors import InvalidInput
 from underskin.inversion.elastomer import of_campaign
-from underskin.physics.contact_curves import CurveGrid
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import CurveGrid, Layer
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.modulus import IndentationModulus
 from underskin.units import Floats

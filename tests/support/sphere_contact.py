@@ -1,6 +1,6 @@
 """A rigid sphere pressed into the linear layer without friction, with or without adhesion (JKR), one contact at a time.
 
-The exact solution behind the curves that serve many contacts at once (contact_curves); lengths in m, forces in N.
+The exact solution behind the curves that serve many contacts at once (elastic_layer); lengths in m, forces in N.
 With E' = E/(1 − ν²), α = a/h and U = √(w/(E' h³)) R, the sphere without adhesion and a flat punch whose φ at the edge
 is −√(2awE'/π) add up (Johnson, Kendall and Roberts 1971; Dimitriadis et al. 2002):
 
@@ -16,8 +16,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from underskin.errors import InvalidInput
-from underskin.physics.contact_curves import ContactEquation, mode_transforms
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import ContactEquation, Layer, mode_transforms
 from underskin.units import Floats
 
 LARGEST = 10.0  # a/h

@@ -16,8 +16,8 @@ from tests.support import felupe_contact
 from tests.support.cases import first
 from underskin import TableError
 from underskin.physics import hertz
+from underskin.surrogate.hdf5_format import ContactTable, load_contact, tables_folder
 from underskin.surrogate.sigma_table import load_table
-from underskin.surrogate.tables import ContactTable, load_contact, tables_folder
 from underskin.units import Floats
 
 RHO = np.array([0.05, 0.2, 0.6, 1.0, 1.5, 3.0])

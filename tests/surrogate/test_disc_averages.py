@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from underskin.surrogate.tensor_spline import CubicAxis
+from underskin.surrogate.sigma_table import CubicAxis
 
 AXIS = CubicAxis(np.linspace(0.0, 4.0, 33))
 

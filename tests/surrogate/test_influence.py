@@ -18,7 +18,8 @@ from underskin.array_stress.load_integration import Load, array_stress, contact_
 from underskin.physics import elastic_layer
 from underskin.physics.contact_pressure import SpherePressure
 from underskin.physics.elastic_layer import Layer
-from underskin.surrogate.tables import InfluenceTable, load_influence, read_table, tables_folder
+from underskin.surrogate.hdf5_format import read_table, tables_folder
+from underskin.surrogate.influence_table import InfluenceTable, load_influence
 from underskin.units import Floats
 
 TABLE = load_influence()

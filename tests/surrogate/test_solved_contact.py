@@ -10,9 +10,9 @@ from underskin.physics.hankel_transform import normal_stress
 from underskin.prediction.forward_model import predict
 from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
 from underskin.recordings.campaign import SkinDescription, frf_conditions
+from underskin.surrogate.hdf5_format import load_contact
 from underskin.surrogate.sigma_table import load_table
 from underskin.surrogate.solved_contact import linear_contact, solved_contact
-from underskin.surrogate.tables import load_contact
 
 SOLVED, TABLE = solved_contact(), load_table()
 MODULUS = 16e6

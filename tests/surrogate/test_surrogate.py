@@ -13,8 +13,8 @@ from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
 from tests.support.oracle import NEEDS_ORACLE, linear_layer_values
 from underskin import TableError, load_table
+from underskin.surrogate.hdf5_format import data_hash, read_table, tables_folder
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.surrogate.tables import data_hash, read_table, tables_folder
 
 TABLE = load_table()
 GENERATOR = np.random.default_rng(2018)

@@ -10,7 +10,7 @@ import pytest
 from scipy.interpolate import NdBSpline, make_interp_spline
 
 from underskin import load_table
-from underskin.surrogate.tensor_spline import TensorSpline
+from underskin.surrogate.sigma_table import TensorSpline
 from underskin.units import Floats
 
 TABLE = load_table()

@@ -12,7 +12,7 @@ from bench.soak import SOAK
 from tablegen import contact_table, influence_table, sigma_table
 from tablegen.sweep import sources_hash
 from tests.support.cases import first
-from underskin.surrogate.tables import tables_folder
+from underskin.surrogate.hdf5_format import tables_folder
 
 MADE_BY = {"sigma.h5": sigma_table, "influence.h5": influence_table, "contact.h5": contact_table}
 

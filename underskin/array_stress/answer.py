@@ -13,8 +13,9 @@ from underskin.errors import Mention, Requirement, out_of_range
 from underskin.findings.finding import Finding
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
 from underskin.physics.elastic_layer import Layer, slip
+from underskin.surrogate.hdf5_format import CONTACT_TABLE
+from underskin.surrogate.influence_table import Influence, InfluenceTable
 from underskin.surrogate.solved_contact import solved_contact
-from underskin.surrogate.tables import CONTACT_TABLE, Influence, InfluenceTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 

@@ -15,9 +15,9 @@ from underskin.array_stress.request import LoadCase
 from underskin.errors import out_of_range
 from underskin.physics import charge_response, hertz
 from underskin.physics.contact_pressure import SpherePressure
+from underskin.surrogate.influence_table import Influence, SensorStress
 from underskin.surrogate.off_centre_sigma import sigma_off_centre
 from underskin.surrogate.solved_contact import SolvedContact
-from underskin.surrogate.tables import Influence, SensorStress
 from underskin.units import Floats, to_si
 
 _FINE_CELL = 0.02  # of the thickness: below, one point a cell; γ varies over lengths of about 0.3

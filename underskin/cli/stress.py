@@ -25,7 +25,7 @@ def stress(
     from underskin.array_stress.answer import answer
     from underskin.array_stress.request import read_file
     from underskin.cli import columns
-    from underskin.surrogate.tables import load_influence
+    from underskin.surrogate.influence_table import load_influence
 
     stresses = answer(load_influence(), read_file(request, pressure_map))
     columns.write_findings(stresses.findings)

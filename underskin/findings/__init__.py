@@ -1,1 +1,1 @@
-"""Findings: what looks wrong in data, or limits an answer, as codes with arguments; `english` makes the sentences."""
+"""Findings: what looks wrong in data, or limits an answer, as codes with arguments, and their sentences."""

@@ -1,6 +1,6 @@
 """The codes of findings, the reasons of each code, and what data lack for a conclusion.
 
-Users filter by codes, which docs/findings.md explains. A reason is one sentence of `english`; its value is its code,
+Users filter by codes, which docs/findings.md explains. A reason is one sentence of `finding`; its value is its code,
 followed by a point and a suffix where the code has several reasons.
 """
 

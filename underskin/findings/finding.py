@@ -1,12 +1,552 @@
-"""A finding: something suspicious in data, or a limit of an answer, as a reason with arguments."""
+"""A finding: something suspicious in data, or a limit of an answer, as a reason with arguments; and its English words.
+
+For each reason there is a template, or a function where words depend on the arguments. Only this module holds the
+words. Templates are those of `str.format` with further specifications (`_Template`). The types of arguments that are
+more than a number or a name say their own words.
+"""
 
 import dataclasses
-from collections.abc import Mapping
+import math
+import string
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
-from underskin.findings import english
-from underskin.findings.codes import FindingCode, Reason
+from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
+from underskin.findings.formatting import in_digits, significant
+
+
+@dataclass(frozen=True)
+class UnitGuess:
+    """The slip of units that explains an unusual magnitude.
+
+    `size` in the field's `unit` is corrected to each value of `meant`, in that unit, if it was given in the paired
+    unit; or to the only value, paired with an empty unit, if it is off by ten to the power of `off_by`. If empty, no
+    slip explains it; a size of 0 is a measured value of 0.
+    """
+
+    size: float
+    unit: str
+    meant: tuple[tuple[float, str], ...] = ()
+    off_by: int = 0
+
+    def __str__(self) -> str:
+        """The slip in words."""
+        if self.size == 0:
+            return "a dead sensor?"
+        if not self.meant:
+            return "no unit that we know explains it"
+        if self.off_by:
+            return f"off by a factor of 10^{self.off_by}? {self.meant[0][0]:g} {self.unit} would be usual"
+        was = ", ".join(f"{self.size:g} {given_in} is {meant:g} {self.unit}" for meant, given_in in self.meant)
+        return f"{was}: was it given in {' or '.join(given_in for _, given_in in self.meant)}?"
+
+
+class ImplausibleD33(StrEnum):
+    """Why a d33 is implausible."""
+
+    TOO_LARGE = "too_large"
+    TOO_SMALL = "too_small"
+    NEGATIVE = "negative"
+    NOT_PVDF = "not_pvdf"
+
+    @property
+    def words(self) -> str:
+        """Why, and what may be wrong."""
+        return {
+            self.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
+            self.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
+            self.NEGATIVE: "negative: is the sign of charge or force turned?",
+            self.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
+        }[self]
+
+
+class DefectKind(StrEnum):
+    """What a run of damaged samples does."""
+
+    OVERLOAD = "overload"
+    HELD_SAMPLES = "held_samples"
+    JUMP = "jump"
+
+    @property
+    def words(self) -> str:
+        """What the samples do."""
+        return {
+            DefectKind.OVERLOAD: "stay at the end of the range: overload",
+            DefectKind.HELD_SAMPLES: "repeat one value: samples were dropped and the last one held",
+            DefectKind.JUMP: "break the signal's course: samples were dropped, or a spike",
+        }[self]
+
+
+_MOST_SENSORS = 3  # named one by one
+_MOST_LISTED = 6
+
+
+def counted_negative(fields: Sequence[str], more: int, may_be_pulled: bool) -> str:
+    """Force, displacement or both fall during loading."""
+    named = " and ".join({"force_n": "force", "displacement_mm": "displacement"}[name] for name in fields)
+    are, channel = ("are", "those channels") if len(fields) > 1 else ("is", "that channel")
+    negative = f"{named} {are} counted negative as it is pressed, where compression and depth count positive"
+    unless = (
+        ": right for a sample that is pulled, else reverse the signs of both channels"
+        if may_be_pulled
+        else f"; turned round here, reverse the sign of {channel}"
+    )
+    return f"{negative}{unless}{more_alike(more, 'recording')}"
+
+
+def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> str:
+    """A force channel at the end of its range."""
+    limits = " or ".join(f"{limit:.4g} N" for limit in limits_n)
+    return (
+        f"the force channel saturates: {samples} samples, {percent:.2g} % of all, read {limits} while the travel goes "
+        "on; they were left out (record with a larger range)"
+    )
+
+
+def thickness_unknown(answer: str, is_tried: bool) -> str:
+    """An undeclared thickness, and what it leaves open."""
+    layer = "a thin layer on a stiff base (layered contact)"
+    undeclared = "the thickness of the sample is not declared"
+    if answer == "layered contact":
+        alike = "a thick sample that stiffens with strain can look alike"
+        return f"{undeclared}: that of {layer} was fitted, and {alike}; declare thickness_mm"
+    tried = "whose thickness was fitted" if is_tried else "which was not tried"
+    return f"{undeclared}, and {layer}, {tried}, stiffens a curve much like {answer}: declare thickness_mm"
+
+
+def more_alike(count: int, noun: str) -> str:
+    """The number of further cases, in brackets; empty for 0."""
+    return f" ({count} more {noun}{'s' if count > 1 else ''} like it)" if count else ""
+
+
+def listed_sensors(ids: Sequence[str]) -> str:
+    """Some sensors by their ids."""
+    if len(ids) > _MOST_SENSORS:
+        return f"sensors {', '.join(ids[:_MOST_SENSORS])} and {len(ids) - _MOST_SENSORS} more"
+    return f"sensors {', '.join(ids[:-1])} and {ids[-1]}"
+
+
+def listed(ids: Sequence[str], noun: str) -> str:
+    """The first ids of a list, and the number of further ones."""
+    if len(ids) > _MOST_LISTED:
+        return f"{noun} {', '.join(ids[:_MOST_LISTED])} and {len(ids) - _MOST_LISTED} more"
+    return f"{noun if len(ids) > 1 else noun.removesuffix('s')} {', '.join(ids)}"
+
+
+def all_conjugated(lag_us: float | None) -> str:
+    """All FRFs in the other sign convention, or a force channel that lags."""
+    if lag_us is not None:
+        return (
+            "the phase over frequency leads: either the FRFs are conjugated, in the convention e^(-iωt), or the force "
+            f"channel lags by {float(f'{lag_us:.2g}'):g} µs; these recordings cannot tell which, and nothing was "
+            "changed"
+        )
+    return (
+        "the phase over frequency is one that no sensor or amplifier can have unless its sign is reversed: the FRFs "
+        "look conjugated, in the convention e^(-iωt); all were conjugated back"
+    )
+
+
+def elastomer(modulus_mpa: float, low_mpa: float, high_mpa: float, guess: UnitGuess) -> str:
+    """A modulus that no elastomer has."""
+    word = "stiffer" if modulus_mpa > high_mpa else "softer"
+    usual = f"({low_mpa:g} to {high_mpa:g} MPa)"
+    return f"{modulus_mpa:g} MPa is {word} than elastomers are {usual}: {guess}"
+
+
+def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> str:
+    """Lines where the force has little power."""
+    of = "one recording" if recordings == 1 else f"{recordings} recordings"
+    beyond = f"; so are {beside} whose noise the next line shares" if beside else ""
+    why = "the force has little power there, or the charge does not follow it"
+    return f"{faint} of {measured} lines of {of} are left out: {why}{beyond}"
+
+
+def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
+    """Noise that biases an estimator."""
+    channel = {"H1": "the force", "H2": "the charge", "Hv": "force and charge"}[estimator]
+    size = "small" if percent < 0 else "large"
+    text = f"noise in {channel} makes {estimator} too {size} by {in_digits(abs(percent), 2)} %: that was taken off"
+    return f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open" if unsure_percent >= 0.1 else text
+
+
+def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
+    """A band behind filters."""
+    filters = [f"a high-pass of about {in_digits(high_pass_hz, 2)} Hz"] if high_pass_hz > 0 else []
+    filters += [f"a low-pass of about {in_digits(low_pass_hz, 2)} Hz"] if low_pass_hz < float("inf") else []
+    return (
+        f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind {' and '.join(filters)}, and does not "
+        f"reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a diagnosis "
+        "takes the filter into account, or record a band further off its corner"
+    )
+
+
+def parameter_at_bound(mechanism: str, parameter: str, low: float, high: float, unit: str) -> str:
+    """A parameter at the end of its range."""
+    limits = f"{low:g} to {high:g} {unit.strip('-')}".rstrip()
+    called = parameter.replace("_", " ")
+    return f"{mechanism}: {called} lies at or beyond an end of its search ({limits}), which is no result"
+
+
+def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float) -> str:
+    """Mechanisms that predict held-out groups no better."""
+    omitted = " and ".join(groups) if len(groups) <= 2 else f"each of {len(groups)} parts in turn"
+    before, after = (float(f"{percent:.4g}") for percent in (before_percent, after_percent))  # as the report has them
+    return (
+        f"what was left out ({omitted}) is predicted no better with {' and '.join(mechanisms)}: "
+        f"{before:.3g} % before, {after:.3g} % after; do not extrapolate with it"
+    )
+
+
+def no_simple_law(
+    tried: int, law: str = "", part: str = "", after_percent: float = 0.0, before_percent: float = 0.0
+) -> str:
+    """The held-out prediction by the best of the laws of one form over one axis."""
+    if not law:
+        return f"none of {tried} simple laws of one quantity over one axis gains anything"
+    if after_percent >= before_percent:
+        return (
+            f"none of {tried} simple laws of one quantity over one axis predicts {part} held out better than without "
+            f"it: the nearest, {law}, predicts them to {after_percent:.2g} % instead of {before_percent:.2g} %"
+        )
+    return (
+        f"none of {tried} simple laws of one quantity over one axis stands out enough to be stated: the nearest, "
+        f"{law}, predicts {part} held out to {after_percent:.2g} % instead of {before_percent:.2g} %"
+    )
+
+
+_AS_A_SLIP = 0.05  # largest difference of the logarithm of a factor from that of 2 or 1/2
+
+
+def sensor_alone(sensor: str, share: float, recordings: int) -> str:
+    """A sensor whose level differs from the common one of the others."""
+    doubled = min(abs(math.log(share / 2)), abs(math.log(2 * share))) < _AS_A_SLIP
+    causes = "its own d33, its cable, or peak-to-peak beside amplitudes" if doubled else "its own d33 or its cable"
+    return (
+        f"sensor {sensor!r} responds with {share:.2f} times the others' charge, and they are alike: {causes}; "
+        f"taken to their level by this factor ({recordings} recordings)"
+    )
+
+
+def labels_permuted(sensors: Sequence[str], places: Sequence[str], since: str | None, recordings: int) -> str:
+    """More than two sensors, each of which answers where another one was pressed."""
+    start = f"from recording {since!r} on, in the order of time, " if since else ""
+    moved = ", ".join(f"{sensor!r} where {place!r} was pressed" for sensor, place in zip(sensors, places, strict=True))
+    return (
+        f"{start}{len(sensors)} sensors answer where another one of them was pressed ({moved}): their labels or "
+        f"cables look rotated, as by a plug that is off by one; put right ({recordings} recordings)"
+    )
+
+
+def labels_contradict_places(sensors: Sequence[str], recordings: int) -> str:
+    """Sensors that respond where others were pressed, without an exchange that explains all of it."""
+    answer = f"{listed(sensors, 'sensors')} answer{'s' if len(sensors) == 1 else ''} where others were pressed"
+    return f"{answer}, and no exchange explains it: labels or places are wrong; left out ({recordings} recordings)"
+
+
+Words = str | Callable[..., str]
+OPTIONAL: Mapping[str, Any] = {
+    "left_out": False,
+    "guess": None,
+    "example": "",
+    "frequency_hz": None,
+}  # arguments of some findings
+
+
+class _Template(string.Formatter):
+    """Python's format specifications, and some for words.
+
+    `{value:yes|no}` is the first text, which may hold fields, if the value is true, else the second. `{value:digits 2}`
+    never is a power of ten, `{value:significant 2}` no positive one. `{texts:or}` joins a list, `{ids:count}` is its
+    length, `{ids:listed recordings}` and `{ids:sensors}` name its first ids, and `{more:more recording}` is a number of
+    further cases in brackets. None is empty.
+    """
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """One field in words."""
+        yes, bar, no = format_spec.rpartition("|")
+        if bar:
+            return yes if value else no
+        if value is None:
+            return ""
+        name, _, argument = format_spec.partition(" ")
+        if name in _WORDS:
+            return _WORDS[name](value, argument)
+        return str(super().format_field(value, format_spec))
+
+
+_WORDS: Mapping[str, Callable[[Any, str], str]] = {
+    "digits": lambda value, digits: in_digits(value, int(digits)),
+    "significant": lambda value, digits: significant(value, int(digits)),
+    "or": lambda texts, _: ", or ".join(texts),
+    "count": lambda ids, _: str(len(ids)),
+    "listed": listed,
+    "sensors": lambda ids, _: listed_sensors(ids),
+    "more": more_alike,
+    "defect": lambda kind, _: DefectKind(kind).words,
+    "implausible": lambda kind, _: ImplausibleD33(kind).words,
+}
+
+
+def in_english(words: Words, arguments: Mapping[str, Any]) -> str:
+    """A template or a function with its arguments."""
+    if isinstance(words, str):
+        return _Template().vformat(words, (), {**OPTIONAL, **arguments})
+    return words(**arguments)
+
+
+def statement(reason: Reason, arguments: Mapping[str, Any]) -> str:
+    """The sentence of a reason with its arguments."""
+    return in_english(ENGLISH[reason], arguments)
+
+
+def lacking(what: Lacking) -> str:
+    """A lack in words, as the end of a sentence."""
+    text = in_english(LACKING[what.lack], what.arguments)
+    if not what.refused_recordings:
+        return text
+    fields = " and ".join(what.refused_fields)
+    return f"{what.refused_recordings} recording(s) were refused for their {fields} (see findings), which leaves {text}"
+
+
+def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
+    meant = "; if it is meant, say units_checked" if confirmable else ""
+    return f"{' and '.join(fields)} cannot be right as declared (see findings){meant}"
+
+
+_IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
+_OF_ARRAY = "{percent:.0f} % of the array's d33"
+_MORE_ROWS = "{more: ({more} more rows like it)|}"
+_UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
+_RESPONSE = "1000 × too {too_large:large: pC taken for nC, or N for mN?|small: nC taken for pC?}"
+_NEEDED = (
+    "force and displacement would need a modulus of about {modulus_mpa:.2g} MPa: "
+    "{slips:{slips:or}?|are force, displacement and size in the units that were said?}"
+)
+_THOUSANDFOLD = "{too_small:a thousandfold|divided by 1000}"
+_ALL_AS_IN, _LEFT_OUT = "{example:in all recordings, as in {example}: |}", "{left_out: Left out|}"  # of time series
+DEFECT = "{channel}: {samples} samples from sample {first_sample} {kind:defect}"
+
+LACKING: Mapping[Lack, Words] = {
+    Lack.CURVES_CONTRADICT: "force, displacement and modulus cannot all be right as declared (see findings); if they "
+    "are meant, say units_checked",
+    Lack.NO_CURVE: "no curve can be used (see findings)",
+    Lack.NO_RECORDING: "no recording can be used",
+    Lack.NO_RESPONSE: "no recording shows a response above its own noise",
+    Lack.TWO_RECORDINGS_CONTRADICT: "two recordings that contradict each other (see findings); a third would tell "
+    "which is off",
+    Lack.FEW_RECORDINGS: "usable recordings: {recordings}; at least {least} are needed, better at different preloads "
+    "or spheres",
+    Lack.FEW_TO_AGREE: "{recordings} recordings agree with the model, but would do so with much missing, which d33 and "
+    "their scatter take up; at least {least} are needed, better at different preloads or spheres",
+    Lack.MADE_ALIKE: "all recordings were made alike, at one frequency; different preloads, spheres or places are "
+    "needed",
+    Lack.IMPOSSIBLE_DECLARATION: _impossible_declaration,
+    Lack.NOISE: "a response that stands out of its noise, which is {floor_percent:.0f} % of what is predicted",
+}
+ENGLISH: Mapping[Reason, Words] = {
+    Reason.REFUSED: "{field} = {value!r}: {allowed}; left out",
+    Reason.NO_FRF: "{refusal}",
+    Reason.IMPOSSIBLE_SKIN: _IMPOSSIBLE,
+    Reason.IMPOSSIBLE_SENSOR_RADIUS: "{radius_mm:g} mm is beyond {thicknesses:g} thicknesses",
+    Reason.IMPOSSIBLE_RECORDING: f"{_IMPOSSIBLE}: left out",
+    Reason.IMPOSSIBLE_FRF: "its FRF of {frf_pc_per_n:.3g} pC/N, not below 1 C/N, can be none",
+    Reason.NO_FINITE_LINE: "no line is finite: left out",
+    Reason.NO_LINE_IN_BAND: "it has no line in the band",
+    Reason.LINES_NOT_FINITE: "{lines} lines left out",
+    Reason.SILENT_CAMPAIGN: "none of the {recordings} recordings shows a response above its noise: is the sensor "
+    "connected?",
+    Reason.SILENT_SENSOR: "sensor {sensor!r} shows no response above its noise in any of its {recordings} recordings: "
+    "left out",
+    Reason.SILENT_RECORDING: "no response above its noise, where the other recordings let expect one: left out",
+    Reason.ZERO_LINES: "every line is 0: left out",
+    Reason.INCOHERENT: "charge follows force at no frequency: left out",
+    Reason.MAINS_SPOIL_ALL: "mains of {mains_hz:g} Hz may spoil all lines where the force has its power: left out",
+    Reason.DUPLICATED_RECORDING: "the same numbers as recording {original!r}: left out",
+    Reason.SERIES_NOT_USABLE: "{refusal}: left out",
+    Reason.CURVE_NOT_USABLE: "{refusal}: left out",
+    Reason.OUT_OF_TABLES_DECLARED: "its contact (radius {radius_mm:.3g} mm on a layer of {thickness_mm:g} mm, at its "
+    "place beside the sensor) lies beyond the tables: left out",
+    Reason.OUT_OF_TABLES_UNLESS_STIFFER: "by the declared {declared_mpa:g} MPa its contact lies beyond the tables, by "
+    "one up to {factor:g} times larger within; no answer that stands has such a modulus, so it was left out: a modulus "
+    "that is declared too small is not ruled out",
+    Reason.OUT_OF_TABLES_FITTED: "with the values found for {answer} its contact lies beyond the tables: its "
+    "prediction is continued from the table's edge",
+    Reason.CONTACTS_KEPT: "by the declared {declared_mpa:g} MPa {contacts} of {recordings} contacts lie beyond the "
+    "tables, "
+    "{found_mpa:at the {found_mpa:.3g} MPa found|with the values found for {answer}} they lie within: kept",
+    Reason.BEYOND_TABLE: "{limit}",
+    Reason.PLACE_BEYOND_TABLE: "its position is farther from the sensor than the table reaches, or its lines scatter "
+    "beyond measure",
+    Reason.EXCLUDED: "Left out: {excluded_for}",
+    Reason.OUTLIER: "its d33 of {d33_pc_per_n:.3g} pC/N is grossly off all others",
+    Reason.CURVE_TOO_DEEP: "pressed {moved_mm:.3g} mm, more than {share:g} of its sample's height ({most_mm:.3g} mm): "
+    "given in µm? Left out",
+    Reason.SPHERE_TOO_DEEP: "pressed {moved_mm:.3g} mm, more than ten times the sphere's width ({most_mm:.3g} mm): "
+    "given in µm? Left out",
+    Reason.MODULUS_BESIDE_OTHERS: "its apparent modulus of {modulus_mpa:.3g} MPa is {ratio:.2g} times the others': a "
+    "slip of units? Left out",
+    Reason.TWO_MODULI: "the two curves' apparent moduli of {first_mpa:.2g} and {second_mpa:.2g} MPa contradict each "
+    "other: is force or displacement of one of them off by 1000?",
+    Reason.MODULUS_BESIDE_DECLARED: f"{_NEEDED} {{declared_mpa:g}} MPa is declared",
+    Reason.MODULUS_BESIDE_RUBBER: f"{_NEEDED} Rubber has {{low_mpa:g}} to {{high_mpa:g}} MPa",
+    Reason.MODULUS_OF_NO_ELASTOMER: elastomer,
+    Reason.DECLARED_UNUSUAL: _UNUSUAL,
+    Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
+    Reason.PRELOADS_SMALL: "no preload is above {highest_n:g} N: they look 1000 × too small; were they given in kN?",
+    Reason.PRELOADS_LARGE: "no preload is below {lowest_n:g} N: they look 1000 × too large; were they given in mN?",
+    Reason.COHERENCE_SMALL: "no coherence is above {largest:.2g}: does its heading say %, where it is a share of 1?",
+    Reason.FREQUENCIES: "frequencies are {lowest_hz:g} to {highest_hz:g} Hz: they look 1000 × too "
+    "{too_large:large|small}; were "
+    "they given in {given_in}?",
+    Reason.PERIODS_TOO_LONG: "no period of {lowest_hz:g} Hz fits into the {pause_s:.3g} s after which, by recorded_at, "
+    "the next recording follows: are they 1000 × too small, given in kHz?",
+    Reason.RESPONSE_BESIDE_OTHERS: f"the response looks {_RESPONSE} Left out",
+    Reason.TWO_RESPONSES: "the two recordings' responses are {ratio:.3g} times as far apart as expected: a slip of "
+    "units?",
+    Reason.D33_NEEDED: "charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N"
+    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}; it looks {_RESPONSE}",
+    Reason.PLACES: f"places lie at their own sensors only {_THOUSANDFOLD}: were they given in {{given_in}}, or the "
+    f"sensors in "
+    "{sensors_in}?",
+    Reason.PLACE: f"its place lies at its own sensor only {_THOUSANDFOLD}: was it given in {{given_in}}? Left out",
+    Reason.PLACES_AT_SENSORS: "no place lies farther from its sensor than {farthest_mm:.2g} mm: were they given in m?",
+    Reason.WITHIN_TABLES: "were it 1000 × {larger:larger|smaller}, contacts would lie within the tables: was it given "
+    "in "
+    "{given_in}?",
+    Reason.SERIES_FORCE: f"{_ALL_AS_IN}it is shaken by {{oscillation_n:.3g}} N, where dynamic_force_n is "
+    f"{{dynamic_force_n:g}}: it "
+    f"looks 1000 × too {{too_large:large|small}}; was it given in {{given_in}}?{_LEFT_OUT}",
+    Reason.SERIES_DYNAMIC_FORCE: f"{_ALL_AS_IN}{{dynamic_force_n:g}} N looks 1000 × too {{too_large:large|small}} "
+    f"beside the "
+    f"recorded force: was it given in {{given_in}}?{_LEFT_OUT}",
+    Reason.SERIES_PRELOAD: f"{_ALL_AS_IN}{{preload_n:g}} N looks 1000 × too {{too_large:large|small}} beside the "
+    f"recorded force's "
+    f"mean of {{mean_n:.3g}} N: was it given in {{given_in}}?{_LEFT_OUT}",
+    Reason.BESIDE_OTHERS: "{value:g} looks 1000 × too {too_large:large|small} beside the others: was it given in "
+    "{given_in}? "
+    "Left out",
+    Reason.DYNAMIC_FORCE_LARGE: "the dynamic force reaches the preload in all recordings, so the sphere would leave "
+    "the skin: was it given in mN, or the preload in kN, or are the two exchanged?",
+    Reason.DYNAMIC_FORCE_SMALL: "it is at most {ratio:.1g} of the preload: it looks 1000 × too small; was it given in "
+    "kN, or the preload in mN?",
+    Reason.NARROW_MAP: "the map spans {span_mm:g} mm, on sensors {diameter_mm:g} mm across: is it in mm?",
+    Reason.UNUSUAL_MAGNITUDE: _UNUSUAL,
+    Reason.UNUSUAL_MEDIAN_FRF: f"FRF, median of the recordings: {_UNUSUAL}",
+    Reason.CURVE_COUNTED_NEGATIVE: counted_negative,
+    Reason.ROWS_REVERSED: "its rows begin where it is deepest and end in the air: it was read from the last row to "
+    "the first"
+    "{is_timed:, without its times, since a way out alone does not tell what relaxes|}",
+    Reason.FORCE_SATURATES: force_saturates,
+    Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
+    "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "
+    "screw or an encoder{frequency_hz:; or hum, or a vibration of {frequency_hz:.3g} Hz|}); it was subtracted",
+    Reason.TIP_SHAPE: "{refusal}",
+    Reason.TWO_SIGNS: "the two recordings answer with opposite signs: one of them is reversed",
+    Reason.ALL_REVERSED: "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier "
+    "inverts)",
+    Reason.SENSOR_REVERSED: "sensor {sensor!r} answers with the opposite sign of the others: reversed",
+    Reason.RECORDING_REVERSED: "its sign is the opposite of the others': reversed",
+    Reason.RECORDINGS_REVERSED: "the sign of {reversed_recordings:count} of {recordings} recordings is the opposite "
+    "of the "
+    "others', with no order in it: reversed ({reversed_recordings:listed recordings})",
+    Reason.ALL_CONJUGATED: all_conjugated,
+    Reason.RECORDINGS_CONJUGATED: "the phase over frequency of {conjugated:count} of {recordings} recordings is that "
+    "of the "
+    "others with its sign turned: they look conjugated, and were conjugated back ({conjugated:listed recordings})",
+    Reason.LEVELS_EXCHANGED: "since {since} sensors {first!r} and {second!r} each have the d33 that the other one had "
+    "before: their labels or cables look exchanged, and each d33 since then belongs to the other sensor",
+    Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, "
+    "or their places, look exchanged; put right",
+    Reason.CABLES_EXCHANGED: "from recording {since!r} on, in the order of time, sensors {first!r} and {second!r} "
+    "answer as each "
+    "other: their cables look exchanged; put right ({recordings} recordings)",
+    Reason.LABELS_PERMUTED: labels_permuted,
+    Reason.LABELS_CONTRADICT_PLACES: labels_contradict_places,
+    Reason.SILENT_TOGETHER: "sensors {first!r} and {second!r} both show no response since recording {since!r}, in the "
+    "order of "
+    "time: cables exchanged, or a connector or amplifier that they share; left out ({recordings} recordings)",
+    Reason.AMPLITUDE_FACTOR: "the response of {of:count} of {recordings} recordings is {factor:.3g} times the "
+    "others': is their "
+    "dynamic force or charge given as {meant} instead of peak? Put right by this factor ({of:listed recordings})"
+    "{left_out:; {left_out} that do not tell were left out|}",
+    Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
+    "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
+    Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "
+    f"{{charge_mean_pc:.3g}}, where "
+    f"preload_n is {{preload_n:g}}: force and charge look exchanged.{_LEFT_OUT}",
+    Reason.PRELOAD_AND_RADIUS_EXCHANGED: "the spheres are pressed harder than the tables hold, or preload_n and "
+    "indenter_radius_mm "
+    "are exchanged: L = F/(R²E) of {beyond} of {recordings} contacts is beyond the tables, and within if they are "
+    "exchanged",
+    Reason.FORCE_CONTRADICTS_PRELOAD: "the force is {mean_n:.3g} N in the mean, but the preload is {preload_n:g} N: "
+    "{guess:{guess}|is one in another unit?}{left_out: Left out|}",
+    Reason.SENSORS_AT_ONE_PLACE: "{sensors:sensors} lie at one place, x {x_mm:g} mm, y {y_mm:g} mm: is it a "
+    "slip?{more:more place}",
+    Reason.SENSORS_TOO_NEAR: "{sensors:sensors} of {radius_mm:g} mm radius cannot lie {pitch_mm:g} mm apart: "
+    "{in_metres:were their places given in m|is it the diameter}, or a slip?",
+    Reason.SENSORS_OVERLAP: "{first} and {second} lie over one another, their centres {distance_mm:g} mm apart: are x "
+    "and y in mm?",
+    Reason.NO_CONTACT_WITHIN_TABLES: "no contact lies within the tables: contact radii would be {smallest:.3g} to "
+    "{largest:.3g} of the thickness, or the places lie far from their sensors; are preload, sphere, thickness, modulus "
+    "and places right?",
+    Reason.TIME_TO_COME: "recorded_at is {written}, which is still to come: is the year a slip?{more:more recording}",
+    Reason.TIME_TOO_OLD: "recorded_at is {written}, before {year}: was the clock not set?{more:more recording}",
+    Reason.D33_FITTED: "d33 comes out as {d33_pc_per_n:.4g} pC/N, {kind:implausible}",
+    Reason.D33_OF_ARRAY: "d33 of the array is {d33_pc_per_n:.3g} pC/N, {kind:implausible}",
+    Reason.D33_OF_ROW: f"d33 is {{d33_pc_per_n:.3g}} pC/N, {{kind:implausible}}{_MORE_ROWS}",
+    Reason.DEFECT: DEFECT,
+    Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",
+    Reason.LINES_LEFT_OUT: lines_left_out,
+    Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
+    "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "
+    "percent; a drive that repeats itself at least four times gives them all",
+    Reason.MAINS_IN_CHARGE: "in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a "
+    "multiple of it by about {charge_pc:significant 2} pC, and the force does not: mains pickup? The lines there "
+    "are left out",
+    Reason.EXCITED_AT_MAINS: "in {affected} of {recordings} recordings the force acts near a multiple of the mains "
+    "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge cannot be told from the response there, and "
+    "d33 holds only if there is none; record at other frequencies",
+    Reason.NOISE_IN_FRF: noise_in_frf,
+    Reason.BEHIND_FILTER: behind_filter,
+    Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
+    Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
+    Reason.PARAMETER_AT_BOUND: parameter_at_bound,
+    Reason.THICKNESS_UNKNOWN: thickness_unknown,
+    Reason.LINE_NOISE_LEVEL: "the lines scatter {level:digits 2} times more about the stated answer than about their "
+    "own "
+    "neighbours: part of the misfit along frequency may have been taken for noise",
+    Reason.REMAINDER: "a smooth part of about {percent:.2g} % of the largest force, {times:.0f} times a sample's "
+    "noise, is left that no mechanism here describes",
+    Reason.HELD_OUT_NO_BETTER: held_out,
+    Reason.NO_SIMPLE_LAW: no_simple_law,
+    Reason.UNUSUAL_SCATTER: "the gain of the recordings scatters by {percent:.2g} %, and by {usual:.2g} % on a poor "
+    "rig: something that no recording states changes from one to the next",
+    Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for {mechanisms}: a platen that is "
+    "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it",
+    Reason.LOAD_NOT_LINEAR: "L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left "
+    "out; it "
+    "adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere"
+    "{more: ({more} more contacts like it)|}",
+    Reason.PRESSURE_NOT_LINEAR: "{pressure_mpa:g} MPa is more than the layer's modulus, {modulus_mpa:g} MPa: it is far "
+    "from linear there",
+    Reason.CONTACT_SLIPS: "the tangential force is {ratio:.3g} times the normal one: it slips unless friction is "
+    "stronger"
+    "{more: ({more} more contacts like it)|}",
+    Reason.DEAD: f"dead: no charge beyond noise ({_OF_ARRAY})",
+    Reason.INVERTED: f"inverted polarity: {_OF_ARRAY}",
+    Reason.WEAK: f"weak: {_OF_ARRAY}",
+    Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
+    "cable or its range, beyond any spread; left out ({recordings} recordings)",
+    Reason.SENSOR_WEAKER: sensor_alone,
+    Reason.SENSOR_STRONGER: sensor_alone,
+    Reason.STRONG: f"strong: {_OF_ARRAY}",
+    Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
+    Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",
+    Reason.BENT: "bent: its d33 curves by {percent:+.0f} % over the preloads",
+}
 
 
 @dataclass(frozen=True)
@@ -14,7 +554,7 @@ class Finding:
     """A reason, its subject, and the values of its sentence.
 
     `recording` is an id, empty for the whole campaign; `field` is the name in the user's document; `index` is the row
-    of a column, from 0. The sentences of `english` define the names of the `arguments`.
+    of a column, from 0. The sentences of `ENGLISH` define the names of the `arguments`.
     """
 
     reason: Reason
@@ -31,7 +571,7 @@ class Finding:
     @property
     def statement(self) -> str:
         """The finding in words, without the recording."""
-        return english.statement(self.reason, self.arguments)
+        return statement(self.reason, self.arguments)
 
     def in_columns(self) -> dict[str, Any]:
         """The finding as answers in columns hold it, for JSON."""

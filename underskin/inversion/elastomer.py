@@ -18,7 +18,7 @@ from underskin.recordings.campaign import (
 )
 from underskin.recordings.curve_preparation import prepared, reject_exchanged_columns
 from underskin.recordings.modulus import CompressionModulus, IndentationModulus, of_compression, of_indentation
-from underskin.surrogate.tables import load_contact
+from underskin.surrogate.hdf5_format import load_contact
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,8 @@ import numpy as np
 from scipy.special import chdtrc, stdtr
 
 from underskin.errors import InvalidInput
-from underskin.findings import english
 from underskin.findings.codes import Reason
-from underskin.findings.english import ImplausibleD33
-from underskin.findings.finding import Finding
+from underskin.findings.finding import Finding, ImplausibleD33, statement
 from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
 from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
@@ -85,7 +83,7 @@ class Flag:
     @property
     def reason(self) -> str:
         """Why, in words with the numbers."""
-        return english.statement(self.flagged_for, self.arguments)
+        return statement(self.flagged_for, self.arguments)
 
     @property
     def sentence(self) -> str:

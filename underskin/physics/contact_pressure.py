@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactEquation, curves_of
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import LARGEST_A_OVER_H, ContactEquation, Layer, curves_of
 from underskin.units import Floats
 
 MOST_A_OVER_H = LARGEST_A_OVER_H
@@ -29,7 +28,7 @@ class SpherePressure:
     radius : float
         Contact radius a [m].
     shape : ndarray, (modes,)
-        Legendre coefficients of f, as in `contact_curves`.
+        Legendre coefficients of f, as in `elastic_layer`.
     """
 
     radius: float

@@ -6,7 +6,7 @@ On the half space, with the contact radius a and E' = E/(1 − ν²) (Sneddon, I
 
 For small a/R these are Hertz's δ = a²/R and F = 4E'a³/(3R); at a given depth the force is lower than Hertz's by about a
 tenth of δ/R. On a layer of thickness h, δ is multiplied by the layer's ratio B(a/h), and F = ∫ k dδ with the stiffness
-k = 2E'a S(a/h) of the flat punch (contact_curves).
+k = 2E'a S(a/h) of the flat punch (elastic_layer).
 
 Finite strain makes δ larger at the same force, by a function of a/h of the linear contact and of L = F/(R²E).
 """
@@ -15,8 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import LARGEST_A_OVER_H, Layer, curves_of
 from underskin.units import Floats
 
 _NODES = 4001

@@ -20,9 +20,8 @@ import numpy as np
 
 from underskin.physics import charge_response, elastic_layer
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
-from underskin.physics.contact_curves import ContactEquation
 from underskin.physics.contact_pressure import SpherePressure
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import ContactEquation, Layer
 from underskin.physics.layer_stress import layer_stress
 from underskin.prediction.pressed_skin import Transmission, in_words, of_pressed, transmission
 from underskin.surrogate.sigma_table import ContactModel

@@ -310,7 +310,10 @@ def _rows(columns: Mapping[str, ArrayLike]) -> list[dict[str, Any]]:
 
 def frf_of(conditions: Conditions) -> list[FrfConditions]:
     """The conditions of FRF recordings, in order; raises InvalidInput where there is none."""
-    recordings = conditions.of(FrfConditions)
+    return _at_least_one(conditions.of(FrfConditions))
+
+
+def _at_least_one(recordings: list[_Kind]) -> list[_Kind]:
     if not recordings:
         raise too_few("recordings", "none of kind frf", "must hold at least one")
     return recordings
@@ -554,10 +557,7 @@ def samples_of(curve: CurveRecording, rows: NDArray[Any]) -> CurveRecording:
 
 def frf_recordings(campaign: Campaign) -> list[FrfRecording]:
     """The campaign's FRF recordings, in order; raises InvalidInput where there is none."""
-    recordings = campaign.of(FrfRecording)
-    if not recordings:
-        raise errors.too_few("recordings", "none of kind frf", "must hold at least one")
-    return recordings
+    return _at_least_one(campaign.of(FrfRecording))
 
 
 def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:

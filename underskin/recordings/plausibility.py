@@ -17,8 +17,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from underskin.findings.codes import Reason
-from underskin.findings.english import ImplausibleD33
-from underskin.findings.finding import Finding
+from underskin.findings.finding import Finding, ImplausibleD33
 from underskin.recordings import curve_course
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor
 from underskin.recordings.curve_preparation import prepared

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from underskin.surrogate.sigma_table import ContactModel
-from underskin.surrogate.tensor_spline import CubicAxis
+from underskin.surrogate.sigma_table import ContactModel, CubicAxis
 from underskin.units import Floats
 
 _SPACING = 0.05  # of the grids in r/h and e/h; the profile turns over lengths of 0.3 h and more

@@ -1,6 +1,6 @@
 """A rigid sphere in frictionless contact with the bonded incompressible layer itself, as a contact model: `solved`.
 
-The contact of the linear layer at the given force is exact at nodes (contact_curves): its radius α = a/h, where with
+The contact of the linear layer at the given force is exact at nodes (elastic_layer): its radius α = a/h, where with
 P = F R/(E' h³) P = (4/3) α³ A(α), A(0) = 1; the transform p̂ of its pressure; and with M of the bonded layer the stress
 on the base (hankel_transform). A is interpolated by a spline, and beyond the last node α is continued as a power of P,
 sufficient to state how far a contact is beyond a limit. What finite strain adds is in the contact table, over α and
@@ -20,11 +20,10 @@ from scipy.interpolate import RectBivariateSpline, make_interp_spline
 from scipy.special import j0
 
 from underskin.physics.charge_response import INCOMPRESSIBLE
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactEquation, mode_transforms
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import LARGEST_A_OVER_H, ContactEquation, Layer, mode_transforms
 from underskin.physics.hankel_transform import disc_average, wave_numbers
+from underskin.surrogate.hdf5_format import CONTACT_TABLE, ContactTable, load_contact
 from underskin.surrogate.sigma_table import ContactModel, ContactName, ContactRadius, SigmaTable
-from underskin.surrogate.tables import CONTACT_TABLE, ContactTable, load_contact
 from underskin.units import Floats
 
 _NODES = 97

@@ -1,7 +1,7 @@
 """Compiled: tensor products of cubic splines with their slopes.
 
 A spline of four axes, s(p, q, r, t) = Σ c_ijkl P_i(p) Q_j(q) R_k(r) T_l(t), has four functions that differ from 0 along
-each axis at a point. Seven arrays (`tensor_spline.joined`) describe its axes, in which the cells of an axis come after
+each axis at a point. Seven arrays (`sigma_table.joined`) describe its axes, in which the cells of an axis come after
 those of the axis before:
 
 - `starts` (cells,) the lower end of each cell between nodes, and infinity behind the last one of an axis;

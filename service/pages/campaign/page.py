@@ -17,7 +17,7 @@ from service.store import AnyRow, Database, annotations, campaigns, diagnoses
 from service.usecases import changes, d33_cache
 from service.usecases.figure_data import frf_columns
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/campaigns/{campaign_id}")
@@ -140,11 +140,10 @@ def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQue
 def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
     """Every sample of the indentation and compression recordings."""
     columns: dict[str, list[Any]] = {name: [] for name in ("recording", "displacement_mm", "force_n")}
-    for recording in _loaded(store, campaign_id).recordings:
-        if isinstance(recording, IndentationRecording | CompressionRecording):
-            columns["recording"] += [recording.id] * len(recording.force_n)
-            columns["displacement_mm"] += recording.displacement_mm.tolist()
-            columns["force_n"] += recording.force_n.tolist()
+    for curve in _loaded(store, campaign_id).curves:
+        columns["recording"] += [curve.id] * len(curve.force_n)
+        columns["displacement_mm"] += curve.displacement_mm.tolist()
+        columns["force_n"] += curve.force_n.tolist()
     return csv_answer(_file(store.read(campaigns.find, campaign_id), "curves"), columns)
 
 

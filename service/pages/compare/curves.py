@@ -8,7 +8,6 @@ import numpy as np
 
 from service.pages.shared.figures import Drawn, columns_of, drawn
 from service.store import AnyRow, Database, campaigns
-from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats
 
 COLUMNS = ("which", "campaign", "recording", "youngs_modulus_mpa", "youngs_modulus_uncertainty_mpa", "statement")
@@ -70,10 +69,8 @@ def figures(store: Database, kind: str, both: Sequence[AnyRow], of_curves: Seque
 
     curves, counts = [], []
     for name, row in zip(_NAMES, both, strict=True):
-        recordings = store.read(campaigns.load, row, with_excluded=False).recordings
-        curves_of_kind = [
-            recording for recording in recordings if not isinstance(recording, FrfRecording) and recording.kind == kind
-        ]
+        campaign = store.read(campaigns.load, row, with_excluded=False)
+        curves_of_kind = [curve for curve in campaign.curves if curve.kind == kind]
         counts.append(f"{min(len(curves_of_kind), _MOST_CURVES)} of {len(curves_of_kind)} of the {name}")
         curves += [
             ForceCurve(recording.id, recording.displacement_mm, recording.force_n, of=name)

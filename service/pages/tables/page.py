@@ -14,8 +14,9 @@ from service.pages.shared.html import page
 from service.pages.shared.skin_values import PROTOTYPE
 from service.schemas.tables import TableAxis, TableEntry
 from service.usecases.tables import tables
+from underskin.surrogate.hdf5_format import CONTACT_TABLE
+from underskin.surrogate.influence_table import INFLUENCE_TABLE
 from underskin.surrogate.sigma_table import SIGMA_TABLE
-from underskin.surrogate.tables import CONTACT_TABLE, INFLUENCE_TABLE
 
 router = APIRouter(prefix="/tables")
 

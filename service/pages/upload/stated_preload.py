@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from underskin.findings.english import more_alike
+from underskin.findings.finding import more_alike
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.spectra import mean_of
 from underskin.units import readable_unit
@@ -33,8 +33,11 @@ def in_words(force_n: float) -> str:
 def doubts(campaign: Campaign) -> list[str]:
     """A sentence on the first recording of a campaign whose stated preload differs from the measured one, and how
     many more there are."""
-    frfs = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
-    measured = [(recording, mean) for recording in frfs if (mean := measured_otherwise(recording)) is not None]
+    measured = [
+        (recording, mean)
+        for recording in campaign.of(FrfRecording)
+        if (mean := measured_otherwise(recording)) is not None
+    ]
     doubtful = [
         (recording, mean)
         for recording, mean in measured

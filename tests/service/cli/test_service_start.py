@@ -16,8 +16,8 @@ from tests.service.connections import HEAD, connect, read_answer
 from tests.service.requests import SIGMA, problem_of
 from tests.support import preloaded
 from tests.support.server import running
+from underskin.surrogate.hdf5_format import tables_folder
 from underskin.surrogate.sigma_table import SIGMA_TABLE
-from underskin.surrogate.tables import tables_folder
 
 
 def refusal(folder: Path, *options: str, **environment: str) -> str:

@@ -19,8 +19,8 @@ from tests.support.diagnosed import awaited, begun, small, small_report, table
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import __version__
 from underskin.recordings.campaign import parse
+from underskin.surrogate.hdf5_format import tables_folder
 from underskin.surrogate.sigma_table import SIGMA_TABLE
-from underskin.surrogate.tables import tables_folder
 
 BACKEND = "sqlite"
 TWO = SEVERAL | {"UNDERSKIN_DIAGNOSIS_WORKERS": "2"}

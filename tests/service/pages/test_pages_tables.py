@@ -5,8 +5,8 @@ import numpy as np
 
 from tests.service.pages.conftest import Visit
 from tests.support.store_server import Server
+from underskin.surrogate.hdf5_format import tables_folder
 from underskin.surrogate.sigma_table import SIGMA_TABLE
-from underskin.surrogate.tables import tables_folder
 
 
 def test_table_tells_range_errors_how_made(visitor: Visit, server: Server) -> None:

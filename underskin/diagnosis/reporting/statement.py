@@ -29,7 +29,7 @@ from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
 from underskin.findings.codes import FindingCode, Lack, Lacking
-from underskin.findings.english import lacking
+from underskin.findings.finding import lacking
 from underskin.findings.formatting import clause, in_digits, in_percent, of_clauses, small
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.base import Kind

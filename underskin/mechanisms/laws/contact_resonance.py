@@ -7,8 +7,7 @@ import numpy as np
 from underskin.autodiff import constant
 from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts, FrfState, frf_design, press, stiffness
-from underskin.physics.contact_curves import curves_of
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import Layer, curves_of
 from underskin.recordings.campaign import Conditions, FrfRecording
 from underskin.recordings.frf.estimation import lines_of, resonance
 from underskin.units import to_si

@@ -9,7 +9,7 @@ The stage that turns loads into contacts gives the radius, and the shape of the 
 a punch's, in four cases (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301; Lebedev & Ufliand, J. Appl. Math.
 Mech. 22 (1958) 442): half space or layer, with or without adhesion. On the half space with adhesion a³ = 3 R F1/(4E'),
 F1 = F + 3πwR + √(6πwRF + (3πwR)²), and the pressure is Hertz' under F1 less a flat punch's under F1 − F; on the layer
-both parts are those of contact_curves.
+both parts are those of elastic_layer.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from scipy.spatial.distance import cdist
 
 from underskin.autodiff import Differentiated, cbrt, chain
 from underskin.errors import required
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves, CurveGrid
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import LARGEST_A_OVER_H, ContactCurves, CurveGrid, Layer
 from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
 from underskin.units import Array, Floats, Indices, Mask, to_si
 from underskin.weak_cache import cached_while_alive

@@ -8,7 +8,7 @@ through the history where the body relaxes. Zero, drift and gain of the load cel
 
 Elastic contact, all as functions of the contact radius a. Without adhesion, on the half space: δ = a²/R,
 F = 4E'a³/(3R), and at a fixed edge the stiffness is K = 2E'a; on the layer these are multiplied by functions of a/h
-(contact_curves). An edge of energy release rate w is stretched by ℓ: δ and F fall by ℓ and K ℓ, on the half space
+(elastic_layer). An edge of energy release rate w is stretched by ℓ: δ and F fall by ℓ and K ℓ, on the half space
 ℓ = √(2πaw/E') (Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E' times its
 nominal stress over a neo-Hookean solid's at the representative strain 0.2 a/R (after Lin, Dimitriadis & Horkay,
 J. Biomech. Eng. 129 (2007) 904; their ratio to Hooke's law would include the neo-Hookean solid's own 9 % at a/R 0.4,
@@ -68,13 +68,12 @@ from underskin.mechanisms.models.sphere_kernels import (
     pull_off_rows,
     radius_rows,
 )
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, curves_of
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import LARGEST_A_OVER_H, Layer, curves_of
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
 from underskin.recordings.curve_course import curve_landmarks, snap_in_interval, touch, visible_contact
 from underskin.recordings.modulus import estimate
-from underskin.surrogate.tables import load_contact
+from underskin.surrogate.hdf5_format import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
 
 _SMALLEST = 1e-12  # m of depth, below which a radius counts as 0

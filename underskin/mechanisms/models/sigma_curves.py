@@ -12,7 +12,7 @@ contact with the layer itself. To the latter a compressible layer adds what the 
 stiffens by Yeoh's law adds what it has for its c₂, in contact with a half space too, with the α of Hertz. The transform
 of the pressure is p̂ = s p̂_sphere + (1 − s) p̂_punch, s the sphere's share of the load; on the half space p̂_sphere is
 Hertz', 3 (sin x − x cos x)/x³, and p̂_punch sin x/x, x = k a/h; on the layer both come from its own contact
-(contact_curves).
+(elastic_layer).
 
 A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond
 its a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to
@@ -31,12 +31,10 @@ from scipy.special import j0
 from underskin.autodiff import Differentiated, chain, contiguous, log
 from underskin.mechanisms.models.contact_state import Contacts, PressedContacts
 from underskin.physics.charge_response import INCOMPRESSIBLE
-from underskin.physics.contact_curves import ContactCurves, CurveGrid
-from underskin.physics.elastic_layer import Layer
+from underskin.physics.elastic_layer import ContactCurves, CurveGrid, Layer
 from underskin.physics.hankel_transform import disc_average
-from underskin.surrogate.sigma_table import SigmaTable
-from underskin.surrogate.tables import load_contact
-from underskin.surrogate.tensor_spline import CubicAxis, TensorSpline, joined
+from underskin.surrogate.hdf5_format import load_contact
+from underskin.surrogate.sigma_table import CubicAxis, SigmaTable, TensorSpline, joined
 from underskin.units import Floats, Indices, Mask
 
 PROFILE_END = 8.0

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from underskin.compiled import compiled
-from underskin.physics.contact_curves import LARGEST_A_OVER_H
+from underskin.physics.elastic_layer import LARGEST_A_OVER_H
 from underskin.physics.sphere_law import FULL_SPHERE_OF_LOAD, LOAD_OF_REDUCED
 from underskin.units import Floats, Indices, Mask
 

@@ -23,8 +23,7 @@ from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from underskin.errors import unusable
 from underskin.findings.codes import Reason
-from underskin.findings.english import DefectKind
-from underskin.findings.finding import Finding
+from underskin.findings.finding import DefectKind, Finding
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.units import Complexes, Floats, Indices, Mask
 
