@@ -4,6 +4,9 @@ The mesh belongs to the edge, so each column has one, and every sphere starts fr
 of the linear contact changes little and the strain varies, in which all quantities are smooth: splines in x = L^(1/3)
 lead from the solved spheres to the table's nodes. They pass through x = 0, where the linear layer is exact. What is
 kept is the difference from the exact linear contact at the same force, sphere and layer, `tablegen.linear_contact`.
+
+Spheres that stick (`tablegen.sticking`) are solved in order of their edges. Their first one is close to x = 0; the last
+one may be an eighth before the largest x, where wide ones lose their stability at the edge: the splines lead on to it.
 """
 
 import math
@@ -123,18 +126,23 @@ def solve_contact_column(
     targets = cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES
     if earlier is not None:
         targets = np.append(_SMALL * cbrt_load[-1], targets)
+    spheres: list[SphereSolution] = []
     with threadpool_limits(1):  # the same bits whatever the number of cores
-        spheres = list(_Column(a, np.zeros(0), order, material, earlier).follow(targets))
-    beyond = cbrt_load > spheres[-1].cbrt_load
+        try:
+            spheres.extend(_Column(a, np.zeros(0), order, material, earlier).follow(targets))
+        except SolverError:
+            if earlier is None or len(spheres) < _SPHERES:
+                raise
     x = np.array([sphere.cbrt_load for sphere in spheres])
     rows = np.array([np.append(sphere.linear.alpha, sphere.over_linear()) for sphere in spheres])
     strain = np.array([a / sphere.radius for sphere in spheres])
     touched = Touched(a, strain, np.array([sphere.contact_radius / a - 1 for sphere in spheres]) / strain)
+    reached = x[-1] if earlier is None else cbrt_load[-1]
     if earlier is None:
         vanishing = np.concatenate([[a, 1.0, 1.0, 1.0], np.zeros(RADII.size)])
         x, rows = np.append(0.0, x), np.vstack([vanishing, rows])
     resampled = np.asarray(make_interp_spline(x, rows, k=min(5, len(rows) - 1))(cbrt_load))
-    resampled[beyond] = np.nan
+    resampled[cbrt_load > reached] = np.nan
     return resampled[:, 0], resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres), touched
 
 

@@ -66,6 +66,7 @@ _RATIOS = ("contact_radius", "indentation", "stiffness")
 SECOND_OVER_FIRST = np.array([0.0, 1.0, 3.0, 7.0])  # evenly in ln(1 + c₂), over which the effect bends little
 POISSON_RATIOS = np.array([0.3, 0.37, 0.44, 0.5])
 FRICTIONS = np.array([0.0, 1.0])
+STICKING_EDGES, STICKING_ORDER = 2.8 * np.linspace(0.08, 1, 11) ** 1.5, 4  # for the small difference from frictionless
 # a/h before pressing; at 2.637 h elements of order 4 do not converge at the largest load
 DEFAULT_EDGES = np.delete(3.05 * np.linspace(0.03, 1, 22) ** 1.5, 19)
 DEFAULT_AXES = 3.0 * np.linspace(0, 1, 33) ** 1.5, np.cbrt(0.15) * np.linspace(0, 1, 13)
@@ -95,7 +96,7 @@ def make_contact_table(
     name = data_hash({"edges": edges, "alpha": axes[0], "x": axes[1]})
     folder = parts / f"{sources[:16]}-{name[:8]}"
     done = run_pieces(pieces, folder, scheduler, "tablegen contact")
-    stuck = _solve_sticking(edges, axes[1], folder, scheduler)
+    stuck = _solve_sticking(axes[1], folder, scheduler)
 
     def solved(material: Material) -> tuple[Floats, Floats]:
         return _with_errors(
@@ -103,16 +104,15 @@ def make_contact_table(
             *([done[_piece(material, order, number)] for number in range(edges.size)] for order in (ORDER, ORDER - 1)),
         )
 
+    slips = solved(NEO_HOOKEAN)
     second = Dataset(SECOND_OVER_FIRST, "c2 of Yeoh's energy (G/2)(K + c2 K^2), K = I1 - 3")
     ratio = Dataset(POISSON_RATIOS, "Poisson's ratio")
     friction = Dataset(FRICTIONS, "0: the sphere slips freely, 1: it sticks")
     groups = {
-        "frictionless": _group(axes, *solved(NEO_HOOKEAN)),
+        "frictionless": _group(axes, *slips),
         "yeoh": _further_group(axes, "second_over_first", second, [solved(material) for material in yeoh], 0),
         "compressible": _further_group(axes, "poisson_ratio", ratio, [solved(one) for one in compressible], -1),
-        "sticking": _further_group(
-            axes, "friction", friction, [solved(NEO_HOOKEAN), _with_errors(axes, *stuck.values())], 0
-        ),
+        "sticking": _further_group(axes, "friction", friction, [slips, _sticks(axes, slips[0], stuck)], 0),
     }
     about = {
         "quantity": "contact",
@@ -121,7 +121,7 @@ def make_contact_table(
         "mesh": f"Q{ORDER}/P{ORDER - 1}, rim at a + {RIM:g} h, graded to the contact's edge",
         "solver": "contact edge prescribed, indentation free; augmented Lagrangian for volume and contact, SuperLU",
         "force_balance_error": max(
-            float(piece["force_error"]) for pieces in (done.values(), *stuck.values()) for piece in pieces
+            float(piece["force_error"]) for pieces in (done.values(), *stuck) for piece in pieces
         ),
         "tablegen_sources_sha256": sources,
         **{f"version_{name}": version(name) for name in ("underskin", "scikit-fem", "numpy", "scipy", "h5py")},
@@ -131,10 +131,10 @@ def make_contact_table(
     return digest
 
 
-def _solve_sticking(edges: Floats, cbrt_load: Floats, folder: Path, scheduler: str | None) -> dict[int, list[Arrays]]:
-    """The columns of a contact that sticks, by order; each needs those of smaller edges."""
-    columns: dict[int, list[Arrays]] = {ORDER: [], ORDER - 1: []}
-    for number, a in enumerate(edges.tolist()):
+def _solve_sticking(cbrt_load: Floats, folder: Path, scheduler: str | None) -> list[list[Arrays]]:
+    """The columns of a contact that sticks, of the higher and the lower order; each needs those of smaller edges."""
+    columns: dict[int, list[Arrays]] = {STICKING_ORDER: [], STICKING_ORDER - 1: []}
+    for number, a in enumerate(STICKING_EDGES.tolist()):
         pieces = {
             f"sticking-order{order}-{number:02d}": partial(
                 solve_piece,
@@ -143,7 +143,7 @@ def _solve_sticking(edges: Floats, cbrt_load: Floats, folder: Path, scheduler: s
                 order,
                 earlier=[
                     Touched(edge, column["strain"], column["spread"])
-                    for edge, column in zip(edges.tolist(), former, strict=False)
+                    for edge, column in zip(STICKING_EDGES.tolist(), former, strict=False)
                 ],
             )
             for order, former in columns.items()
@@ -151,7 +151,28 @@ def _solve_sticking(edges: Floats, cbrt_load: Floats, folder: Path, scheduler: s
         done = run_pieces(pieces, folder, scheduler, f"tablegen contact that sticks, a/h {a:.2f}")
         for former, piece in zip(columns.values(), pieces, strict=True):
             former.append(done[piece])
-    return columns
+    return list(columns.values())
+
+
+def _sticks(axes: tuple[Floats, Floats], slips: Floats, stuck: list[list[Arrays]]) -> tuple[Floats, Floats]:
+    """All quantities of a contact that sticks at the nodes, and their errors: the columns' differences from `slips`,
+    the frictionless contact at the nodes."""
+    count = len(_RATIOS)
+    scale = np.concatenate([slips[..., :count], np.ones_like(slips[..., count:])], axis=-1)
+    offset = np.concatenate([np.zeros_like(slips[..., :count]), slips[..., count:]], axis=-1)
+
+    def at(values: Floats, alpha: Floats) -> Floats:
+        return np.stack([make_interp_spline(axes[0], values[:, i])(x) for i, x in enumerate(alpha)])
+
+    added = [
+        [
+            {**column, "values": (column["values"] - at(offset, column["alpha"])) / at(scale, column["alpha"])}
+            for column in of_order
+        ]
+        for of_order in stuck
+    ]
+    values, errors = _with_errors(axes, *added)
+    return offset + scale * values, scale * errors
 
 
 def _piece(material: Material, order: int, number: int) -> str:

@@ -1,9 +1,10 @@
-"""The correction by finite strain to the exact linear layer's contact with a rigid frictionless sphere.
+"""The correction by finite strain and friction to the exact linear layer's contact with a rigid frictionless sphere.
 
 A sphere of radius R is pressed with the force F into the bonded layer. All is over α = a/h of the linear layer's
 frictionless contact at the same F, R, E, ν, h, and x = L^(1/3), L = F/(R² E) · (0.75/(1 − ν²))². The correction of the
 incompressible neo-Hookean layer is the solved stress on the base less that of the linear contact. Over c₂ of Yeoh's
-energy, (G/2)(K + c₂ K²), K = I₁ − 3, and over ν the table holds what is added to that correction.
+energy, (G/2)(K + c₂ K²), K = I₁ − 3, over ν, and for a sphere that sticks the table holds what is added to that
+correction.
 """
 
 from collections.abc import Mapping
@@ -20,7 +21,8 @@ from underskin.units import Floats
 
 CONTACT_TABLE = "contact.h5"
 _STATE = "frictionless"
-_FURTHER = {"second_over_first": "yeoh", "poisson_ratio": "compressible"}  # the group of each further property
+# The group of each further property
+_FURTHER = {"second_over_first": "yeoh", "poisson_ratio": "compressible", "friction": "sticking"}
 
 
 class ContactTable(Table):
@@ -79,8 +81,8 @@ class ContactTable(Table):
         return np.asarray(self._over_radius(r_over_h))
 
     def further_profiles_over(self, name: str, r_over_h: Floats) -> tuple[Floats, Floats]:
-        """The nodes of a further property, `second_over_first` or `poisson_ratio`, and what is added at each of them at
-        these distances (radii,): (nodes, a, L^(1/3), radii)."""
+        """The nodes of a further property, `second_over_first`, `poisson_ratio` or `friction`, and what is added at
+        each of them at these distances (radii,): (nodes, a, L^(1/3), radii)."""
         nodes, over_radius = self._further[name]
         return nodes, np.asarray(over_radius(r_over_h))
 

@@ -21,7 +21,7 @@ from underskin.units import Floats
 
 SIGMA_SCHEMA = "underskin-sigma/1"
 INFLUENCE_SCHEMA = "underskin-influence/1"
-CONTACT_SCHEMA = "underskin-contact/2"
+CONTACT_SCHEMA = "underskin-contact/3"
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 

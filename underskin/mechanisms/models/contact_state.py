@@ -38,13 +38,14 @@ class Contacts:
     work_of_adhesion: Differentiated | None = None  # w [J/m²], of one row; None without adhesion
     relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
     second_over_first: Differentiated | None = None  # c₂ of Yeoh's law, of one row; None of a neo-Hookean layer
+    friction: Differentiated | None = None  # 0 slips to 1 sticks, of one row; None of a frictionless sphere
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the present radius, where a mechanism reads it
 
     @property
     def optional(self) -> tuple[Differentiated | None, ...]:
         """What only some mechanisms set: contacts are of one structure where the same of these are None."""
-        return self.slip, self.work_of_adhesion, self.relaxed, self.second_over_first
+        return self.slip, self.work_of_adhesion, self.relaxed, self.second_over_first, self.friction
 
     def at_points(self, subset: Indices | None) -> Contacts:
         """At some of several points (points, contacts), at all for None."""
