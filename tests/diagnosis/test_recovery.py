@@ -64,7 +64,7 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
     ("frf", "crosstalk"): Hidden({"fraction": 0.2}, {"fraction": "fraction"}),
     ("frf", "timing_delay"): Hidden({"delay_us": 80.0}, {"delay": "delay_us"}),
     ("frf", "modulus_error"): Hidden({"factor": 1.4}, {"modulus_factor": "factor"}),
-    ("frf", "sticking_contact"): Hidden({"friction": 1.0}, {"friction": "friction"}),
+    ("frf", "sticking_contact"): Hidden({"share": 1.0}, {"sticking_share": "share"}),
     ("frf", "thickness_error"): Hidden({"factor": 1.15}, {"thickness_factor": "factor"}),
     ("indentation", "layered_contact"): Hidden({}),
     ("indentation", "adhesion"): Hidden(

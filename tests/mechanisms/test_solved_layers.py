@@ -35,7 +35,7 @@ def frf(laws: tuple[str, ...], force: float, radius: float, rho: float, material
     model = compose(laws, Conditions("spot", skin, (recording,)), load_table(), "frf")
     fit = np.array([parameter.start for parameter in model.parameters])
     values = {"stiffening": 0.0, "second_over_first": material.second_over_first}
-    values |= {"mobile_fraction": 1.0, "friction": 1.0}
+    values |= {"mobile_fraction": 1.0, "sticking_share": 1.0}
     for index, parameter in enumerate(model.parameters):
         if parameter.name in values:
             fit[index] = values[parameter.name]
