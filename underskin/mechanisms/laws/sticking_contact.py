@@ -18,9 +18,9 @@ class StickingContact(Mechanism):
     law = """σ plus f · (what tables/contact.h5 has for a sphere that sticks, over a/h and L of its contact), f from 0
     (slips freely) to 1 (sticks: a point stays where on the sphere it was touched, r + u_r = ρ(r) beside |x − c| = R,
     ρ(r) the radius of the contact's edge as it grew to r)."""
-    assumptions = """solved for f = 0 and 1 in contact with the layer itself (layered_contact; without that
-    mechanism the same is added to Hertz' contact, at its a/h), neo-Hookean with ν = 0.5, bonded to its base and without adhesion;
-    between them σ is linear in f, which partial slip is not; what sticks in the static contact sticks in the
+    assumptions = """solved for f = 0 and 1 in contact with the layer itself (layered_contact; without that mechanism
+    the same is added to Hertz' contact, at its a/h), neo-Hookean with ν = 0.5, bonded to its base and without
+    adhesion; between them σ is linear in f, which partial slip is not; what sticks in the static contact sticks in the
     oscillation. On an incompressible half space sticking changes nothing, at a/h 1 it adds up to 15 % to σ and 20 % to
     its increment with the load."""
     source = """Mossakovskii, J. Appl. Math. Mech. 27 (1963) 418; Spence, Proc. R. Soc. A 305 (1968) 55, for the linear
