@@ -21,8 +21,8 @@ class StickingContact(Mechanism):
     assumptions = """solved for f = 0 and 1 in contact with the layer itself (layered_contact; without that mechanism
     the same is added to Hertz' contact, at its a/h), neo-Hookean with ν = 0.5, bonded to its base and without
     adhesion; between them σ is linear in f, which partial slip is not; what sticks in the static contact sticks in the
-    oscillation. On an incompressible half space sticking changes nothing, at a/h 1 it adds up to 15 % to σ and 20 % to
-    its increment with the load."""
+    oscillation. On an incompressible half space sticking changes nothing; at rT/h 0.6 it adds 8 % to σ and 15 % to its
+    increment with the load at a/h 0.9, 23 % and 35 % at 1.5, much as an edge that moves less does."""
     source = """Mossakovskii, J. Appl. Math. Mech. 27 (1963) 418; Spence, Proc. R. Soc. A 305 (1968) 55, for the linear
     half space; tablegen/sticking.py for the layer at finite strain."""
     stage = Stage.CONTACT
