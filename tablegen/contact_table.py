@@ -164,7 +164,7 @@ def _sticks(axes: tuple[Floats, Floats], slips: Floats, stuck: list[list[Arrays]
     def at(values: Floats, alpha: Floats) -> Floats:
         return np.stack([make_interp_spline(axes[0], values[:, i])(x) for i, x in enumerate(alpha)])
 
-    added = [
+    added: list[list[Arrays]] = [
         [
             {**column, "values": (column["values"] - at(offset, column["alpha"])) / at(scale, column["alpha"])}
             for column in of_order

@@ -163,7 +163,7 @@ def lenses(name: str) -> dict[str, Any]:
     thickness, shear, rho, d33 = 2.0, 4.0 / 3, np.array([0.5]), 14.0
     solved = sticking_spheres(1.5, rho)
     random = np.random.default_rng(53)
-    recordings = []
+    recordings: list[dict[str, Any]] = []
     for radius in (200.0, 400.0):
         for number in np.flatnonzero(solved.a > 0.3):
             frf = 1.5 * rho[0] ** 2 * d33 * float(solved.sigma[number, 0]) * math.exp(random.normal(0.0, 0.005))
