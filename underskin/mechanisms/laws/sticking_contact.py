@@ -26,7 +26,7 @@ class StickingContact(Mechanism):
     source = """Mossakovskii, J. Appl. Math. Mech. 27 (1963) 418; Spence, Proc. R. Soc. A 305 (1968) 55, for the linear
     half space; tablegen/sticking.py for the layer at finite strain."""
     stage = Stage.CONTACT
-    order = 20
+    order = 30
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "a declared thickness_mm and a skin declared with poisson_ratio 0.5"
     parameters_stated = (
