@@ -35,18 +35,22 @@ _MOST_ITERATIONS = 15
 
 @dataclass(frozen=True)
 class PressedState:
-    """The layer under the sphere: its deformation, the multipliers (edges, modes) and the indentation."""
+    """The layer under the sphere: its deformation, the multipliers (edges, modes) and the indentation.
+
+    `spread`, of a sphere that sticks, says where the edge was touched (`tablegen.sticking`).
+    """
 
     state: State
     multiplier: Floats
     indentation: float
+    spread: float = 0.0
 
 
-_Increment = tuple[Floats, Floats, Floats]  # of displacements, pressures, multipliers
+Increment = tuple[Floats, Floats, Floats]  # of displacements, pressures, multipliers
 
 
 @dataclass(frozen=True)
-class _Tangent:
+class Tangent:
     """Of one state: factors of the augmented matrix; ∂(volume)/∂u, the same augmented, and ∂(gap)/∂u by element."""
 
     factors: SuperLU
@@ -85,7 +89,7 @@ class ContactLayer(NonlinearLayer):
         """Equilibrium under the sphere of `radius`, by Newton's method; SolverError when it does not converge."""
         now = start
         for _ in range(_MOST_ITERATIONS):
-            force = self._traction(now, self._normal(now, radius)[0])
+            force = self._contact_force(now, radius)
             residual, gap = force - self.internal_force(now.state), self._gap(now, radius)
             size = float(np.linalg.norm(residual[self.discretisation.free]))
             scale = float(np.linalg.norm(force))
@@ -101,11 +105,11 @@ class ContactLayer(NonlinearLayer):
     def force(self, now: PressedState, radius: float) -> float:
         """The force on the sphere over 2π."""
         normal, _ = self._normal(now, radius)
-        return -float((self.weight * (now.multiplier @ self._modes.T) * normal[..., 1]).sum())
+        return -float((self.weight * self.pressure(now) * normal[..., 1]).sum())
 
     def pressure(self, now: PressedState) -> Floats:
         """λ at the points `r` of the contact, (edges, points)."""
-        return now.multiplier @ self._modes.T
+        return now.multiplier[:, : self._modes.shape[1]] @ self._modes.T
 
     def surface(self, now: PressedState, r: Floats) -> Floats:
         """Places (points, 2) of the surface points that were at the radii r."""
@@ -122,32 +126,49 @@ class ContactLayer(NonlinearLayer):
         return d.assemble_vector(local[..., 0])
 
     def _step(self, now: PressedState, radius: float, residual: Floats, gap: Floats) -> PressedState:
-        """One Newton increment: that at fixed δ, and as much of the one per unit of δ as frees the edge of pressure."""
+        """One Newton increment: that at fixed unknowns, and as much of those per unit of them as frees the edge."""
         tangent = self._tangent(now, radius)
-        volume = self._volume_defect(now.state)
-        fixed, per_depth = self._solve(tangent, residual, volume, gap), self._per_depth(now, radius, tangent)
-        rest = float(np.sum(self._edge_pressure * (now.multiplier + fixed[2])))
-        depth = -rest / float(np.sum(self._edge_pressure * per_depth[2]))
-        du, dp, dm = (one + depth * other for one, other in zip(fixed, per_depth, strict=True))
+        fixed = self._solve(tangent, residual, self._volume_defect(now.state), gap)
+        further = self._per_unknown(now, radius, tangent)
+        rest = self._at_edge(now.multiplier + fixed[2])
+        change = np.linalg.solve(np.stack([self._at_edge(dm) for *_, dm in further], axis=-1), -rest)
+        du, dp, dm = (
+            one + sum(share * other for share, other in zip(change, others, strict=True))
+            for one, *others in zip(fixed, *further, strict=True)
+        )
         state = State(now.state.displacement + du, now.state.pressure + dp)
-        return PressedState(state, now.multiplier + dm, now.indentation + depth)
+        unknowns = np.array([now.indentation, now.spread])
+        unknowns[: change.size] += change
+        return PressedState(state, now.multiplier + dm, *unknowns.tolist())
 
-    def _tangent(self, now: PressedState, radius: float) -> _Tangent:
+    def _per_unknown(self, now: PressedState, radius: float, tangent: Tangent) -> list[Increment]:
+        """What a unit of each unknown beside the displacements adds."""
+        return [self._per_depth(now, radius, tangent)]
+
+    def _at_edge(self, multiplier: Floats) -> Floats:
+        """The singular tractions at the edge, which must be 0."""
+        return np.array([np.sum(self._edge_pressure * multiplier)])
+
+    def _contact_force(self, now: PressedState, radius: float) -> Floats:
+        """Nodal forces (all displacements) of the sphere."""
+        return self._traction(self.pressure(now), self._normal(now, radius)[0])
+
+    def _tangent(self, now: PressedState, radius: float) -> Tangent:
         stiffness, constraint = self.element_matrices(now.state)
         scaled = self._scaled(constraint)
         matrices = stiffness + np.swapaxes(constraint, 1, 2) @ scaled
         touch, _ = self._touch_gradient(now, radius)
         matrices[self._elements] += self._curvature(now, radius) + np.swapaxes(touch, 1, 2) @ self._scale @ touch
-        return _Tangent(factorise(self.discretisation.assemble_matrix(matrices)), constraint, scaled, touch)
+        return Tangent(factorise(self.discretisation.assemble_matrix(matrices)), constraint, scaled, touch)
 
-    def _per_depth(self, now: PressedState, radius: float, tangent: _Tangent) -> _Increment:
+    def _per_depth(self, now: PressedState, radius: float, tangent: Tangent) -> Increment:
         """What a unit of δ adds: it closes the gap, and it turns the normal, on which the pressure acts."""
         normal, distance = self._normal(now, radius)
         turned = (np.array([0.0, 1.0]) - normal * normal[..., 1:]) / distance[..., None]
         _, gap = self._touch_gradient(now, radius)
-        return self._solve(tangent, self._traction(now, turned), np.zeros_like(now.state.pressure), gap)
+        return self._solve(tangent, self._traction(self.pressure(now), turned), np.zeros_like(now.state.pressure), gap)
 
-    def _solve(self, tangent: _Tangent, residual: Floats, volume: Floats, gap: Floats) -> _Increment:
+    def _solve(self, tangent: Tangent, residual: Floats, volume: Floats, gap: Floats) -> Increment:
         """The increment that takes residual, volume defect and gap to 0."""
         d = self.discretisation
         du, dp, dm = np.zeros(d.size), np.zeros_like(volume), np.zeros_like(gap)
@@ -165,9 +186,9 @@ class ContactLayer(NonlinearLayer):
             residual = np.zeros(d.size)  # balanced by the first solve
         return du, dp, dm
 
-    def _traction(self, now: PressedState, direction: Floats) -> Floats:
-        """Nodal forces (all displacements) of the pressure along a direction (edges, points, 2)."""
-        traction = (self.weight * self.pressure(now))[..., None] * direction
+    def _traction(self, size: Floats, direction: Floats) -> Floats:
+        """Nodal forces (all displacements) of a traction of this size along a direction (edges, points, 2)."""
+        traction = (self.weight * size)[..., None] * direction
         every = np.zeros_like(self.discretisation.numbers, dtype=float)
         for component in (0, 1):
             every[self._elements, component::2] = np.einsum("eq,eqn->en", traction[..., component], self._values)

@@ -4,10 +4,13 @@ The mesh belongs to the edge, so each column has one, and every sphere starts fr
 of the linear contact changes little and the strain varies, in which all quantities are smooth: splines in x = L^(1/3)
 lead from the solved spheres to the table's nodes. They pass through x = 0, where the linear layer is exact. What is
 kept is the difference from the exact linear contact at the same force, sphere and layer, `tablegen.linear_contact`.
+
+Spheres that stick (`tablegen.sticking`) are solved in order of their edges. Their first one is close to x = 0; the last
+one may be an eighth before the largest x, where wide ones lose their stability at the edge: the splines lead on to it.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +25,7 @@ from tablegen.linear_contact import LinearContact, LinearSphere
 from tablegen.linear_layer import transmission
 from tablegen.neo_hookean import NEO_HOOKEAN, SHEAR_MODULUS, Material
 from tablegen.newton import State
+from tablegen.sticking import StickingLayer, Touched
 from underskin.errors import SolverError
 from underskin.physics import hertz
 from underskin.physics.hankel_transform import normal_stress, punch_transform
@@ -29,6 +33,7 @@ from underskin.units import Floats
 
 _SMALLEST_STEP = 1 / 32  # of the way from one sphere to the next
 _SPHERES = 8  # of a column, evenly in x
+_SMALL = 1e-3  # of the largest x, for the first sphere that sticks
 RADII = np.concatenate([np.linspace(0, 4, 65), np.linspace(4, PROFILE_END, 33)[1:]])  # r/h of the profile
 
 
@@ -81,8 +86,12 @@ class SphereSolution:
 
 
 def solve_contact_column(
-    a: float, cbrt_load: Floats, order: int, material: Material = NEO_HOOKEAN
-) -> tuple[Floats, Floats, float]:
+    a: float,
+    cbrt_load: Floats,
+    order: int,
+    material: Material = NEO_HOOKEAN,
+    earlier: Sequence[Touched] | None = None,
+) -> tuple[Floats, Floats, float, Touched]:
     """Solve one column of the contact table.
 
     Parameters
@@ -95,6 +104,8 @@ def solve_contact_column(
         Order of the displacement elements.
     material : Material
         Of the layer; default: incompressible and neo-Hookean.
+    earlier : sequence of Touched, optional
+        The smaller edges, ascending, of a contact that sticks; default: a frictionless one.
 
     Returns
     -------
@@ -104,44 +115,48 @@ def solve_contact_column(
         As `SphereSolution.over_linear`.
     force_error : float
         The largest over the column.
+    touched : Touched
+        Where its edge was touched, for wider contacts that stick.
 
     Raises
     ------
     SolverError
         Names the point where Newton's method did not converge.
     """
+    targets = cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES
+    if earlier is not None:
+        targets = np.append(_SMALL * cbrt_load[-1], targets)
+    spheres: list[SphereSolution] = []
     with threadpool_limits(1):  # the same bits whatever the number of cores
-        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order, material))
-    beyond = cbrt_load > spheres[-1].cbrt_load
-    x = np.array([0.0, *(sphere.cbrt_load for sphere in spheres)])
-    rows = [np.append(sphere.linear.alpha, sphere.over_linear()) for sphere in spheres]
-    vanishing = np.concatenate([[a, 1.0, 1.0, 1.0], np.zeros(RADII.size)])
-    resampled = np.asarray(make_interp_spline(x, np.array([vanishing, *rows]), k=min(5, len(rows)))(cbrt_load))
-    resampled[beyond] = np.nan
-    return resampled[:, 0], resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
+        try:
+            spheres.extend(_Column(a, np.zeros(0), order, material, earlier).follow(targets))
+        except SolverError:
+            if earlier is None or len(spheres) < _SPHERES:
+                raise
+    x = np.array([sphere.cbrt_load for sphere in spheres])
+    rows = np.array([np.append(sphere.linear.alpha, sphere.over_linear()) for sphere in spheres])
+    strain = np.array([a / sphere.radius for sphere in spheres])
+    touched = Touched(a, strain, np.array([sphere.contact_radius / a - 1 for sphere in spheres]) / strain)
+    reached = x[-1] if earlier is None else cbrt_load[-1]
+    if earlier is None:
+        vanishing = np.concatenate([[a, 1.0, 1.0, 1.0], np.zeros(RADII.size)])
+        x, rows = np.append(0.0, x), np.vstack([vanishing, rows])
+    resampled = np.asarray(make_interp_spline(x, rows, k=min(5, len(rows) - 1))(cbrt_load))
+    resampled[cbrt_load > reached] = np.nan
+    return resampled[:, 0], resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres), touched
 
 
 def press_spheres(
-    a: float, radii: Floats, rho: Floats, order: int, material: Material = NEO_HOOKEAN
+    a: float,
+    radii: Floats,
+    rho: Floats,
+    order: int,
+    material: Material = NEO_HOOKEAN,
+    earlier: Sequence[Touched] | None = None,
 ) -> list[SphereSolution]:
     """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
-    column = _Column(a, rho, order, material)
+    column = _Column(a, rho, order, material, earlier)
     return [column.advance(float(radius)) for radius in radii]
-
-
-def _follow(a: float, targets: Floats, order: int, material: Material) -> Iterator[SphereSolution]:
-    """Spheres whose x is near each target, the last one's at or beyond it, as far as the linear contact is known."""
-    column = _Column(a, np.zeros(0), order, material)
-    reached, ratio = 0.0, 1.0 + a  # of the force over Hertz's for a: a first guess
-    further = iter(targets)
-    while reached < targets[-1]:
-        target = next((target for target in further if target > reached), 1.02 * targets[-1])
-        try:
-            sphere = column.advance(a / _strain(target, ratio))
-        except BeyondLinearContactError:
-            return
-        reached, ratio = sphere.cbrt_load, sphere.cbrt_load**3 / (16 / 9 * (a / sphere.radius) ** 3)
-        yield sphere
 
 
 def _strain(cbrt_load: float, ratio: float) -> float:
@@ -156,12 +171,29 @@ class BeyondLinearContactError(SolverError):
 class _Column:
     """The layer pressed up to one contact edge; knows the last sphere."""
 
-    def __init__(self, a: float, rho: Floats, order: int, material: Material) -> None:
-        self.layer = ContactLayer(discretise(contact_mesh(a), order), a, material)
+    def __init__(
+        self, a: float, rho: Floats, order: int, material: Material, earlier: Sequence[Touched] | None
+    ) -> None:
+        d = discretise(contact_mesh(a), order)
+        self.layer = ContactLayer(d, a, material) if earlier is None else StickingLayer(d, a, material, earlier)
         self.base = BaseStress(self.layer.discretisation)
         self.linear = LinearContact(np.minimum(self.base.points, PROFILE_END), rho, material.poisson_ratio)
         self.a, self.rho, self.material = a, rho, material
         self.now, self.strain = self.layer.untouched(), 0.0
+
+    def follow(self, targets: Floats) -> Iterator[SphereSolution]:
+        """Spheres whose x is near each target, the last one's at or beyond it, as far as the linear contact is
+        known."""
+        reached, ratio = 0.0, 1.0 + self.a  # of the force over Hertz's for a: a first guess
+        further = iter(targets)
+        while reached < targets[-1]:
+            target = next((target for target in further if target > reached), 1.02 * targets[-1])
+            try:
+                sphere = self.advance(self.a / _strain(target, ratio))
+            except BeyondLinearContactError:
+                return
+            reached, ratio = sphere.cbrt_load, sphere.cbrt_load**3 / (16 / 9 * (self.a / sphere.radius) ** 3)
+            yield sphere
 
     def advance(self, radius: float) -> SphereSolution:
         """To the next sphere, in smaller steps where Newton's method needs them."""
@@ -184,7 +216,7 @@ class _Column:
         """The present state in proportion to a/R, which it follows nearly."""
         now, factor = self.now, strain / self.strain if self.strain else 0.0
         state = State(now.state.displacement * factor, now.state.pressure * factor)
-        return PressedState(state, now.multiplier * factor, now.indentation * factor)
+        return PressedState(state, now.multiplier * factor, now.indentation * factor, now.spread)
 
     def _sphere(self, radius: float) -> SphereSolution:
         layer, base, now = self.layer, self.base, self.now

@@ -18,6 +18,7 @@ from rig.description import parse
 from rig.elastomer import campaign_of_curves, record_curves
 from rig.recorded import campaign, record_lines
 from tests.support.lean_reports import beside
+from tests.support.sticking_punch import sticking_spheres
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import from_dict
 
@@ -26,6 +27,7 @@ _LEFT_OPEN = 0.2  # of its set, where the answer is ambiguous
 # Among which it is sought, in `make soak` among all
 _RIVALS = {
     "frf": ("modulus_error", "thickness_error", "sensor_spread", "moving_contact_edge", "contact_resonance"),
+    "sticking_contact": ("modulus_error", "thickness_error", "moving_contact_edge", "layered_contact"),  # on a layer
     "indentation": ("modulus_error", "layered_contact", "instrument_compliance", "strain_stiffening"),
     "compression": ("modulus_error", "platen_friction", "strain_stiffening", "cell_collapse"),
 }
@@ -63,6 +65,7 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
     ("frf", "crosstalk"): Hidden({"fraction": 0.2}, {"fraction": "fraction"}),
     ("frf", "timing_delay"): Hidden({"delay_us": 80.0}, {"delay": "delay_us"}),
     ("frf", "modulus_error"): Hidden({"factor": 1.4}, {"modulus_factor": "factor"}),
+    ("frf", "sticking_contact"): Hidden({"share": 1.0}, {"sticking_share": "share"}),
     ("frf", "thickness_error"): Hidden({"factor": 1.15}, {"thickness_factor": "factor"}),
     ("indentation", "layered_contact"): Hidden({}),
     ("indentation", "adhesion"): Hidden(
@@ -92,7 +95,6 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
         {"lost": 0.35, "strain": 0.2}, {"softened_fraction": "lost", "softening_strain": "strain"}
     ),
 }
-WITHOUT_RIG = {"cell_collapse", "cyclic_softening"}  # of which the rig has no effect
 
 
 def frfs(name: str) -> dict[str, Any]:
@@ -156,6 +158,33 @@ def cycles(name: str) -> dict[str, Any]:
     return {"schema": "campaign/1", "name": name, "skin": {"poisson_ratio": 0.5}, "recordings": [recording]}
 
 
+def lenses(name: str) -> dict[str, Any]:
+    """Two spheres, so wide that strains are small, that stick to a layer of 2 mm and 4 MPa by the linear theory."""
+    thickness, shear, rho, d33 = 2.0, 4.0 / 3, np.array([0.5]), 14.0
+    solved = sticking_spheres(1.5, rho)
+    random = np.random.default_rng(53)
+    recordings: list[dict[str, Any]] = []
+    for radius in (200.0, 400.0):
+        for number in np.flatnonzero(solved.a > 0.3):
+            frf = 1.5 * rho[0] ** 2 * d33 * float(solved.sigma[number, 0]) * math.exp(random.normal(0.0, 0.005))
+            recordings.append({
+                "id": f"r{len(recordings)}", "sensor": "s", "indenter_radius_mm": radius, "dynamic_force_n": 0.001,
+                "preload_n": float(solved.load[number]) * shear * thickness**3 / radius,
+                "frequency_hz": np.geomspace(1.0, 100.0, 16).tolist(),
+                "frf_re_pc_per_n": (frf * (1 + random.normal(0.0, 0.003, 16))).tolist(),
+                "frf_im_pc_per_n": (frf * random.normal(0.0, 0.003, 16)).tolist(),
+            })  # fmt: skip
+    skin = {
+        "thickness_mm": thickness, "youngs_modulus_mpa": 3 * shear, "poisson_ratio": 0.5, "sensor_radius_mm": 1.0,
+        "d33_pc_per_n": None, "sensors": [{"id": "s", "x_mm": 0.0, "y_mm": 0.0}],
+    }  # fmt: skip
+    return {"schema": "campaign/1", "name": name, "units_checked": True, "skin": skin, "recordings": recordings}
+
+
+# Of which the rig has no effect
+DRAWN = {"cell_collapse": cycles, "cyclic_softening": cycles, "sticking_contact": lenses}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name"), [(kind, name) for name, mechanism in CATALOGUE.items() for kind in mechanism.kinds]
@@ -165,10 +194,10 @@ def test_mechanism_is_recovered(kind: str, name: str) -> None:
 
     One campaign stands for each: the intervals are taken twice as wide, which a true value leaves once in 10,000 times.
     """
-    document = cycles(name) if name in WITHOUT_RIG else frfs(name) if kind == "frf" else curves(kind, name)
+    document = DRAWN[name](name) if name in DRAWN else frfs(name) if kind == "frf" else curves(kind, name)
     made, refused = from_dict(document)
     assert not refused
-    report = underskin.diagnose(made, without=() if SOAK else beside(name, *_RIVALS[kind]))
+    report = underskin.diagnose(made, without=() if SOAK else beside(name, *_RIVALS.get(name, _RIVALS[kind])))
     present = sum(group.probability for group in report.presence if name in group.mechanisms)
     sets = [([one.name for one in report.mechanisms], report.probability)]
     sets += [(list(rival.mechanisms), rival.probability) for rival in report.alternatives]

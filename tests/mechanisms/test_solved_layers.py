@@ -1,4 +1,4 @@
-"""FRFs of layers that stiffen or are compressible, against contacts solved anew between the table's nodes."""
+"""FRFs of layers that stiffen or are compressible and of spheres that stick, against contacts solved anew."""
 
 import itertools
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from bench.soak import SOAK
-from tablegen.contact_column import press_spheres
-from tablegen.neo_hookean import Material
+from tablegen.contact_column import SphereSolution, press_spheres
+from tablegen.neo_hookean import NEO_HOOKEAN, Material
+from tests.support.grown_contacts import grown
 from underskin.mechanisms.models.composed import compose
 from underskin.recordings.campaign import Conditions, FrfConditions, Sensor, SkinDescription
 from underskin.surrogate.sigma_table import load_table
@@ -15,6 +16,7 @@ from underskin.surrogate.sigma_table import load_table
 RHO, LARGEST_LOAD = np.array([0.2, 0.6, 1.2]), 0.15
 MATERIALS = [Material(0.5), Material(2.0), Material(5.0), Material(0.0, 0.33), Material(0.0, 0.47)]
 SPOTS = list(itertools.product(MATERIALS, (0.37, 0.13, 0.86, 1.5, 2.2), (0.9, 0.4)))
+STICKING = list(itertools.product((0.37, 0.86, 1.5, 2.2), (0.9, 0.4)))
 HIGHEST = 0.5  # of the largest a/R that the largest load of a thick neo-Hookean layer gives, on a thin stiff one
 
 
@@ -32,7 +34,8 @@ def frf(laws: tuple[str, ...], force: float, radius: float, rho: float, material
     )
     model = compose(laws, Conditions("spot", skin, (recording,)), load_table(), "frf")
     fit = np.array([parameter.start for parameter in model.parameters])
-    values = {"stiffening": 0.0, "second_over_first": material.second_over_first, "mobile_fraction": 1.0}
+    values = {"stiffening": 0.0, "second_over_first": material.second_over_first}
+    values |= {"mobile_fraction": 1.0, "sticking_share": 1.0}
     for index, parameter in enumerate(model.parameters):
         if parameter.name in values:
             fit[index] = values[parameter.name]
@@ -49,9 +52,23 @@ def test_spot_solves(material: Material, edge: float, share: float) -> None:
     )
     (sphere,) = press_spheres(edge, np.array([edge / strain]), RHO, 5, material)
     assert sphere.cbrt_load**3 < LARGEST_LOAD
+    law = ("strain_stiffening",) if material.second_over_first else ()
+    check(("layered_contact", *law), sphere, material)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("edge", "share"), STICKING if SOAK else STICKING[1:2])
+def test_spheres_that_stick(edge: float, share: float) -> None:
+    """The same of spheres that stick, their contact grown over edges that the table's are not."""
+    radius = edge / (share * 0.44 / np.cbrt(1 + edge + 0.4 * edge**2))
+    *_, sphere = grown([*np.linspace(0, edge, 5)[1:]], radius, RHO, 4)
+    assert sphere.cbrt_load**3 < LARGEST_LOAD
+    check(("layered_contact", "sticking_contact"), sphere, NEO_HOOKEAN)
+
+
+def check(laws: tuple[str, ...], sphere: SphereSolution, material: Material) -> None:
+    """σ and its increment on all discs."""
     for number, rho in enumerate(RHO):
-        law = ("strain_stiffening",) if material.second_over_first else ()
-        laws = ("layered_contact", *law)
         still, moving = (
             frf(names, sphere.force, sphere.radius, float(rho), material)
             for names in (laws, (*laws, "moving_contact_edge"))

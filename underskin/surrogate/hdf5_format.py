@@ -30,7 +30,7 @@ from underskin.units import Floats
 
 SIGMA_SCHEMA = "underskin-sigma/1"
 INFLUENCE_SCHEMA = "underskin-influence/1"
-CONTACT_SCHEMA = "underskin-contact/2"
+CONTACT_SCHEMA = "underskin-contact/3"
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -155,7 +155,7 @@ def _verify_values(path: Path, group: str, name: str, data: Mapping[str, Floats]
     values = data[f"{group}/{name}"]
     if not np.isfinite(values).all():
         raise TableError(f"table {path}: {group}/{name} holds values that are not finite. {_REMEDY}")
-    if not axes and not (values.ndim == 1 and values.size >= 4 and (np.diff(values) > 0).all()):
+    if not axes and not (values.ndim == 1 and values.size >= 2 and (np.diff(values) > 0).all()):
         raise TableError(f"table {path}: axis {group}/{name} does not ascend. {_REMEDY}")
     expected = tuple(data[f"{group}/{axis}"].size for axis in axes)
     if axes and values.shape != expected:
@@ -195,7 +195,8 @@ def tables_folder() -> Path:
 
 CONTACT_TABLE = "contact.h5"
 _STATE = "frictionless"
-_FURTHER = {"second_over_first": "yeoh", "poisson_ratio": "compressible"}  # the group of each further property
+# The group of each further property
+_FURTHER = {"second_over_first": "yeoh", "poisson_ratio": "compressible", "friction": "sticking"}
 
 
 class ContactTable(Table):
@@ -254,8 +255,8 @@ class ContactTable(Table):
         return np.asarray(self._over_radius(r_over_h))
 
     def further_profiles_over(self, name: str, r_over_h: Floats) -> tuple[Floats, Floats]:
-        """The nodes of a further property, `second_over_first` or `poisson_ratio`, and what is added at each of them at
-        these distances (radii,): (nodes, a, L^(1/3), radii)."""
+        """The nodes of a further property, `second_over_first`, `poisson_ratio` or `friction`, and what is added at
+        each of them at these distances (radii,): (nodes, a, L^(1/3), radii)."""
         nodes, over_radius = self._further[name]
         return nodes, np.asarray(over_radius(r_over_h))
 

@@ -266,6 +266,7 @@ class Contacts:
     work_of_adhesion: Differentiated | None = None  # w [J/m²], of one row; None without adhesion
     relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
     second_over_first: Differentiated | None = None  # c₂ of Yeoh's law, of one row; None of a neo-Hookean layer
+    friction: Differentiated | None = None  # 0 slips to 1 sticks, of one row; None of a frictionless sphere
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the present radius, where a mechanism reads it
 

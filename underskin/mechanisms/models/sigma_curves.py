@@ -6,13 +6,13 @@ changes the shape of the pressure or the layer,
 
     σ = linear(p̂, M; a, e) + finite strain,
 
-with the Hankel integral of the linear layer (underskin/physics/hankel_transform.py). The finite-strain term is table(a,
-L, e) − table(a, 0, e) in contact with a half space, and the correction of the contact table (tables/contact.h5) in
-contact with the layer itself. To the latter a compressible layer adds what the same table has for its ν. A layer that
-stiffens by Yeoh's law adds what it has for its c₂, in contact with a half space too, with the α of Hertz. The transform
-of the pressure is p̂ = s p̂_sphere + (1 − s) p̂_punch, s the sphere's share of the load; on the half space p̂_sphere is
-Hertz', 3 (sin x − x cos x)/x³, and p̂_punch sin x/x, x = k a/h; on the layer both come from its own contact
-(elastic_layer).
+with the Hankel integral of the linear layer (underskin/physics/hankel_transform.py). The finite-strain term is
+table(a, L, e) − table(a, 0, e) in contact with a half space, and the correction of the contact table
+(tables/contact.h5) in contact with the layer itself. To the latter a compressible layer adds what the same table has
+for its ν, and a sphere that sticks what it has for friction. A layer that stiffens by Yeoh's law adds what it has for
+its c₂, in contact with a half space too, with the α of Hertz. The transform of the pressure is p̂ = s p̂_sphere + (1 −
+s) p̂_punch, s the sphere's share of the load; on the half space p̂_sphere is Hertz', 3 (sin x − x cos x)/x³, and
+p̂_punch sin x/x, x = k a/h; on the layer both come from its own contact (elastic_layer).
 
 A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond
 its a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to
@@ -100,6 +100,11 @@ class OffsetSigma:
     def compressible_strain(self) -> _Added:
         """What ν adds in contact with the linear layer."""
         return _Added(*self._added("poisson_ratio"))
+
+    @cached_property
+    def sticking_strain(self) -> _Added:
+        """What friction adds in contact with the linear layer, at no strain too."""
+        return _Added(*self._added("friction"))
 
     def _added(self, name: str) -> tuple[Floats, dict[int, TensorSpline]]:
         table = load_contact()
@@ -201,6 +206,8 @@ class SigmaOfContacts:
         self._added: list[tuple[_Added, Differentiated]] = []
         if contacts.second_over_first is not None:
             self._added.append((sigma.yeoh_strain, log(1.0 + contacts.second_over_first)))
+        if contacts.friction is not None:
+            self._added.append((sigma.sticking_strain, contacts.friction))
         if layer is not None and not incompressible(contacts):
             self._added.append((sigma.compressible_strain, contacts.poisson_ratio))
         self._linear: Floats | None = None
