@@ -2,7 +2,7 @@
 
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings.campaign import Conditions
 
 _REASON = "from a lubricated sphere to one that holds all it touches: nothing is known beforehand"
