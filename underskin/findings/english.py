@@ -87,6 +87,7 @@ _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g}
 _OF_ARRAY = "{percent:.0f} % of the array's d33"
 _MORE_ROWS = "{more: ({more} more rows like it)|}"
 _UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
+_GIVEN_IN = "{units:; was charge over force given in {units:or}?|}"
 _RESPONSE = "1000 × too {too_large:large: pC taken for nC, or N for mN?|small: nC taken for pC?}"
 _NEEDED = (
     "force and displacement would need a modulus of about {modulus_mpa:.2g} MPa: "
@@ -174,7 +175,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.TWO_RESPONSES: "the two recordings' responses are {ratio:.3g} times as far apart as expected: a slip of "
     "units?",
     Reason.D33_NEEDED: "charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N"
-    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}; it looks {_RESPONSE}",
+    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}{_GIVEN_IN}",
     Reason.PLACES: f"places lie at their own sensors only {_THOUSANDFOLD}: were they given in {{given_in}}, or the "
     f"sensors in "
     "{sensors_in}?",
@@ -261,8 +262,8 @@ ENGLISH: Mapping[Reason, Words] = {
     "and places right?",
     Reason.TIME_TO_COME: "recorded_at is {written}, which is still to come: is the year a slip?{more:more recording}",
     Reason.TIME_TOO_OLD: "recorded_at is {written}, before {year}: was the clock not set?{more:more recording}",
-    Reason.D33_FITTED: "d33 comes out as {d33_pc_per_n:.4g} pC/N, {kind:implausible}",
-    Reason.D33_OF_ARRAY: "d33 of the array is {d33_pc_per_n:.3g} pC/N, {kind:implausible}",
+    Reason.D33_FITTED: f"d33 comes out as {{d33_pc_per_n:.4g}} pC/N, {{kind:implausible}}{_GIVEN_IN}",
+    Reason.D33_OF_ARRAY: f"d33 of the array is {{d33_pc_per_n:.3g}} pC/N, {{kind:implausible}}{_GIVEN_IN}",
     Reason.D33_OF_ROW: f"d33 is {{d33_pc_per_n:.3g}} pC/N, {{kind:implausible}}{_MORE_ROWS}",
     Reason.DEFECT: DEFECT,
     Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",

@@ -25,6 +25,11 @@ class UnitGuess:
     meant: tuple[tuple[float, str], ...] = ()
     off_by: int = 0
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The units in which it may have been given."""
+        return tuple(unit for _, unit in self.meant if unit)
+
     def __str__(self) -> str:
         """The slip in words."""
         if self.size == 0:
@@ -52,7 +57,8 @@ class ImplausibleD33(StrEnum):
             self.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
             self.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
             self.NEGATIVE: "negative: is the sign of charge or force turned?",
-            self.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
+            self.NOT_PVDF: "which PVDF cannot have (it and its copolymers have 10 to 40), and not to be quoted unless "
+            "units_checked confirms it",
         }[self]
 
 

@@ -11,13 +11,16 @@ import numpy as np
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.physics import hertz
+from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.plausibility import moment, pitch_mm
-from underskin.units import Floats, unit_guess, unusual
+from underskin.units import Floats, to_si, unit_guess, unusual
 
 UNUSED_FOR_D33 = ("frequency_hz", "coherence")
 _PRELOADS_N = (0.01, 150.0)  # of stages: least for the highest preload of a campaign, most for the lowest
 _FREQUENCIES_HZ = (0.5, 2e4)  # of shakers and charge amplifiers: range of the highest line of a campaign
+_LEAST_SWEEP_HZ = 2.0  # of the highest of several lines: below it shakers end and charge amplifiers roll off
 _LEAST_PAUSE_S = 5.0  # no sweep takes less
 _SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency
 _ELASTOMERS_MPA = (0.02, 100.0)  # from gels to the hardest (Ashby, Materials Selection in Mechanical Design, fig. 4.3)
@@ -30,16 +33,16 @@ _GEOMETRY = ("thickness_mm", "sensor_radius_mm", "width_mm", "length_mm")
 def unlikely(campaign: Campaign, recordings: Sequence[FrfRecording], lines: Sequence[Floats]) -> list[Finding]:
     """Findings on magnitudes of the skin, or common to all recordings, that look like a wrong unit; `lines`: the
     frequencies of each recording [Hz]."""
-    return [*_of_skin(campaign), *_of_recordings(recordings), *_of_frequencies(recordings, lines)]
+    return [*_of_skin(campaign, recordings), *_of_recordings(recordings), *_of_frequencies(recordings, lines)]
 
 
-def _of_skin(campaign: Campaign) -> list[Finding]:
+def _of_skin(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
     skin = campaign.skin
     assert skin.youngs_modulus_mpa is not None
     findings = []
     low, high = _ELASTOMERS_MPA
     modulus = skin.youngs_modulus_mpa
-    if not low <= modulus <= high:
+    if modulus > high or (modulus < low and _sink(modulus, recordings)):
         arguments = {
             "modulus_mpa": modulus,
             "low_mpa": low,
@@ -53,6 +56,14 @@ def _of_skin(campaign: Campaign) -> list[Finding]:
     if pitch is not None and pitch > _WIDEST_PITCH_MM:
         findings.append(Finding(Reason.WIDE_PITCH, "", "skin.sensors", {"pitch_mm": pitch}))
     return findings
+
+
+def _sink(modulus_mpa: float, recordings: Sequence[FrfRecording]) -> bool:
+    """Whether a sphere would sink into a skin this soft, a contact wider than the sphere by Hertz; a gel that bears
+    its spheres is no slip."""
+    preload = np.array([recording.preload_n for recording in recordings])
+    radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])
+    return bool((hertz.contact_radius(preload, radius, 1e6 * modulus_mpa, INCOMPRESSIBLE) > radius).any())
 
 
 def _of_recordings(recordings: Sequence[FrfRecording]) -> list[Finding]:
@@ -81,7 +92,7 @@ def _of_frequencies(recordings: Sequence[FrfRecording], lines: Sequence[Floats])
         min(float(frequency.min()) for frequency in lines),
         max(float(frequency.max()) for frequency in lines),
     )
-    slow = lowest < _SLOW_HZ[0] and highest < _SLOW_HZ[1]
+    slow = (lowest < _SLOW_HZ[0] and highest < _SLOW_HZ[1]) or lowest < highest < _LEAST_SWEEP_HZ
     for wrong, too_large, unit in (
         (highest > _FREQUENCIES_HZ[1], True, "mHz"),
         (slow or highest < _FREQUENCIES_HZ[0], False, "kHz"),

@@ -10,23 +10,24 @@ import numpy as np
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.sentences import ImplausibleD33
-from underskin.units import LAB, Floats, Mask, unusual
+from underskin.units import LAB, Floats, Mask, unit_guess, unusual
 
 _LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: range of all reported sensors of skins
-_OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
+OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
 
 
-def of_array(d33: float) -> list[Finding]:
-    """A finding on an implausible d33 of an array [pC/N]."""
-    implausible = implausibility(d33)
-    arguments = {"d33_pc_per_n": d33, "kind": implausible}
-    return [] if implausible is None else [Finding(Reason.D33_OF_ARRAY, "", "d33_pc_per_n", arguments)]
+def of_array(reason: Reason, d33: float, *, units_checked: bool) -> list[Finding]:
+    """A finding, for this reason, on an implausible d33 of an array [pC/N]."""
+    implausible = implausibility(d33, units_checked=units_checked)
+    units = unit_guess("d33_pc_per_n", d33, OF_PVDF).units if implausible is ImplausibleD33.NOT_PVDF else ()
+    arguments = {"d33_pc_per_n": d33, "kind": implausible, "units": units}
+    return [] if implausible is None else [Finding(reason, "", "d33_pc_per_n", arguments)]
 
 
-def implausibility(d33: float) -> ImplausibleD33 | None:
-    """Why PVDF cannot have a d33 [pC/N]; None of one that it may have."""
+def implausibility(d33: float, *, units_checked: bool = False) -> ImplausibleD33 | None:
+    """Why PVDF cannot have a d33 [pC/N]; None of one that it may have, and where the units of another are checked."""
     implausible = next((implausible for implausible, rows in _implausible_rows(np.array(d33)).items() if rows), None)
-    if implausible is not None or _OF_PVDF[0] <= d33 <= _OF_PVDF[1]:
+    if implausible is not None or units_checked or OF_PVDF[0] <= d33 <= OF_PVDF[1]:
         return implausible
     return ImplausibleD33.NOT_PVDF
 
