@@ -12,7 +12,10 @@ from tests.mechanisms.contact_elements import Body, force_of_elements
 from tests.recordings.test_sphere_modulus import bonded_layer, whole_sphere
 from tests.support.lean_reports import COSTLY
 from tests.support.sphere_curves import campaign, pressed, ways
+from underskin.diagnosis.data.dataset import curve_lines
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.recordings.campaign import IndentationRecording, from_dict
+from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
 pytestmark = pytest.mark.slow
@@ -57,6 +60,28 @@ def test_a_neo_hookean_block_lacks_nothing(largest: float) -> None:
     report = diagnosed(block(strain, neo_hookean(strain)))
     assert report.verdict == "no_mismatch"
     assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("pulled", "largest"), [(True, (0.3, 1.5)), (False, (0.08, 0.35))])
+def test_interval_of_neo_hookean_samples(pulled: bool, largest: tuple[float, float]) -> None:
+    """The 95 % interval of E holds that of strips and blocks with an unknown zero, slack and 0.1 to 2 % noise."""
+    random, table, inside = np.random.default_rng(2), load_table(), []
+    for number in range(40):
+        strain = np.linspace(0, random.uniform(*largest), random.integers(30, 300))
+        slack = random.uniform(0, 0.1) * strain[-1] * (number % 2)
+        stretch = 1 + (1 if pulled else -1) * np.maximum(strain - slack, 0)
+        stress = (stretch - stretch**-2) / 3
+        top = float(np.abs(stress).max())
+        zero, noise = top * random.uniform(-0.03, 0.03) * (number % 4 > 1), top * np.exp(random.uniform(-6.9, -3.9))
+        stress = stress + zero + noise * random.standard_normal(len(stress))
+        rows = curve_lines(block(-strain if pulled else strain, -stress), "compression")
+        (fit,) = FittingProblem(rows, table).explain([Request(())])
+        assert fit is not None
+        index = [parameter.name for parameter in fit.model.parameters].index("youngs_modulus")
+        deviation = float(np.sqrt(fit.best.covariance[index, index]))
+        inside.append(abs(fit.point.fit[index]) < 1.96 * deviation)
+        assert deviation < 0.06
+    assert sum(inside) >= 35  # fewer with probability 0.014
 
 
 def test_pulled_strip_told_without_spheres() -> None:

@@ -8,7 +8,7 @@ from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
 from underskin.recordings.campaign import Campaign
-from underskin.recordings.curve_preparation import falling, periodic_error
+from underskin.recordings.curve_preparation import falling, marks, periodic_error
 from underskin.recordings.plausibility import implausible
 
 pytestmark = pytest.mark.slow
@@ -113,6 +113,25 @@ def test_steps_converter_hold_no_saturation() -> None:
     steps = hertz(np.array(0.3)) / 60
     assert implausible(campaign(depth, np.round(pressed(depth) / steps) * steps)) == []
     assert implausible(campaign(depth, pressed(depth, noise=0.0))) == []
+
+
+@pytest.mark.parametrize("mark", [-1.0, 0.0, 999.0])
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_marks_for_no_reading_left_out(mark: float, share: float) -> None:
+    """A number that an instrument writes where it has no reading is told and left out; coarse steps in the air and
+    rests between presses are no marks."""
+    depth = ways(-0.1, 0.3, -0.1)
+    force = pressed(depth) + 0.05
+    marked = np.random.default_rng(4).permutation(len(force))[: int(share * len(force))]
+    force[np.arange(0, len(force), int(1 / share)) if share == 0.5 else marked] = mark
+    read = campaign(depth, force)
+    finding = only(read)
+    assert finding.code == "damaged_samples"
+    assert finding.arguments["samples"] == int((force == mark).sum())
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
+    coarse = np.tile(np.round(pressed(ways(-0.1, 0.3, -0.1, samples=40)), 2), 20)
+    assert not marks(coarse).any()
+    assert not marks(np.tile([0.0, 0.0, 0.0, 0.3, 0.7, 0.3], 40)).any()
 
 
 @pytest.mark.parametrize("period_mm", [0.02, 0.045])
