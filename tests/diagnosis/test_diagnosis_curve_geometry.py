@@ -186,7 +186,7 @@ def test_not_tried_said_missing() -> None:
 def test_several_presses_relax() -> None:
     """What relaxes is named from several presses in one recording, with E and the share that relaxes."""
     depth = ways(-0.1, 0.3, -0.1, 0.3, -0.1, samples=80)
-    time = 0.1 * np.arange(len(depth))
+    time = 0.1 * np.arange(float(len(depth)))
     force = force_of_elements(Body(2e-3, 1e6 / 0.75, 0.4, 1.0), depth * 1e-3, time)
     noisy = force + 1e-3 * force.max() * np.random.default_rng(1).normal(size=len(force))
     curve = IndentationRecording("p1", 2.0, depth, noisy, time_s=time)

@@ -663,8 +663,8 @@ def _error(
     indentation's contact, `samples` as in CurveError."""
     largest = float(np.abs(force).max()) or 1.0
     if kind == "compression":
-        zero = np.full((len(force), 1), ZERO_SD * largest)
-        return CurveError(np.full(len(force), largest), path_fraction, zero, *samples)
+        of_zero = np.full((len(force), 1), ZERO_SD * largest)
+        return CurveError(np.full(len(force), largest), path_fraction, of_zero, *samples)
     in_air = np.abs(force) < 4 * seen.noise + 1e-3 * largest
     if seen.pull_off is None and seen.snap_in is None:
         in_air &= displacement < displacement[np.argmax(displacement)]
