@@ -8,8 +8,9 @@ from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
 from underskin.recordings.campaign import Campaign
-from underskin.recordings.curve_preparation import falling, marks, periodic_error
-from underskin.recordings.plausibility import implausible
+from underskin.recordings.curve_preparation import falling, periodic_error
+from underskin.recordings.damaged_readings import marks, spikes
+from underskin.recordings.plausibility import at_reading, implausible
 
 pytestmark = pytest.mark.slow
 
@@ -132,6 +133,23 @@ def test_marks_for_no_reading_left_out(mark: float, share: float) -> None:
     coarse = np.tile(np.round(pressed(ways(-0.1, 0.3, -0.1, samples=40)), 2), 20)
     assert not marks(coarse).any()
     assert not marks(np.tile([0.0, 0.0, 0.0, 0.3, 0.7, 0.3], 40)).any()
+
+
+@pytest.mark.parametrize("spike", [50.0, -50.0])
+def test_spike_left_out(spike: float) -> None:
+    """A reading far beyond the range of all others is told and left out, and the end of a steep curve is none."""
+    depth = ways(-0.1, 0.3, -0.1)
+    force = pressed(depth)
+    force[[150, 300, 301]] = spike
+    read = campaign(depth, force)
+    finding = only(read)
+    assert (finding.code, finding.arguments["samples"]) == ("damaged_samples", 3)
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
+    assert [one.code for one in at_reading(read)] == ["damaged_samples"]
+    steep = np.append(pressed(ways(-0.1, 0.3)), [2.0, 5.0, 20.0, 100.0])
+    assert not spikes(steep).any()
+    stuck = np.concatenate([np.zeros(200), np.linspace(0.0, -9.0, 20), np.zeros(200)]) + 0.1 * np.sin(np.arange(420))
+    assert not spikes(stuck).any()
 
 
 @pytest.mark.parametrize("period_mm", [0.02, 0.045])

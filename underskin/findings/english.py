@@ -269,6 +269,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",
     Reason.READINGS_MARKED: "{samples} readings of the force ({percent:.2g} %) are {value_n:.4g} N each, far off those "
     "beside them: the instrument's mark for no reading? They were left out",
+    Reason.READINGS_BEYOND: "{samples} reading(s) of the force, up to {value_n:.4g} N, lie far beyond the range of all "
+    "others and last no longer than a sample or two: damaged? They were left out",
     Reason.LINES_LEFT_OUT: sentences.lines_left_out,
     Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
     "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "

@@ -32,6 +32,7 @@ from underskin.recordings.campaign import (
     samples_of,
 )
 from underskin.recordings.curve_course import is_one_sided, roughness
+from underskin.recordings.damaged_readings import marks, spikes, without_damaged
 from underskin.units import Floats, Indices, Mask
 
 FORCE, TRAVEL = "force_n", "displacement_mm"
@@ -83,7 +84,8 @@ def orientation(recording: CurveRecording) -> Orientation:
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
     """The columns that fall during loading, for force and travel of a sphere or a block, (samples,) in any unit."""
-    return _oriented(force, travel, sphere=sphere).negative
+    rows = ~(marks(force) | spikes(force))
+    return _oriented(force[rows], travel[rows], sphere=sphere).negative
 
 
 def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
@@ -418,22 +420,6 @@ def saturated(travel: Floats, force: Floats, *, sphere: bool) -> Mask:
     return at_limits
 
 
-def marks(force: Floats) -> Mask:
-    """The samples (samples,) at which an instrument wrote a mark, such as -1, where it had no reading: one number that
-    comes again, one or two samples each time, far off the samples on both sides, which agree."""
-    values, counts = np.unique(force, return_counts=True)
-    marked = np.zeros(len(force), dtype=bool) if len(values) < _EQUAL else force == values[counts.argmax()]
-    others, first = np.flatnonzero(~marked), np.flatnonzero(np.diff(marked.astype(int), prepend=0) > 0)
-    beside = np.searchsorted(others, first)
-    first, beside = (rows[(beside > 0) & (beside < len(others))] for rows in (first, beside))
-    if len(first) < _LEAST or marked.sum() > 2 * len(first) + 2:
-        return np.zeros(len(force), dtype=bool)
-    before, after = force[others[beside - 1]], force[others[beside]]
-    off = np.abs(force[first] - (before + after) / 2)
-    least = np.maximum(np.abs(after - before), max(roughness(force[others]), float(np.diff(values).min())))
-    return marked if np.mean(off > _OFF * least) > 0.5 else np.zeros(len(force), dtype=bool)
-
-
 def _goes_on(travel: Floats, rows: Indices) -> bool:
     """Whether the travel keeps its speed at the first or the last of these samples at the limit."""
     first, last = int(rows[0]), int(rows[-1])
@@ -579,7 +565,6 @@ def _splines(travel: Floats, apart: float) -> Floats:
 
 
 _LEAST = 16  # samples needed to detect a defect
-_OFF = 4.0  # times what its neighbours differ by, and their noise: how far a mark stands off the curve
 _TURNS_OF_ONE_WAY = 2  # turning points of a monotonic curve: its first and its last sample
 _STICKS = 0.05  # of the range of force below the shallow end: adhesion, so that the rows are a withdrawal
 _UNLOADED = 0.1  # largest final force of a reversed block, of its first force
@@ -603,7 +588,7 @@ def prepared(campaign: Campaign) -> PreparedCurves:
         if isinstance(recording, FrfRecording) or are_exchanged(recording):
             recordings.append(recording)
             continue
-        curve, curve_findings = _without_marks(recording)
+        curve, curve_findings = without_damaged(recording)
         curve, of_saturation = _without_saturation(curve)
         curve_findings += of_saturation
         oriented = orientation(curve)
@@ -642,18 +627,6 @@ def _is_backwards(curve: CurveRecording) -> bool:
             return False
         return bool(travel[0] > travel[-1])
     return bool(abs(force[-1]) < _UNLOADED * abs(force[0]))
-
-
-def _without_marks(curve: CurveRecording) -> tuple[CurveRecording, list[Finding]]:
-    finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-    force = curve.force_n[finite]
-    marked = marks(force)
-    if not marked.any():
-        return curve, []
-    value = float(force[marked][0])
-    arguments = {"samples": int(marked.sum()), "percent": 100 * float(marked.mean()), "value_n": value}
-    rest = np.setdiff1d(np.arange(len(curve.force_n)), finite[marked])
-    return samples_of(curve, rest), [Finding(Reason.READINGS_MARKED, curve.id, "force_n", arguments)]
 
 
 def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Finding]]:

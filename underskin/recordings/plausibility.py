@@ -31,7 +31,7 @@ def implausible(campaign: Campaign) -> list[Finding]:
 def at_reading(campaign: Campaign) -> list[Finding]:
     """`implausible`, with slips of units of curves and of the dynamic force of all FRFs."""
     frfs = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
-    return [*implausible(campaign), *curve_course.implausible(campaign), *loose_sphere(frfs)]
+    return [*implausible(campaign), *curve_course.implausible(prepared(campaign).campaign), *loose_sphere(frfs)]
 
 
 def loose_sphere(recordings: Sequence[FrfRecording]) -> list[Finding]:
