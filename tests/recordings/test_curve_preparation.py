@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from tests.support.sphere_curves import campaign, hertz, pressed, ways
+from underskin import read_file
 from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
+from underskin.recordings import rig_description
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.curve_preparation import falling, periodic_error
 from underskin.recordings.damaged_readings import marks, spikes
@@ -133,6 +135,20 @@ def test_marks_for_no_reading_left_out(mark: float, share: float) -> None:
     coarse = np.tile(np.round(pressed(ways(-0.1, 0.3, -0.1, samples=40)), 2), 20)
     assert not marks(coarse).any()
     assert not marks(np.tile([0.0, 0.0, 0.0, 0.3, 0.7, 0.3], 40)).any()
+
+
+def test_marks_turn_no_sign() -> None:
+    """Marks of -999 do not make the force of a file fall as it is pressed."""
+    depth = ways(-0.1, 0.3, -0.1)
+    force = pressed(depth)
+    force[np.random.default_rng(5).permutation(len(force))[:60]] = -999.0
+    rows = [f"{one:.5f},{other:.6f}" for one, other in zip(depth, force, strict=True)]
+    described = """{"schema": "rig/1", "name": "n", "kind": "indentation", "skin": {"poisson_ratio": 0.5},
+    "recording": {"indenter_radius_mm": 2}, "channels": {"displacement_mm": {"channel": "z (mm)"},
+    "force_n": {"channel": "F (N)"}}}"""
+    rig = rig_description.parse(described.encode(), "rig.json")
+    read = read_file("\n".join(["z (mm),F (N)", *rows]).encode(), "curve.csv", rig)
+    assert modulus_mpa(read.campaign) == pytest.approx(1.0, rel=0.02)
 
 
 @pytest.mark.parametrize("spike", [50.0, -50.0])
