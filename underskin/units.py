@@ -83,7 +83,15 @@ _NEIGHBOURS = {
     "mm": {1e-3: "µm", 1e-6: "nm", 1e3: "m"},
     "MPa": {1e-3: "kPa", 1e-6: "Pa", 1e3: "GPa"},
     "N": {1e-3: "mN", 1e-6: "µN", 1e3: "kN"},
-    "pC/N": {1e-3: "fC/N", 1e3: "nC/N", 1e6: "µC/N", 1e12: "C/N"},
+    "pC/N": {
+        1e-3: "fC/N",
+        1e3: "nC/N",
+        1e6: "µC/N",
+        1e12: "C/N",
+        1 / GRAM_FORCE: "pC/gf",
+        1e-3 / GRAM_FORCE: "pC/kgf",
+        1 / POUND_FORCE: "pC/lbf",
+    },
 }
 _AS_NEAR = 0.5  # decades: another unit that would make a number about as usual
 

@@ -47,7 +47,7 @@ CURVES: list[Row] = [
     ("curves", _by_rig("clipped"), Right(1.0, says=SATURATED), Right(1.0, says=SATURATED, never="rough|encoder")),
     ("curves", _by_rig("clipped_in"), Right(1.0, says=SATURATED), Right(1.0, says=SATURATED, never="rough|encoder")),
     ("curves", _by_rig("interference"), Right(1.0, 0.05), Right(1.0, 0.05, says=r"0\.045|45.? µm")),
-    ("curves", _by_rig("ting_two"), None, Right(says="contact.creep|two presses|split", never="period")),
+    ("curves", _by_rig("ting_two"), None, _named("contact_creep", within=0.05)),
     ("curves", _by_rig("tension_few_points"), ONE, Right(1.0, 0.05, never="sphere")),
     ("curves", _by_rig("tension_and_compression"), ONE, Right(1.0, 0.05)),
     ("curves", _by_rig("side_by_side"), Right(0.005), None),

@@ -1,5 +1,6 @@
 """What a curve's declared geometry, its tip and its course make of a diagnosis: no confident number of a wrong law."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,10 +8,14 @@ import pytest
 
 import underskin
 from bench.soak import SOAK
+from tests.mechanisms.contact_elements import Body, force_of_elements
 from tests.recordings.test_sphere_modulus import bonded_layer, whole_sphere
 from tests.support.lean_reports import COSTLY
 from tests.support.sphere_curves import campaign, pressed, ways
-from underskin.recordings.campaign import from_dict
+from underskin.diagnosis.data.dataset import curve_lines
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
+from underskin.recordings.campaign import IndentationRecording, from_dict
+from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
 pytestmark = pytest.mark.slow
@@ -55,6 +60,28 @@ def test_a_neo_hookean_block_lacks_nothing(largest: float) -> None:
     report = diagnosed(block(strain, neo_hookean(strain)))
     assert report.verdict == "no_mismatch"
     assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("pulled", "largest"), [(True, (0.3, 1.5)), (False, (0.08, 0.35))])
+def test_interval_of_neo_hookean_samples(pulled: bool, largest: tuple[float, float]) -> None:
+    """The 95 % interval of E holds that of strips and blocks with an unknown zero, slack and 0.1 to 2 % noise."""
+    random, table, inside = np.random.default_rng(2), load_table(), []
+    for number in range(40):
+        strain = np.linspace(0, random.uniform(*largest), random.integers(30, 300))
+        slack = random.uniform(0, 0.1) * strain[-1] * (number % 2)
+        stretch = 1 + (1 if pulled else -1) * np.maximum(strain - slack, 0)
+        stress = (stretch - stretch**-2) / 3
+        top = float(np.abs(stress).max())
+        zero, noise = top * random.uniform(-0.03, 0.03) * (number % 4 > 1), top * np.exp(random.uniform(-6.9, -3.9))
+        stress = stress + zero + noise * random.standard_normal(len(stress))
+        rows = curve_lines(block(-strain if pulled else strain, -stress), "compression")
+        (fit,) = FittingProblem(rows, table).explain([Request(())])
+        assert fit is not None
+        index = [parameter.name for parameter in fit.model.parameters].index("youngs_modulus")
+        deviation = float(np.sqrt(fit.best.covariance[index, index]))
+        inside.append(abs(fit.point.fit[index]) < 1.96 * deviation)
+        assert deviation < 0.06
+    assert sum(inside) >= 35  # fewer with probability 0.014
 
 
 def test_pulled_strip_told_without_spheres() -> None:
@@ -143,18 +170,30 @@ def test_displacement_wrong_sign_turned_told() -> None:
 def test_not_tried_said_missing() -> None:
     """What was not tried is said first where it may be missing.
 
-    Two presses in one recording, of what relaxes: creep is not tried, and the statement begins with why.
+    A hold of what relaxes, without times: creep is not tried, and the statement begins with why.
     """
-    depth = ways(-0.1, 0.3, -0.1, 0.3, -0.1, samples=80)
-    time = 0.02 * np.arange(len(depth))
-    relaxed = 1 - 0.8 * (1 - np.exp(-(time % 3.2) / 0.8))
-    report = diagnosed(campaign(depth, pressed(depth) * relaxed), "contact_creep")
+    depth = np.concatenate([ways(-0.1, 0.3, samples=80), np.full(160, 0.3), ways(0.3, -0.1, samples=80)])
+    force = force_of_elements(Body(2e-3, 1e6 / 0.75, 0.8, 0.8), depth * 1e-3, 0.02 * np.arange(float(len(depth))))
+    report = diagnosed(campaign(depth, force, timed=False), "contact_creep")
     assert report.verdict in ("unexplained", "ambiguous")
     assert "contact creep was not tried" in report.statement.lower()
-    assert "presses again" in report.statement
+    assert "has no time_s" in report.statement
     if report.verdict == "unexplained":
         assert report.statement.startswith("Contact creep was not tried")
         assert "none of the known mechanisms" not in report.statement
+
+
+def test_several_presses_relax() -> None:
+    """What relaxes is named from several presses in one recording, with E and the share that relaxes."""
+    depth = ways(-0.1, 0.3, -0.1, 0.3, -0.1, samples=80)
+    time = 0.1 * np.arange(float(len(depth)))
+    force = force_of_elements(Body(2e-3, 1e6 / 0.75, 0.4, 1.0), depth * 1e-3, time)
+    noisy = force + 1e-3 * force.max() * np.random.default_rng(1).normal(size=len(force))
+    curve = IndentationRecording("p1", 2.0, depth, noisy, time_s=time)
+    report = diagnosed(replace(campaign(depth, force), recordings=(curve,)), "contact_creep")
+    assert report.verdict == "explained"
+    assert [entry.name for entry in report.mechanisms] == ["contact_creep"]
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.03)
 
 
 def test_swapped_pair_columns_ends_no_traceback() -> None:

@@ -11,7 +11,7 @@ from tests.support.simulated_campaign import Rig, simulate
 from underskin.diagnosis.slips.time_series import as_lines
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode
-from underskin.findings.finding import Finding
+from underskin.findings.finding import Finding, ImplausibleD33
 from underskin.inversion.invert import Inversion, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -195,6 +195,45 @@ def test_modulus_of_no_elastomer_gives_no_d33(table: SigmaTable) -> None:
     found = invert(replace(campaign, recordings=slow), table)
     assert found.campaign_d33 is not None
     assert [one.statement for one in found.findings if one.field == "frequency_hz" and "kHz" in one.statement]
+
+
+def test_gel_under_light_spheres_is_no_slip(table: SigmaTable) -> None:
+    """A gel of kilopascals that bears its spheres has a d33; a modulus in GPa under MPa, where they sink, has none."""
+    gel = Rig(d33=np.array([14.0]), preloads_n=(0.01, 0.02), indenters_mm=(8.0, 10.0), modulus_mpa=5e-3)
+    found = invert(simulate(table, gel, np.random.default_rng(18)), table)
+    assert found.campaign_d33 is not None
+    assert covered(found.campaign_d33, np.array(14.0))
+    slip = Rig(d33=np.array([14.0]), preloads_n=(0.5, 1.0))
+    campaign = simulate(table, slip, np.random.default_rng(18))
+    softer = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=1e-3 * slip.modulus_mpa))
+    with pytest.raises(InvalidInput, match=r"skin.youngs_modulus_mpa: .* was it given in GPa\?"):
+        invert(softer, table)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("pC/gf", 9.80665e-3), ("pC/kgf", 9.80665), ("nC/N", 1e-3)])
+@pytest.mark.parametrize("d33", [12.0, 33.0])
+def test_response_in_another_unit_is_named(table: SigmaTable, unit: str, factor: float, d33: float) -> None:
+    """Where no PVDF has the array's d33, the unit that explains it is named and d33 is not to be quoted, until the
+    units are checked."""
+    campaign = simulate(table, Rig(d33=np.array([d33, d33]), preloads_n=(0.5, 1.0)), np.random.default_rng(18))
+    for row in range(len(campaign.recordings)):
+        campaign = scaled(campaign, row, factor)
+    (told,) = [one for one in invert(campaign, table).findings if one.code == FindingCode.IMPLAUSIBLE_D33]
+    assert unit.split("/")[0] in told.statement
+    if told.arguments["kind"] == ImplausibleD33.NOT_PVDF:
+        assert unit in told.statement
+        assert "not to be quoted" in told.statement
+        checked = invert(replace(campaign, units_checked=True), table).findings
+        assert FindingCode.IMPLAUSIBLE_D33 not in {one.code for one in checked}
+
+
+@pytest.mark.parametrize("lowest_hz", [0.005, 0.02, 0.1])
+def test_frequencies_in_khz_are_named(table: SigmaTable, lowest_hz: float) -> None:
+    """Several lines below what a shaker drives look like kHz; a single slow tone is no slip."""
+    for lines, is_said in ((np.geomspace(lowest_hz, 1.0, 30), True), (np.array([1.0]), False)):
+        campaign = simulate(table, Rig(d33=np.array([14.0]), frequency_hz=lines), np.random.default_rng(18))
+        said = [one for one in invert(campaign, table).findings if one.field == "frequency_hz"]
+        assert any("kHz" in one.statement for one in said) is is_said
 
 
 @pytest.mark.parametrize("mains_hz", [50.0, 60.03])

@@ -191,7 +191,7 @@ def test_body_relaxed_softer_way_back() -> None:
 
 
 def cylinder(strain: Floats) -> Campaign:
-    recording = CompressionRecording("c", 20.0, 30.0, 20.0 * strain, 1.0 + 100 * strain)
+    recording = CompressionRecording("c", 20.0, 30.0, 20.0 * strain, 100 * strain)
     return Campaign("cylinder", SKIN, (recording,))
 
 

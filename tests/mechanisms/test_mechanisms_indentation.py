@@ -24,7 +24,7 @@ from tests.mechanisms.indentation_loops import (
 )
 from tests.support.mechanism_campaigns import fit_of, predicted, table
 from tests.support.sphere_contact import SphereOnLayer
-from underskin.mechanisms import Unsupported, compose
+from underskin.mechanisms import compose
 from underskin.mechanisms.base import Normal
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.physics.elastic_layer import Layer
@@ -96,15 +96,53 @@ def test_noise_displacement_changes_force() -> None:
     assert 0 < relaxing.max() < 1.5 * elastic
 
 
-def test_pressing_again_refused_name_held_noisy() -> None:
-    """Pressing again is refused by name and a held or a noisy loop is not."""
-    for again in (np.concatenate([LOOP, LOOP]), np.concatenate([LOOP[:90], LOOP[70:90][::-1]])):
-        with pytest.raises(Unsupported, match="'i' presses again after it was drawn back"):
-            compose(["contact_creep"], recorded(again), table())
-        assert np.isfinite(force_at(["adhesion"], again)).all()
-    stepped = np.concatenate([LOOP[:40], np.full(20, LOOP[40]), LOOP[40:]])
-    for single in (LOOP, stepped, LOOP + 2e-3 * np.random.default_rng(1).normal(size=len(LOOP))):
-        assert np.isfinite(force_at(["contact_creep"], single)).all()
+@pytest.mark.parametrize(("fraction", "tau"), [(0.5, 3.0), (0.8, 1.0), (0.3, 30.0)])
+@pytest.mark.parametrize("rest", [0, 40])
+def test_pressing_again_meets_unrecovered_surface(fraction: float, tau: float, rest: int) -> None:
+    """Further presses, after a rest in the air or a way back in contact, are those of independent elements."""
+    again = (0.01 + LOOP, np.linspace(-0.1, 0.3, 40), np.linspace(0.3, 0.1, 20), np.linspace(0.1, 0.45, 30))
+    path = np.concatenate([LOOP, np.full(rest, -0.1), *again])
+    exact = force_of_elements(Body(R, REDUCED, fraction, tau), path * 1e-3, TIME * np.arange(float(len(path))))
+    found = force_at(["contact_creep"], path, relaxed_fraction=fraction, relaxation_time=tau)
+    assert np.abs(found - exact).max() < 4e-4 * exact.max()
+    assert (found == 0).tolist() == (exact == 0).tolist()
+
+
+def test_pressing_again_like_once() -> None:
+    """A press after a long rest is like the first one; a power law is followed too."""
+    for values in (CREEP, {"relaxed_fraction": 0.0, "relaxation_time": 1.0, "relaxation_exponent": 0.15}):
+        once = force_at(["contact_creep"], LOOP, **values)
+        longest = TIME * len(LOOP) * (1e4 if "relaxation_exponent" in values else 10.0)
+        time = TIME * np.arange(float(len(LOOP)))
+        recording = IndentationRecording(
+            "i", 4.0, np.tile(LOOP, 2), np.tile(once, 2), time_s=np.r_[time, time + longest]
+        )
+        campaign = replace(recorded(LOOP), recordings=(recording,))
+        twice = predicted(["contact_creep"], campaign, **{"contact_point i": 0.0, **values})
+        assert np.abs(twice[: len(LOOP)] - once).max() < 1e-3 * once.max()
+        assert np.abs(twice[len(LOOP) :] - once).max() < 0.02 * once.max()
+
+
+@pytest.mark.parametrize(
+    ("kept", "of_kept", "gone", "limit"),
+    [
+        ([], {}, "contact_creep", {"relaxed_fraction": 0.0, "relaxation_time": 3.0}),
+        (
+            ["strain_stiffening"],
+            {"stiffening_coefficient": 0.5},
+            "contact_creep",
+            {"relaxed_fraction": 0.0, "relaxation_time": 3.0},
+        ),
+        (["adhesion"], {"work_of_adhesion": 0.5}, "contact_creep", {"relaxed_fraction": 0.0, "relaxation_time": 3.0}),
+        (["contact_creep"], CREEP, "adhesion", {"work_of_adhesion": 0.0}),
+        (["contact_creep"], CREEP, "instrument_compliance", {"stage_stiffness": np.inf}),
+    ],
+)
+def test_pressing_again_limits(kept: list[str], of_kept: dict[str, float], gone: str, limit: dict[str, float]) -> None:
+    """Each law leaves the others alone where it vanishes, also of a sphere that presses again."""
+    path = np.concatenate([LOOP, LOOP])
+    alone = force_at(kept, path, **of_kept)
+    assert np.abs(force_at([*kept, gone], path, **of_kept, **limit) - alone).max() < 1e-4 * alone.max()
 
 
 # Limits: each mechanism leaves the others' law alone where it vanishes.

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from tests.support.sphere_curves import campaign, hertz, pressed, ways
+from underskin import read_file
 from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
+from underskin.recordings import rig_description
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.curve_preparation import falling, periodic_error
-from underskin.recordings.plausibility import implausible
+from underskin.recordings.damaged_readings import marks, spikes
+from underskin.recordings.plausibility import at_reading, implausible
 
 pytestmark = pytest.mark.slow
 
@@ -113,6 +116,56 @@ def test_steps_converter_hold_no_saturation() -> None:
     steps = hertz(np.array(0.3)) / 60
     assert implausible(campaign(depth, np.round(pressed(depth) / steps) * steps)) == []
     assert implausible(campaign(depth, pressed(depth, noise=0.0))) == []
+
+
+@pytest.mark.parametrize("mark", [-1.0, 0.0, 999.0])
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_marks_for_no_reading_left_out(mark: float, share: float) -> None:
+    """A number that an instrument writes where it has no reading is told and left out; coarse steps in the air and
+    rests between presses are no marks."""
+    depth = ways(-0.1, 0.3, -0.1)
+    force = pressed(depth) + 0.05
+    marked = np.random.default_rng(4).permutation(len(force))[: int(share * len(force))]
+    force[np.arange(0, len(force), int(1 / share)) if share == 0.5 else marked] = mark
+    read = campaign(depth, force)
+    finding = only(read)
+    assert finding.code == "damaged_samples"
+    assert finding.arguments["samples"] == int((force == mark).sum())
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
+    coarse = np.tile(np.round(pressed(ways(-0.1, 0.3, -0.1, samples=40)), 2), 20)
+    assert not marks(coarse).any()
+    assert not marks(np.tile([0.0, 0.0, 0.0, 0.3, 0.7, 0.3], 40)).any()
+
+
+def test_marks_turn_no_sign() -> None:
+    """Marks of -999 do not make the force of a file fall as it is pressed."""
+    depth = ways(-0.1, 0.3, -0.1)
+    force = pressed(depth)
+    force[np.random.default_rng(5).permutation(len(force))[:60]] = -999.0
+    rows = [f"{one:.5f},{other:.6f}" for one, other in zip(depth, force, strict=True)]
+    described = """{"schema": "rig/1", "name": "n", "kind": "indentation", "skin": {"poisson_ratio": 0.5},
+    "recording": {"indenter_radius_mm": 2}, "channels": {"displacement_mm": {"channel": "z (mm)"},
+    "force_n": {"channel": "F (N)"}}}"""
+    rig = rig_description.parse(described.encode(), "rig.json")
+    read = read_file("\n".join(["z (mm),F (N)", *rows]).encode(), "curve.csv", rig)
+    assert modulus_mpa(read.campaign) == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("spike", [50.0, -50.0])
+def test_spike_left_out(spike: float) -> None:
+    """A reading far beyond the range of all others is told and left out, and the end of a steep curve is none."""
+    depth = ways(-0.1, 0.3, -0.1)
+    force = pressed(depth)
+    force[[150, 300, 301]] = spike
+    read = campaign(depth, force)
+    finding = only(read)
+    assert (finding.code, finding.arguments["samples"]) == ("damaged_samples", 3)
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
+    assert [one.code for one in at_reading(read)] == ["damaged_samples"]
+    steep = np.append(pressed(ways(-0.1, 0.3)), [2.0, 5.0, 20.0, 100.0])
+    assert not spikes(steep).any()
+    stuck = np.concatenate([np.zeros(200), np.linspace(0.0, -9.0, 20), np.zeros(200)]) + 0.1 * np.sin(np.arange(420))
+    assert not spikes(stuck).any()
 
 
 @pytest.mark.parametrize("period_mm", [0.02, 0.045])

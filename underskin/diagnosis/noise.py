@@ -12,9 +12,10 @@ Error that the samples of a curve share under every hypothesis. A cell has a zer
 times, in the order of the samples) or along the travel (its gain is the recording's, as of FRFs): columns P with normal
 coefficients, scaled to the prior's standard deviation. Where samples in the air show the zero, F0 is practically free;
 else a tared cell is within a hundredth of the largest force. The drift over the curve is 2 % of the largest force, or a
-larger one that the air shows; without air there is none. The position of the surface, friction in a stage and the
-idealisation of every law also bend a curve a little. With s the force (at least 0.7 of the largest near the beginning
-of contact and 0.2 in the air), x the position along the curve (`path_fractions`) and η the size,
+larger one that the air shows; without air there is none. Of a cylinder, F0 is within a fiftieth of the largest force,
+as for its modulus, and there is no drift. The position of the surface, friction in a stage and the idealisation of
+every law also bend a curve a little. With s the force (at least 0.7 of the largest near the beginning of contact and
+0.2 in the air), x the position along the curve (`path_fractions`) and η the size,
 
     ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
 

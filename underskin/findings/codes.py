@@ -162,6 +162,8 @@ class Reason(StrEnum):
     D33_OF_ROW = "implausible_d33.row"
     DEFECT = "damaged_samples"
     DEFECTS_LEFT_OUT = "damaged_samples.left_out"
+    READINGS_MARKED = "damaged_samples.marked"
+    READINGS_BEYOND = "damaged_samples.beyond"
     LINES_LEFT_OUT = "lines_left_out"
     FORCE_ACTS_ONCE = "force_acts_once"
     MAINS_IN_CHARGE = "mains_in_charge"

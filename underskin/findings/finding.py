@@ -31,6 +31,11 @@ class UnitGuess:
     meant: tuple[tuple[float, str], ...] = ()
     off_by: int = 0
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The units in which it may have been given."""
+        return tuple(unit for _, unit in self.meant if unit)
+
     def __str__(self) -> str:
         """The slip in words."""
         if self.size == 0:
@@ -58,7 +63,8 @@ class ImplausibleD33(StrEnum):
             self.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
             self.TOO_SMALL: "less than sensors have: was mV/nC meant, not mV/pC, or mN, not N, or nC, not pC?",
             self.NEGATIVE: "negative: is the sign of charge or force turned?",
-            self.NOT_PVDF: "which PVDF cannot have: it and its copolymers have 10 to 40",
+            self.NOT_PVDF: "which PVDF cannot have (it and its copolymers have 10 to 40), and not to be quoted unless "
+            "units_checked confirms it",
         }[self]
 
 
@@ -320,6 +326,7 @@ _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g}
 _OF_ARRAY = "{percent:.0f} % of the array's d33"
 _MORE_ROWS = "{more: ({more} more rows like it)|}"
 _UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
+_GIVEN_IN = "{units:; was charge over force given in {units:or}?|}"
 _RESPONSE = "1000 × too {too_large:large: pC taken for nC, or N for mN?|small: nC taken for pC?}"
 _NEEDED = (
     "force and displacement would need a modulus of about {modulus_mpa:.2g} MPa: "
@@ -407,7 +414,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.TWO_RESPONSES: "the two recordings' responses are {ratio:.3g} times as far apart as expected: a slip of "
     "units?",
     Reason.D33_NEEDED: "charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N"
-    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}; it looks {_RESPONSE}",
+    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}{_GIVEN_IN}",
     Reason.PLACES: f"places lie at their own sensors only {_THOUSANDFOLD}: were they given in {{given_in}}, or the "
     f"sensors in "
     "{sensors_in}?",
@@ -494,11 +501,15 @@ ENGLISH: Mapping[Reason, Words] = {
     "and places right?",
     Reason.TIME_TO_COME: "recorded_at is {written}, which is still to come: is the year a slip?{more:more recording}",
     Reason.TIME_TOO_OLD: "recorded_at is {written}, before {year}: was the clock not set?{more:more recording}",
-    Reason.D33_FITTED: "d33 comes out as {d33_pc_per_n:.4g} pC/N, {kind:implausible}",
-    Reason.D33_OF_ARRAY: "d33 of the array is {d33_pc_per_n:.3g} pC/N, {kind:implausible}",
+    Reason.D33_FITTED: f"d33 comes out as {{d33_pc_per_n:.4g}} pC/N, {{kind:implausible}}{_GIVEN_IN}",
+    Reason.D33_OF_ARRAY: f"d33 of the array is {{d33_pc_per_n:.3g}} pC/N, {{kind:implausible}}{_GIVEN_IN}",
     Reason.D33_OF_ROW: f"d33 is {{d33_pc_per_n:.3g}} pC/N, {{kind:implausible}}{_MORE_ROWS}",
     Reason.DEFECT: DEFECT,
     Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",
+    Reason.READINGS_MARKED: "{samples} readings of the force ({percent:.2g} %) are {value_n:.4g} N each, far off those "
+    "beside them: the instrument's mark for no reading? They were left out",
+    Reason.READINGS_BEYOND: "{samples} reading(s) of the force, up to {value_n:.4g} N, lie far beyond the range of all "
+    "others and last no longer than a sample or two: damaged? They were left out",
     Reason.LINES_LEFT_OUT: lines_left_out,
     Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
     "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "

@@ -270,7 +270,12 @@ _CONTRADICTS = 3.0  # times
 
 
 def findings_of(
-    recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats, array: Estimate | None
+    recorded: Sequence[FrfRecording],
+    measured: Sequence[Frf],
+    level: Floats,
+    array: Estimate | None,
+    *,
+    units_checked: bool,
 ) -> tuple[Finding, ...]:
     """Findings on time series: defects, bias by noise, and a mean force that contradicts the preload; and on errors of
     units and sign of the level [C/N] and of the array's d33."""
@@ -281,7 +286,10 @@ def findings_of(
     ]
     typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
     unit_errors = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]
-    implausible = [] if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
+    implausible = []
+    if array is not None:
+        d33 = float(to_lab("d33_pc_per_n", array.value))
+        implausible = plausibility.of_array(Reason.D33_OF_ARRAY, d33, units_checked=units_checked)
     preloads = [finding for recording in recorded if (finding := _preload_contradiction(recording)) is not None]
     return (*defects, *noise_findings(measured), *preloads, *unit_errors, *implausible)
 
@@ -463,7 +471,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     common_uncertainty = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
     inversion = _estimated(ids, rows, contact, zone).wider(common_uncertainty)
     filtered = of_roll_off(roll_off(frfs, zone, level), zone)
-    others = findings_of(recorded, measured, level, inversion.campaign_d33)
+    others = findings_of(recorded, measured, level, inversion.campaign_d33, units_checked=campaign.units_checked)
     if filtered:  # whose phase hides the sign
         others = tuple(finding for finding in others if finding.arguments.get("kind") != ImplausibleD33.NEGATIVE)
     findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *others)

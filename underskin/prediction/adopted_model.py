@@ -222,7 +222,7 @@ def implausible_d33(report: Mapping[str, Any]) -> str | None:
         return None
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
     implausible = plausibility.implausibility(d33)
-    return None if implausible is None else f"{d33:.4g} pC/N, {implausible}"
+    return None if implausible is None else f"{d33:.4g} pC/N, {implausible.words}"
 
 
 def _on_fit(parameter: Parameter, value: float) -> float:

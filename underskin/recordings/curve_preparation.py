@@ -25,6 +25,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, CurveRecording, samples_of
 from underskin.recordings.curve_course import is_one_sided, roughness
+from underskin.recordings.damaged_readings import marks, spikes, without_damaged
 from underskin.units import Floats, Indices, Mask
 
 FORCE, TRAVEL = "force_n", "displacement_mm"
@@ -74,7 +75,8 @@ def orientation(recording: CurveRecording) -> Orientation:
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
     """The columns that fall during loading, for force and travel of a sphere or a block, (samples,) in any unit."""
-    return _oriented(force, travel, sphere=sphere).negative
+    rows = ~(marks(force) | spikes(force))
+    return _oriented(force[rows], travel[rows], sphere=sphere).negative
 
 
 def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
@@ -566,8 +568,9 @@ def prepared(campaign: Campaign) -> PreparedCurves:
     def changed(curve: CurveRecording) -> CurveRecording:
         if are_exchanged(curve):
             return curve
-        curve, curve_findings = _without_saturation(curve)
-        findings.extend(curve_findings)
+        curve, of_damage = without_damaged(curve)
+        curve, of_saturation = _without_saturation(curve)
+        findings.extend((*of_damage, *of_saturation))
         oriented = orientation(curve)
         oriented_curves.append((curve, oriented))
         for step in (_turned, _forwards, _without_periodic_error):

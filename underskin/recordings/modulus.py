@@ -56,7 +56,7 @@ _LEAST_STRETCH = 0.05  # least λ
 _ROUNDS = 2  # iterations for the foot of the curve, from which strain counts
 _FOOT_RANGE, _FEET = 0.5, 41  # of the strain of a part: where its foot is sought; feet tried
 _STEP = 1e-4  # of the range of strain, for a derivative
-_ZERO_SD = 0.02  # of the largest force: a cell's zero, 0.1 % of its range where a sample uses a twentieth of that
+ZERO_SD = 0.02  # of the largest force: a cell's zero, 0.1 % of its range where a sample uses a twentieth of that
 _FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
 _SMOOTH = 5  # degree of the polynomial that represents a curve of few points
 _LONGER = 1.15  # ratio of strain ranges beyond which the law of the longer range is chosen
@@ -152,7 +152,7 @@ def _by_law(
             moved = -float(level / slope) if slope > 0 else 0.0
         foot, strain = foot + sign * height * moved, strain - moved
     stretched = law(strain)
-    zero = max(_ZERO_SD * float(np.abs(binned).max()), 1e-300)
+    zero = max(ZERO_SD * float(np.abs(binned).max()), 1e-300)
     columns = np.column_stack([stretched[part], np.ones(last + 1 - first)])
     slope, level = (float(value) for value in np.linalg.lstsq(columns, binned[part], rcond=None)[0])
     if not straight:
@@ -199,8 +199,8 @@ class _Block:
 
 
 def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise: float) -> float:
-    """The strain at which the sample is unloaded, by least squares with a zero of the force known to `_ZERO_SD`."""
-    weight = noise / max(_ZERO_SD * float(np.abs(stress).max()), 1e-300)
+    """The strain at which the sample is unloaded, by least squares with a zero of the force known to `ZERO_SD`."""
+    weight = noise / max(ZERO_SD * float(np.abs(stress).max()), 1e-300)
 
     def misfit(foot: float) -> float:
         columns = np.column_stack([law(strain - foot), np.ones_like(strain)])
@@ -215,7 +215,7 @@ def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise
 
 def _with_zero(columns: Floats, stress: Floats, weight: float) -> tuple[Floats, float]:
     """The coefficients of two columns, the second with a prior around 0 of this weight, and the sum of squares."""
-    weight = float(np.hypot(weight, _STRAIGHT / _ZERO_SD))  # nor is the law better known than by its departure
+    weight = float(np.hypot(weight, _STRAIGHT / ZERO_SD))  # nor is the law better known than by its departure
     rows, values = np.vstack([columns, [0.0, weight]]), np.append(stress, 0.0)
     fitted: Floats = np.linalg.lstsq(rows, values, rcond=None)[0].astype(np.float64)
     rest = values - rows @ fitted

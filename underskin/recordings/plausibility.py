@@ -18,10 +18,12 @@ from scipy.spatial import KDTree
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding, ImplausibleD33
+from underskin.physics import hertz
+from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import curve_course
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor
 from underskin.recordings.curve_preparation import prepared
-from underskin.units import LAB, Floats, Mask, unit_guess, unusual
+from underskin.units import LAB, Floats, Mask, to_si, unit_guess, unusual
 
 _EARLIEST = datetime(1990, 1, 1, tzinfo=UTC)  # clocks that were never set begin in 1904, 1970 or 1980
 _ZONES = timedelta(days=1)  # a time without a zone is taken as UTC
@@ -36,7 +38,7 @@ def implausible(campaign: Campaign) -> list[Finding]:
 
 def at_reading(campaign: Campaign) -> list[Finding]:
     """`implausible`, with slips of units of curves and of the dynamic force of all FRFs."""
-    slips = [*curve_course.implausible(campaign), *loose_sphere(campaign.of(FrfRecording))]
+    slips = [*curve_course.implausible(prepared(campaign).campaign), *loose_sphere(campaign.of(FrfRecording))]
     return [*implausible(campaign), *slips]
 
 
@@ -114,6 +116,7 @@ def nearest_pair(sensors: Sequence[Sensor]) -> tuple[float, int, int] | None:
 UNUSED_FOR_D33 = ("frequency_hz", "coherence")
 _PRELOADS_N = (0.01, 150.0)  # of stages: least for the highest preload of a campaign, most for the lowest
 _FREQUENCIES_HZ = (0.5, 2e4)  # of shakers and charge amplifiers: range of the highest line of a campaign
+_LEAST_SWEEP_HZ = 2.0  # of the highest of several lines: below it shakers end and charge amplifiers roll off
 _LEAST_PAUSE_S = 5.0  # no sweep takes less
 _SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency
 _ELASTOMERS_MPA = (0.02, 100.0)  # from gels to the hardest (Ashby, Materials Selection in Mechanical Design, fig. 4.3)
@@ -126,16 +129,16 @@ _GEOMETRY = ("thickness_mm", "sensor_radius_mm", "width_mm", "length_mm")
 def unlikely(campaign: Campaign, recordings: Sequence[FrfRecording], lines: Sequence[Floats]) -> list[Finding]:
     """Findings on magnitudes of the skin, or common to all recordings, that look like a wrong unit; `lines`: the
     frequencies of each recording [Hz]."""
-    return [*_of_skin(campaign), *_of_recordings(recordings), *_of_frequencies(recordings, lines)]
+    return [*_of_skin(campaign, recordings), *_of_recordings(recordings), *_of_frequencies(recordings, lines)]
 
 
-def _of_skin(campaign: Campaign) -> list[Finding]:
+def _of_skin(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
     skin = campaign.skin
     assert skin.youngs_modulus_mpa is not None
     findings = []
     low, high = _ELASTOMERS_MPA
     modulus = skin.youngs_modulus_mpa
-    if not low <= modulus <= high:
+    if modulus > high or (modulus < low and _sink(modulus, recordings)):
         arguments = {
             "modulus_mpa": modulus,
             "low_mpa": low,
@@ -149,6 +152,14 @@ def _of_skin(campaign: Campaign) -> list[Finding]:
     if pitch is not None and pitch > _WIDEST_PITCH_MM:
         findings.append(Finding(Reason.WIDE_PITCH, "", "skin.sensors", {"pitch_mm": pitch}))
     return findings
+
+
+def _sink(modulus_mpa: float, recordings: Sequence[FrfRecording]) -> bool:
+    """Whether a sphere would sink into a skin this soft, a contact wider than the sphere by Hertz; a gel that bears
+    its spheres is no slip."""
+    preload = np.array([recording.preload_n for recording in recordings])
+    radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])
+    return bool((hertz.contact_radius(preload, radius, 1e6 * modulus_mpa, INCOMPRESSIBLE) > radius).any())
 
 
 def _of_recordings(recordings: Sequence[FrfRecording]) -> list[Finding]:
@@ -177,7 +188,7 @@ def _of_frequencies(recordings: Sequence[FrfRecording], lines: Sequence[Floats])
         min(float(frequency.min()) for frequency in lines),
         max(float(frequency.max()) for frequency in lines),
     )
-    slow = lowest < _SLOW_HZ[0] and highest < _SLOW_HZ[1]
+    slow = (lowest < _SLOW_HZ[0] and highest < _SLOW_HZ[1]) or lowest < highest < _LEAST_SWEEP_HZ
     for wrong, too_large, unit in (
         (highest > _FREQUENCIES_HZ[1], True, "mHz"),
         (slow or highest < _FREQUENCIES_HZ[0], False, "kHz"),
@@ -205,20 +216,21 @@ def _pause_s(recordings: Sequence[FrfRecording]) -> float | None:
 
 
 _LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: range of all reported sensors of skins
-_OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
+OF_PVDF = 1.0, 100.0  # pC/N: PVDF and its copolymers have 10 to 40
 
 
-def of_array(d33: float) -> list[Finding]:
-    """A finding on an implausible d33 of an array [pC/N]."""
-    implausible = implausibility(d33)
-    arguments = {"d33_pc_per_n": d33, "kind": implausible}
-    return [] if implausible is None else [Finding(Reason.D33_OF_ARRAY, "", "d33_pc_per_n", arguments)]
+def of_array(reason: Reason, d33: float, *, units_checked: bool) -> list[Finding]:
+    """A finding, for this reason, on an implausible d33 of an array [pC/N]."""
+    implausible = implausibility(d33, units_checked=units_checked)
+    units = unit_guess("d33_pc_per_n", d33, OF_PVDF).units if implausible is ImplausibleD33.NOT_PVDF else ()
+    arguments = {"d33_pc_per_n": d33, "kind": implausible, "units": units}
+    return [] if implausible is None else [Finding(reason, "", "d33_pc_per_n", arguments)]
 
 
-def implausibility(d33: float) -> ImplausibleD33 | None:
-    """Why PVDF cannot have a d33 [pC/N]; None of one that it may have."""
+def implausibility(d33: float, *, units_checked: bool = False) -> ImplausibleD33 | None:
+    """Why PVDF cannot have a d33 [pC/N]; None of one that it may have, and where the units of another are checked."""
     implausible = next((implausible for implausible, rows in _implausible_rows(np.array(d33)).items() if rows), None)
-    if implausible is not None or _OF_PVDF[0] <= d33 <= _OF_PVDF[1]:
+    if implausible is not None or units_checked or OF_PVDF[0] <= d33 <= OF_PVDF[1]:
         return implausible
     return ImplausibleD33.NOT_PVDF
 

@@ -17,6 +17,7 @@ from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import KINDS, SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values
 from underskin.recordings.curve_preparation import falling
+from underskin.recordings.damaged_readings import marks, spikes
 from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.channel_arithmetic import FIELD
 from underskin.recordings.readers.unit_labels import (
@@ -358,8 +359,10 @@ class MappedBlock:
         signs = [self.rig.channels[name].sign for name in ("displacement_mm", "force_n") if name in self.rig.channels]
         if len(signs) < 2 or None not in signs or len(columns["displacement_mm"]) != len(columns["force_n"]):
             return
+        travel, force = (np.asarray(columns[name], dtype=float) for name in ("displacement_mm", "force_n"))
         with np.errstate(all="ignore"):
-            covariance = np.mean(_centred(columns["displacement_mm"]) * _centred(columns["force_n"]))
+            rows = ~(marks(force) | spikes(force))
+            covariance = np.mean(_centred(travel[rows]) * _centred(force[rows]))
         if covariance < 0:
             reason = "force falls as the displacement grows, and compression is positive here"
             sign_field = Mention("sign", "sign: 1, -1 or auto")

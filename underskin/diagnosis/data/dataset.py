@@ -47,6 +47,7 @@ from underskin.recordings.campaign import (
 )
 from underskin.recordings.curve_course import CurveLandmarks, curve_landmarks, foot, hidden_samples, roughness
 from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.modulus import ZERO_SD
 from underskin.units import Complexes, Floats, Indices, Mask
 
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
@@ -662,7 +663,8 @@ def _error(
     indentation's contact, `samples` as in CurveError."""
     largest = float(np.abs(force).max()) or 1.0
     if kind == "compression":
-        return CurveError(np.full(len(force), largest), path_fraction, np.zeros((len(force), 0)), *samples)
+        of_zero = np.full((len(force), 1), ZERO_SD * largest)
+        return CurveError(np.full(len(force), largest), path_fraction, of_zero, *samples)
     in_air = np.abs(force) < 4 * seen.noise + 1e-3 * largest
     if seen.pull_off is None and seen.snap_in is None:
         in_air &= displacement < displacement[np.argmax(displacement)]

@@ -351,7 +351,10 @@ class Facts:
                 and finding.arguments["affected"] == finding.arguments["recordings"]
                 for finding in diagnosis.findings
             ),
-            "no PVDF has such a value": plausibility.implausibility(d33["value"]) is not None,
+            "no PVDF has such a value": plausibility.implausibility(
+                d33["value"], units_checked=self.problem.lines.campaign.units_checked
+            )
+            is not None,
             f"the error in the recordings, {in_digits(error, 2)} %, is well above their noise": not (
                 error <= cross_validation.REACHES_NOISE * floor
             ),
@@ -376,10 +379,9 @@ class Facts:
         """The report's `findings`: those of the recordings, then those on the fit and on d33."""
         further = [*self._fit_findings(), *self._contacts_kept(), *self._thickness_unknown()]
         number = self.d33.number
-        implausible = None if number is None else plausibility.implausibility(number["value"])
-        if number is not None and implausible is not None:
-            arguments = {"d33_pc_per_n": number["value"], "kind": implausible}
-            further.append(Finding(Reason.D33_FITTED, "", "d33_pc_per_n", arguments))
+        if number is not None:
+            checked = self.problem.lines.campaign.units_checked
+            further += plausibility.of_array(Reason.D33_FITTED, number["value"], units_checked=checked)
         return [finding.in_report() for finding in (*self.diagnosis.findings, *further)]
 
     def _fit_findings(self) -> list[Finding]:

@@ -13,12 +13,14 @@ from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composition import D33
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
-from underskin.units import Floats, Mask
+from underskin.recordings.plausibility import OF_PVDF
+from underskin.units import Floats, Mask, unit_guess
 
 SLIP = 1000.0  # between neighbouring units
 MOST_SHARE = 0.25  # of the recordings; more are no slip of single ones
 _WIDTH = np.log(12.0)  # of ln 1000: values that are meant to be equal differ by less
 _FAINT = 5e-4  # dynamic force over preload: instruments resolve no less
+_D33 = "d33_pc_per_n"
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
 _FIELDS = {  # the units that make values too large, and too small
     "preload_n": ("mN", "kN"),
@@ -104,5 +106,6 @@ def unlikely_d33(ratio: Floats, declared: float | None) -> list[Finding]:
         low, high = abs(declared) / SLIP * np.exp(_WIDTH), abs(declared) * SLIP / np.exp(_WIDTH)
     if low <= d33 <= high:
         return []
-    arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "too_large": bool(d33 > high)}
+    usual = (low, high) if declared else OF_PVDF
+    arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "units": unit_guess(_D33, d33, usual).units}
     return [Finding(Reason.D33_NEEDED, "", "frf_re_pc_per_n", arguments)]

@@ -10,7 +10,6 @@ from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Para
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.campaign import CompressionConditions, Conditions, CurveConditions, IndentationConditions
-from underskin.recordings.curve_course import presses_again
 from underskin.units import Floats
 
 # Curves that add no information by their times: share of the span, of the duration; ratio of speeds
@@ -71,8 +70,9 @@ class ContactCreep(Mechanism):
     between). With adhesion the edge lets go where it carries the stretch ℓ of JKR's contact at the instantaneous
     modulus, of a power law that within a fifth of the shortest time between two samples. Where the modulus stiffens
     too, all of the force is multiplied by its ratio at the contact radius of the moment. A stage gives by the relaxed
-    force. A sphere that presses again after it was drawn back meets a surface that has not recovered: refused. A
-    cylinder: F(t) = ∫₀^t e(t−s) du(s)."""
+    force. A sphere that presses again after it was drawn back meets a surface that has not recovered: each ring of the
+    contact is a spring of the relaxing body, left without force while the sphere is off it (exact for a half space),
+    and adhesion then adds what it adds on the elastic body. A cylinder: F(t) = ∫₀^t e(t−s) du(s)."""
     source = """Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; Greenwood & Johnson,
     Phil. Mag. A 43 (1981) 697 (the modulus that a moving edge sees); Bonfanti, Kaplan, Charras & Kabla, Soft Matter 16
     (2020) 6002 (power laws)."""
@@ -80,8 +80,7 @@ class ContactCreep(Mechanism):
     order = 30
     kinds = ("frf", "indentation", "compression")
     axes = ("dwell_s", "preload_n", "indenter_radius_mm", "time_s")
-    needs = """frf: dwell_s of every recording, not all the same; curves: time_s, and two speeds, a hold or a way back;
-    indentations: one way in and one back"""
+    needs = "frf: dwell_s of every recording, not all the same; curves: time_s, and two speeds, a hold or a way back"
     reads = ("dwell_s",)
     parameters_stated = _FRF
 
@@ -111,7 +110,7 @@ class ContactCreep(Mechanism):
                 return f"recording {lacking[0]!r} has no time_s"
             if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time cannot be told from displacement"
-            return _repeated_press(conditions)
+            return None
         dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
         lacking = [name for name, value in dwell.items() if value is None]
         if lacking:
@@ -144,16 +143,6 @@ def _times(conditions: Conditions) -> list[Floats]:
     return [
         recording.time_s for recording in indentations if recording.time_s is not None and len(recording.time_s) > 1
     ]
-
-
-def _repeated_press(conditions: Conditions) -> str | None:
-    """A refusal of the first indentation that presses in again after its way back; None without one."""
-    for recording in conditions.recordings:
-        if isinstance(recording, IndentationConditions) and presses_again(recording.displacement_mm):
-            return (
-                f"recording {recording.id!r} presses again after it was drawn back: give each way in and back by itself"
-            )
-    return None
 
 
 def time_runs_with_displacement(recordings: Sequence[CurveConditions]) -> bool:

@@ -5,8 +5,9 @@ Derivatives are central differences, exact to about 1e-8: the shifted points are
 the central one. Contact points are shifted all at once, since each moves one curve only.
 
 Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
-platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. Stages: declared value → nominal stress
-of the material → friction at the platens → relaxation.
+platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. A sample that is only compressed or only
+pulled is slack, F = 0, before d0. Stages: declared value → nominal stress of the material → friction at the platens →
+relaxation.
 """
 
 from abc import ABC, abstractmethod
@@ -35,6 +36,7 @@ from underskin.recordings.campaign import (
     CurveConditions,
     SkinDescription,
 )
+from underskin.recordings.curve_course import is_one_sided
 from underskin.recordings.modulus import of_compression
 from underskin.units import Floats, Indices, Mask, to_si
 
@@ -174,6 +176,7 @@ class CompressionModel(CurveModel):
         diameter = to_si("sample_diameter_mm", [recording.sample_diameter_mm for recording in recordings])[:, None]
         self._area = np.pi / 4 * diameter**2
         self._shape_factor = diameter / (4 * self._height)
+        self._loaded = np.array([_loaded(recording) for recording in recordings])[:, None]
 
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
@@ -188,6 +191,7 @@ class CompressionModel(CurveModel):
 
     def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
         strain = (self.displacement - contact) / self._height
+        strain = np.where(self._loaded * strain < 0, 0.0, strain)  # slack
         force = curve.modulus_at_rest * self._area * self._relative_stress(curve, strain)
         relaxation = curve.relaxes
         if relaxation is not None:
@@ -209,6 +213,13 @@ class CompressionModel(CurveModel):
         if curve.platen_friction is None:
             return stress
         return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * numbers(curve.platen_friction)))
+
+
+def _loaded(recording: CompressionConditions) -> float:
+    """1 of a cylinder that is only compressed, −1 of one that is only pulled, 0 of both: one is slack before."""
+    if not isinstance(recording, CompressionRecording) or not is_one_sided(recording.force_n):
+        return 0.0
+    return 1.0 if recording.force_n.max() > -recording.force_n.min() else -1.0
 
 
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:

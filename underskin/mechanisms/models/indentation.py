@@ -35,7 +35,9 @@ multiplied by the stiffening ratio at the present contact. Where only the rings 
 contact is elastic with modulus E(0) e at the depth [(1−g) δ + Σ g Y]/e and the work of separation over e²; it ends at
 that contact's pull-off. Y is the fading memory of δ (relaxation). δ and u are linear between samples. Exact for half
 space and layer through one growth and one shrinkage of the contact, with holds in between; in small returns on the way
-(noise) rings are assumed to stick, larger ones are rejected by contact_creep.
+(noise) rings are assumed to stick. Where a sphere presses again the surface may not have recovered: the rings are
+marched as springs side by side (`ring_rows`), exact on a half space through any history of a round contact (Popov, Heß
+& Willert, Handbook of Contact Mechanics, 2019, chapter 8), and adhesion is added as on the elastic body.
 
 Arrays are (points, curves, samples), with 1 where nothing differs: points of the fit coordinates, samples of a
 curve. The functions of a are compiled (sphere_kernels).
@@ -67,11 +69,18 @@ from underskin.mechanisms.models.sphere_kernels import (
     edge_rows,
     pull_off_rows,
     radius_rows,
+    ring_rows,
 )
 from underskin.physics.elastic_layer import LARGEST_A_OVER_H, Layer, curves_of
 from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
-from underskin.recordings.curve_course import curve_landmarks, snap_in_interval, touch, visible_contact
+from underskin.recordings.curve_course import (
+    curve_landmarks,
+    presses_again,
+    snap_in_interval,
+    touch,
+    visible_contact,
+)
 from underskin.recordings.modulus import estimate
 from underskin.surrogate.hdf5_format import load_contact
 from underskin.units import Floats, Indices, Mask, to_si
@@ -291,12 +300,13 @@ class Path:
     """The commanded `travel` [m] and `time` [s] of the samples (points, curves, samples).
 
     `first_contact` (points, curves): index of the sample at which contact starts, the first or one that was moved to
-    the touch; the number of samples without contact.
+    the touch; the number of samples without contact. `again` (curves,): which press again after a way back.
     """
 
     travel: Floats
     time: Floats
     first_contact: Indices
+    again: Mask
 
     @property
     def touched(self) -> Mask:
@@ -311,6 +321,15 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     """
     if np.any(sphere.compliance):
         sphere = replace(sphere, compliance=0.0)
+    if path.again.all():
+        return _relaxing_again(sphere, relaxation, adhesion, path)
+    if path.again.any():
+        parts = [
+            relaxing(sphere, relaxation, adhesion, replace(path, again=np.full(len(path.again), again)))
+            for again in (False, True)
+        ]
+        force, contact_mask = (np.where(path.again[:, None], last, first) for first, last in zip(*parts, strict=True))
+        return force, contact_mask
     first_contact, started = np.minimum(path.first_contact, path.travel.shape[-1] - 1)[..., None], path.touched
     number = np.arange(path.travel.shape[-1])
     depth = np.where(started, path.travel, 0.0)
@@ -356,6 +375,32 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
         of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
         answer, contact_mask = np.where(touch, of_touch, answer), np.where(touch, holds, contact_mask)
     return np.where(contact_mask, answer, 0.0), contact_mask
+
+
+_RINGS = 128  # of a contact: F is straight between them, within 3e-5 of the largest
+
+
+def _relaxing_again(
+    sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
+) -> tuple[Floats, Mask]:
+    """As `relaxing`, of spheres that press again."""
+    depth = np.where(path.touched, path.travel, 0.0)
+    reach = np.maximum(depth.max(axis=-1, keepdims=True), _SMALLEST) * np.linspace(0.0, 1.0, _RINGS + 1) ** 2
+    slope = np.diff(_elastic(sphere, sphere.radius_at(reach, None), None)[0]) / np.diff(reach)
+    force, edge = np.zeros(depth.shape), np.full(depth.shape, -1.0)
+    inputs = (depth, path.time, path.first_contact, path.again, reach[..., :-1], np.diff(slope, prepend=0.0))
+    ring_rows(*map(contiguous, inputs), *relaxation.of_points(len(depth)), force, edge)
+    contact_mask = edge >= 0
+    if sphere.stiffening is not None:
+        force = force * _elastic(sphere, sphere.radius_at(np.maximum(edge, 0.0), None), None)[-1]
+    if adhesion is None:
+        return force, contact_mask
+    depth = np.maximum(path.travel, 0.0)
+    plain = np.where(depth > 0, sphere.at(sphere.radius_at(depth, None))[0], 0.0)
+    sticking = in_contact(path.travel, sphere.pull_off(adhesion.separation)[1])
+    a = edges(sphere, path.travel, sticking, adhesion.work, adhesion.separation)
+    adhesive = np.where(sticking, sphere.force_at(path.travel, a), 0.0) - plain
+    return force + adhesive, contact_mask | sticking
 
 
 def relaxing_on_stage(
@@ -457,6 +502,7 @@ class IndentationModel(CurveModel):
         self.hidden_jumps = sticks and not bool(self._seen.all())
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
         deepest = self.displacement.max(axis=1) - 1e-3 * middles
+        self._again = np.array([presses_again(recording.displacement_mm) for recording in recordings])
         self._deep = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
 
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
@@ -528,7 +574,7 @@ class IndentationModel(CurveModel):
         contact_mask: Mask | None,
     ) -> tuple[Floats, Mask, Mask]:
         """As `_force_at` through the history, which begins at the touch of a recording, between two samples."""
-        path = _with_touch(travel, self.time)
+        path = _with_touch(travel, self.time, self._again)
         force, own_contact = force_on(path)
         own_contact = own_contact & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
         if contact_mask is None:
@@ -562,7 +608,7 @@ def _adhesion(curve: Curve) -> Adhesion | None:
     return Adhesion(work, work if curve.work_of_separation is None else numbers(curve.work_of_separation))
 
 
-def _with_touch(travel: Floats, time: Floats) -> Path:
+def _with_touch(travel: Floats, time: Floats, again: Mask) -> Path:
     """The path with its last sample before contact moved to the touch, travel 0."""
     touched = travel >= 0
     first = np.where(touched.any(axis=-1), touched.argmax(axis=-1), travel.shape[-1])
@@ -575,7 +621,7 @@ def _with_touch(travel: Floats, time: Floats) -> Path:
     time[point, curve, then - 1] += share * (time[point, curve, then] - time[point, curve, then - 1])
     travel[point, curve, then - 1] = 0.0
     first_contact = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
-    return Path(travel, time, first_contact)
+    return Path(travel, time, first_contact, again)
 
 
 def _visible_contact(recording: IndentationConditions) -> Mask | None:

@@ -471,3 +471,98 @@ def creep_edge_rows(
                     age = max(now[1] - ring_time, 0.0)
                     total += pairs[0][pair] * math.exp(-age / pairs[1][pair]) * memory[pair]
                 memory_force[point, curve, sample] = total
+
+
+Step = tuple[float, float, Floats, Floats]  # depth before and now, duration over τ, decay of memories
+
+
+@compiled()
+def _followed(
+    ring: int, reach: float, pressed: Floats, memory: Floats, pairs: Pairs, step: Step
+) -> tuple[float, float]:
+    """Move a ring on by a step: its force over its stiffness, and how far it is pressed beyond where it would have
+    recovered to; negative where it is left behind."""
+    before, now, ratio, decay = step
+    carried = at_once = 1.0 - pairs[0].sum()
+    carried *= pressed[ring]
+    for pair in range(len(ratio)):
+        carried += pairs[0][pair] * decay[pair] * memory[ring, pair]
+        at_once += pairs[0][pair] * _lagging(ratio[pair])
+    recovery = -carried / at_once
+    change = now - reach - pressed[ring]
+    beyond = change - recovery
+    gap = max(pressed[ring] + reach - before, 0.0)
+    share = beyond / (beyond + gap) if beyond > 0 else 0.0  # of the step, since the ring was met
+    sudden = 1.0 - pairs[0].sum()
+    for pair in range(len(ratio)):
+        own = _lagging(share * ratio[pair])
+        memory[ring, pair] = decay[pair] * memory[ring, pair] + _lagging(ratio[pair]) * recovery
+        memory[ring, pair] += own * max(beyond, 0.0)
+        sudden += pairs[0][pair] * own
+    pressed[ring] += recovery + max(beyond, 0.0)
+    return sudden * max(beyond, 0.0), beyond
+
+
+@compiled()
+def _march(
+    depth: Floats,
+    time: Floats,
+    first: int,
+    reach: Floats,
+    stiffness: Floats,
+    pairs: Pairs,
+    force: Floats,
+    edge: Floats,
+) -> None:
+    """As `ring_rows`, of one curve."""
+    rings, reached = len(reach), 0
+    pressed, memory = np.zeros(rings), np.zeros((rings, len(pairs[0])))
+    for sample in range(first, len(depth)):
+        before = max(sample - 1, first)
+        ratio = max(time[sample] - time[before], 0.0) / pairs[1]
+        step = (depth[before] if sample > first else 0.0, depth[sample], ratio, np.exp(-ratio))
+        while reached < rings and reach[reached] < depth[sample]:
+            reached += 1
+        outermost, excess, gap = -1, 0.0, reach[0]
+        for ring in range(reached):
+            carried, beyond = _followed(ring, reach[ring], pressed, memory, pairs, step)
+            force[sample] += stiffness[ring] * carried
+            if beyond > 0:
+                outermost, excess = ring, beyond
+            elif ring == outermost + 1:
+                gap = -beyond
+        if outermost + 1 == reached and reached < rings:
+            gap = reach[reached] - depth[sample]
+        if outermost >= 0:
+            following = reach[min(outermost + 1, rings - 1)]
+            edge[sample] = reach[outermost] + excess / (excess + gap) * (following - reach[outermost])
+
+
+@compiled(f"void({_ROWS}, {_ROWS}, int64[:, ::1], boolean[::1], {_ROWS}, {_ROWS}, {_PAIRS}, {_ROWS}, {_ROWS})")
+def ring_rows(
+    depth: Floats,
+    time: Floats,
+    first_contact: Indices,
+    again: Mask,
+    reach: Floats,
+    stiffness: Floats,
+    fractions: Floats,
+    times: Floats,
+    force: Floats,
+    edge: Floats,
+) -> None:
+    """Of the curves that press `again`, fill F and the depth that belongs to the edge, from −1 where there is none.
+
+    The contact is a row of rings, springs side by side: ring j of `stiffness` k_j touches at the depth `reach` δ_j
+    (points, curves, rings). Its surface is pressed in by v_j ≥ δ − δ_j and carries k_j ∫ e(t−s) dv_j(s) ≥ 0, one of the
+    two with equality: where it is left behind it recovers without force. v is linear between samples, from where the
+    ring is met.
+    """
+    points, curves, _ = depth.shape
+    for point in range(points):
+        for curve in range(curves):
+            if again[curve]:
+                here = point, curve
+                pairs = fractions[point], times[point]
+                curve_rows = depth[here], time[here], first_contact[here]
+                _march(*curve_rows, reach[here], stiffness[here], pairs, force[here], edge[here])

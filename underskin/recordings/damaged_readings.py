@@ -1,0 +1,59 @@
+"""Readings of a force that are none: marks that an instrument writes in their place, and spikes."""
+
+import numpy as np
+
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import CurveRecording, samples_of
+from underskin.recordings.curve_course import roughness
+from underskin.units import Floats, Mask
+
+_LEAST = 16  # marks, or samples among which a spike can be told
+_FEW_VALUES = 5  # distinct values of a curve
+_OFF = 4.0  # times what its neighbours differ by, and their noise: how far a mark stands off the curve
+_BEYOND_RANGE = 2.5  # from the middle of a range: twice the range outside it
+
+
+def without_damaged(curve: CurveRecording) -> tuple[CurveRecording, list[Finding]]:
+    """The curve without marks and spikes among its finite forces, and the findings on them."""
+    findings = []
+    for detect, reason in ((marks, Reason.READINGS_MARKED), (spikes, Reason.READINGS_BEYOND)):
+        finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
+        force = curve.force_n[finite]
+        bad = detect(force)
+        if bad.any():
+            farthest = float(force[bad][np.abs(force[bad]).argmax()])
+            arguments = {"samples": int(bad.sum()), "percent": 100 * float(bad.mean()), "value_n": farthest}
+            findings.append(Finding(reason, curve.id, "force_n", arguments))
+            curve = samples_of(curve, np.setdiff1d(np.arange(len(curve.force_n)), finite[bad]))
+    return curve, findings
+
+
+def marks(force: Floats) -> Mask:
+    """The samples (samples,) at which an instrument wrote a mark, such as -1, where it had no reading: one number that
+    comes again, one or two samples each time, far off the samples on both sides, which agree."""
+    values, counts = np.unique(force, return_counts=True)
+    marked = np.zeros(len(force), dtype=bool) if len(values) < _FEW_VALUES else force == values[counts.argmax()]
+    others, first = np.flatnonzero(~marked), np.flatnonzero(np.diff(marked.astype(int), prepend=0) > 0)
+    beside = np.searchsorted(others, first)
+    first, beside = (rows[(beside > 0) & (beside < len(others))] for rows in (first, beside))
+    if len(first) < _LEAST or marked.sum() > 2 * len(first) + 2:
+        return np.zeros(len(force), dtype=bool)
+    before, after = force[others[beside - 1]], force[others[beside]]
+    off = np.abs(force[first] - (before + after) / 2)
+    least = np.maximum(np.abs(after - before), max(roughness(force[others]), float(np.diff(values).min())))
+    return marked if np.mean(off > _OFF * least) > 0.5 else np.zeros(len(force), dtype=bool)
+
+
+def spikes(force: Floats) -> Mask:
+    """The samples (samples,), one or two at a time and a hundredth of all at most, that lie farther outside the range
+    of all others than twice that range, between samples within it."""
+    none = np.zeros(len(force), dtype=bool)
+    trimmed = max(1, len(force) // 100)
+    if len(force) < _LEAST:
+        return none
+    low, high = np.sort(force)[[trimmed, -trimmed - 1]].tolist()
+    beyond = np.abs(force - (low + high) / 2) > _BEYOND_RANGE * (high - low)
+    inside = np.flatnonzero(~beyond)
+    lasting = np.diff(inside).max(initial=1) > 3 or beyond[0] or beyond[-1]
+    return none if lasting or not high > low else beyond
