@@ -17,6 +17,7 @@ from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.residuals import declared_d33, with_hidden_mechanism
 from underskin.diagnosis.reporting.numbers import (
     HIDES,
+    LEAST_DESCRIBED,
     covariance_of,
     explanations_of,
     law_levels,
@@ -42,7 +43,7 @@ def d33_over_answers(search: Search, problem: FittingProblem, unsure: float) -> 
     dates and spheres. `unsure` is a further relative standard uncertainty.
     """
     weighted = explanations_of(search)
-    if sum(probability for probability, _ in weighted) < 0.5:
+    if sum(probability for probability, _ in weighted) < LEAST_DESCRIBED:
         return None
     mixtures = [
         _d33_under(search, problem, explanation, probability).times(probability)

@@ -172,7 +172,8 @@ class Facts:
         after = self._errors(self.shown, self.scores[1], outside[1])
         if self.problem.lines.curves:
             before["youngs_modulus"] = modulus_under(self.problem, self.base)
-            after["youngs_modulus"] = modulus_over_answers(self.search, self.problem, self.shown)
+            modulus = modulus_over_answers(self.search, self.problem, self.shown)
+            after |= {} if modulus is None else {"youngs_modulus": modulus}
         return {
             "before": before,
             "after": after,

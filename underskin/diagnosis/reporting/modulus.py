@@ -22,10 +22,12 @@ def modulus_under(problem: FittingProblem, explanation: Explanation) -> dict[str
     return _entry(problem, explanation, _log_modulus(problem, explanation))
 
 
-def modulus_over_answers(search: Search, problem: FittingProblem, shown: Explanation) -> dict[str, Any]:
+def modulus_over_answers(search: Search, problem: FittingProblem, shown: Explanation) -> dict[str, Any] | None:
     """The report's E of curves over all answers; `shown`, the fit behind the leading one, tells whether E is at a bound
-    of its search."""
-    weighted = numbers.explanations_of(search) or [(1.0, shown)]
+    of its search. None where answers without a fit are more probable than all others: nothing describes the curves."""
+    weighted = numbers.explanations_of(search)
+    if sum(probability for probability, _ in weighted) < numbers.LEAST_DESCRIBED:
+        return None
     mixtures = [_log_modulus(problem, explanation).times(probability) for probability, explanation in weighted]
     return _entry(problem, shown, NormalMixture.joined(mixtures))
 

@@ -197,6 +197,7 @@ def at_bounds(explanation: Explanation) -> dict[str, Finding]:
 
 
 COUNTS = 0.003  # probability below which an answer is left out of averages
+LEAST_DESCRIBED = 0.5  # probability of all answers with a fit, below which none has a number
 HIDES = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
 _TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
 _LEAST_NAMED = 3  # groups, however improbable

@@ -256,7 +256,9 @@ def _depths_clause(facts: Facts) -> str:
 
 def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     """A clause on E of curves, and on the answers under which it holds."""
-    modulus = after["youngs_modulus"]
+    modulus = after.get("youngs_modulus")
+    if modulus is None:
+        return "Young's modulus: none, as nothing describes these curves"
     if modulus.get("at_bound"):
         bound = f"{modulus['value']:.3g} {modulus['unit']}"
         return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
