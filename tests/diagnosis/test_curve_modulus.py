@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from rig.description import parse as experiment
+from rig.draw_curves import drawn_curves
+from rig.effects import INDENTATION
+from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.lean_reports import beside, lean_report
 from underskin import SkinDescription
-from underskin.recordings.campaign import Campaign, IndentationRecording
+from underskin.recordings.campaign import Campaign, IndentationRecording, parse
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
@@ -48,3 +52,53 @@ def test_modulus_integrates_over_the_scatter_of_gains(gains: tuple[float, ...], 
     low, high = interval(np.array(gains))
     assert np.log(modulus["high"] / modulus["low"]) == pytest.approx(high - low, rel=0.1)
     assert modulus["low"] < 2.0 * np.exp(np.mean(gains)) < modulus["high"]
+
+
+MODULUS_MPA = 1.5
+PRESSED = experiment(
+    {
+        "schema": "experiment/1", "name": "curves", "seed": 4, "kind": "indentation",
+        "effects": {"contact_creep": {"fraction": 0.1, "time_s": 0.05}},
+        "skin": {
+            "thickness_mm": 4.0, "youngs_modulus_mpa": MODULUS_MPA, "sensor_radius_mm": 1.0, "d33_pc_per_n": 10.0
+        },
+        "curves": {
+            "indenters_mm": [0.09], "largest_displacement_mm": 7e-3, "samples": 600, "speeds_mm_per_s": [0.02],
+            "repeats": 2, "hold_s": 3.0, "retract": True, "approach_mm": 0.02, "retreat_mm": 6e-3, "times": True,
+            "modulus_declared": False, "units_checked": True, "contact_point_mm": 0.02, "force_zero_n": 7e-6,
+            "gain": 0.01, "cell_gain": 0.01, "force_noise_n": 3e-7,
+        },
+    }
+)  # fmt: skip
+FAST = parse(campaign_of_curves(PRESSED, record_curves(PRESSED)))
+
+
+def test_modulus_of_a_relaxation_at_the_foot(table: SigmaTable) -> None:
+    """A weak relaxation much faster than the loading is found: what it changes at the foot is not the modulus."""
+    report = lean_report(FAST, table, *beside("contact_creep", "instrument_compliance"))
+    modulus = report["fit"]["after"]["youngs_modulus"]
+    assert [entry["name"] for entry in report["mechanisms"]] == ["contact_creep"]
+    assert modulus["low"] < MODULUS_MPA < modulus["high"]
+
+
+@pytest.mark.slow
+def test_stiffening_with_strain_is_as_likely_as_with_the_invariant(table: SigmaTable) -> None:
+    """Of a modulus that grows with the contact's strain the exponent is 1, or else E takes up a tenth of it."""
+    campaign = parse(campaign_of_curves(*drawn_curves(51764, 10, INDENTATION, "single")))
+    report = lean_report(campaign, table, *beside("strain_stiffening", "instrument_compliance"))
+    (stiffening,) = report["mechanisms"]
+    exponent = next(entry for entry in stiffening["parameters"] if entry["name"] == "stiffening_exponent")
+    assert exponent["low"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_no_modulus_where_nothing_describes_the_curve(table: SigmaTable) -> None:
+    """A force that falls in a hold without a time cannot be described by any law; then no modulus is stated."""
+    depth = np.concatenate([np.linspace(-0.1, 0.2, 300), np.full(300, 0.2)])
+    force = 16 / 9 * 2.0 * np.sqrt(5.0) * np.maximum(depth, 0.0) ** 1.5
+    force[300:] *= 1 - 0.1 * np.log1p(np.arange(300.0))
+    force += 1e-3 * force.max() * np.random.default_rng(2).normal(size=len(force))
+    skin = SkinDescription(poisson_ratio=0.5, thickness_mm=80.0, youngs_modulus_mpa=None, sensor_radius_mm=1.0)
+    curve = IndentationRecording("i", 5.0, depth, force)
+    report = lean_report(Campaign("one", skin, (curve,), units_checked=True), table, *beside("instrument_compliance"))
+    assert report["verdict"] == "unexplained"
+    assert "youngs_modulus" not in report["fit"]["after"]
