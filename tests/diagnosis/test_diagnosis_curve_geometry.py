@@ -75,7 +75,7 @@ def test_interval_of_neo_hookean_samples(pulled: bool, largest: tuple[float, flo
         zero, noise = top * random.uniform(-0.03, 0.03) * (number % 4 > 1), top * np.exp(random.uniform(-6.9, -3.9))
         stress = stress + zero + noise * random.standard_normal(len(stress))
         rows = curve_lines(block(-strain if pulled else strain, -stress), "compression")
-        (fit,) = FittingProblem(rows, table).explain([Request(())])
+        fit = FittingProblem(rows, table).explain(Request(()))
         assert fit is not None
         index = [parameter.name for parameter in fit.model.parameters].index("youngs_modulus")
         deviation = float(np.sqrt(fit.best.covariance[index, index]))

@@ -14,13 +14,14 @@ all values of the sensors' spread, which two sensors leave open by a factor, is 
 need not be Gaussian, ends it (`profile_end`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.special import log_ndtr
 
-from underskin.diagnosis.inference.fit import Fitter
+from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
 from underskin.diagnosis.noise import NoiseLevels
@@ -122,7 +123,13 @@ def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
 def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
     """Logarithms of the integrals over the mean parameters, with the covariance's held (points,), and the covariance of
     each quadratic (mean parameters, mean parameters)."""
-    values, covariances = [], []
+    values, _, covariances = _quadratics(fitter, at)
+    return values, covariances
+
+
+def _quadratics(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats], list[Floats]]:
+    """As `mean_integrals`, with the mean of each quadratic (mean parameters,) between them."""
+    values, means, covariances = [], [], []
     indices = np.flatnonzero(fitter.free)
     for number, (information, gradient) in enumerate(zip(*_equations(fitter, at), strict=True)):
         coordinates, low, high = at.points.fit[number, indices], fitter.low[indices], fitter.high[indices]
@@ -139,13 +146,14 @@ def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]
         bounds_term = gain + log_box(mean, covariance, low, high)
         if not _LEAST_BOUNDS_TERM < bounds_term < 2 * _REMAINING_GAIN:
             # Truncating one bound after another fails where a quadratic leads far out of several.
-            deviation = np.where(free, 0.0, np.diag(information) ** -0.5)
+            mean, deviation = coordinates, np.where(free, 0.0, np.diag(information) ** -0.5)
             bounds_term = log_box(coordinates, covariance, low, high) - float(
                 np.log1p(np.abs(gradient) * deviation).sum()
             )
         values.append(float(-at.cost[number] + volume + bounds_term))
+        means.append(mean)
         covariances.append(covariance)
-    return np.array(values), covariances
+    return np.array(values), means, covariances
 
 
 def _definite(information: Floats) -> Floats:
@@ -205,7 +213,12 @@ def _polished(fitter: Fitter, at: Evaluated) -> Evaluated | None:
 
 
 def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:
-    """The logarithm of the probability of low < x < high for x ~ N(mean, covariance).
+    """The logarithm of the probability of low < x < high for x ~ N(mean, covariance)."""
+    return _truncated(mean, covariance, low, high)[0]
+
+
+def _truncated(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> tuple[float, Floats, Floats]:
+    """`log_box`, and the mean and the covariance of x within the bounds.
 
     The bound that the mean is farthest beyond comes first: truncation there also brings correlated parameters back
     within theirs.
@@ -235,7 +248,7 @@ def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> floa
         gain = covariance[:, index] / sd
         mean = mean + gain * sign * first
         covariance = covariance - np.outer(gain, gain) * (1 - variance)
-    return total
+    return total, mean, covariance
 
 
 def _log_between(a: float, b: float) -> float:
@@ -344,7 +357,7 @@ def _trading_index(evidence: Evidence, index: int) -> int | None:
     return None
 
 
-_SPREAD_VALUES = 24  # of the sensors' spread, at equal distances between its bounds
+_SPREAD_VALUES = 24  # of the sensors' spread or the scatter of gains, at equal distances between its bounds
 
 
 def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list[NormalMixture] | None:
@@ -362,8 +375,7 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
     grid = at[np.repeat(np.arange(len(at)), _SPREAD_VALUES)]
     covariance = grid.points.covariance.copy()
     covariance[:, column] = np.tile(low + (high - low) * (np.arange(_SPREAD_VALUES) + 0.5) / _SPREAD_VALUES, len(at))
-    shifted = fitter.weighed(fitter.with_covariance(grid.points, covariance), grid.products)
-    shifted = replace(shifted, log_slope_gradient=grid.log_slope_gradient)
+    shifted = _with_levels(fitter, grid, covariance)
     values, covariances = mean_integrals(fitter, shifted)
     free = np.flatnonzero(fitter.free)
     mean_index = int(np.searchsorted(free, index))
@@ -375,6 +387,59 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
         NormalMixture(_shares(values[rows]), mean[rows], deviation[rows])
         for rows in (slice(first, first + _SPREAD_VALUES) for first in range(0, len(values), _SPREAD_VALUES))
     ]
+
+
+_SMOOTH_STEPS = np.linspace(-3.0, 3.0, 7)  # standard deviations from the most probable logarithm of the smooth error
+
+
+def marginalise_curve_noise(evidence: Evidence, indices: Sequence[int]) -> NormalMixture:
+    """The posterior of the sum of parameters of a model of curves over all values of gain scatter and smooth error.
+
+    Few curves leave the scatter of their gains open, and the most probable one is too small: together with a modulus
+    that all share, n curves have it at √((n − 1)/n) of their own scatter, one curve at the least usual value. At each
+    node the mean and the deviation are those within the parameters' bounds.
+
+    Parameters
+    ----------
+    evidence
+        The fit.
+    indices
+        Of the parameters among the model's.
+
+    Returns
+    -------
+    NormalMixture
+        Of the sum of the parameters' fit coordinates; the shares sum to 1.
+    """
+    fitter, at = evidence.fitter, evidence.at
+    gains, sizes = (evidence.hypothesis.covariance[column] for column in (Scatter.GAIN, Scatter.SMOOTH))
+    smooth_sd = float(np.sqrt(levels_covariance(fitter.covariance_equations(at)[1][0])[Scatter.SMOOTH, Scatter.SMOOTH]))
+    gain = gains.low + (gains.high - gains.low) * (np.arange(_SPREAD_VALUES) + 0.5) / _SPREAD_VALUES
+    smooth = at.points.covariance[0, Scatter.SMOOTH] + smooth_sd * _SMOOTH_STEPS
+    smooth = smooth[(smooth >= sizes.low) & (smooth <= sizes.high)]
+    covariance = np.tile(at.points.covariance, (len(gain) * len(smooth), 1))
+    covariance[:, Scatter.GAIN], covariance[:, Scatter.SMOOTH] = (
+        np.repeat(gain, len(smooth)),
+        np.tile(smooth, len(gain)),
+    )
+    shifted = _with_levels(fitter, at[np.zeros(len(covariance), dtype=np.intp)], covariance)
+    shifted = shifted[np.flatnonzero(shifted.cost < shifted.cost.min() + NEGLIGIBLE_NATS)]
+    values, means, covariances = _quadratics(fitter, shifted)
+    free = np.flatnonzero(fitter.free[0])
+    rows = np.searchsorted(free, indices)
+    low, high = fitter.low[0, free], fitter.high[0, free]
+    parts = [_truncated(mean, full, low, high)[1:] for mean, full in zip(means, covariances, strict=True)]
+    return NormalMixture(
+        _shares(values),
+        np.array([mean[rows].sum() for mean, _ in parts]),
+        np.sqrt([max(float(full[np.ix_(rows, rows)].sum()), 0.0) for _, full in parts]),
+    )
+
+
+def _with_levels(fitter: Fitter, at: Evaluated, covariance: Floats) -> Evaluated:
+    """The same predictions with other covariance parameters (points, parameters)."""
+    shifted = fitter.weighed(fitter.with_covariance(at.points, covariance), at.products)
+    return replace(shifted, log_slope_gradient=at.log_slope_gradient)
 
 
 def _shares(values: Floats) -> Floats:

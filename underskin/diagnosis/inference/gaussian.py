@@ -139,6 +139,10 @@ class NormalMixture:
         """With every mean shifted by `by`."""
         return NormalMixture(self.share, self.mean + by, self.deviation)
 
+    def averaged_over(self, changes: Floats) -> "NormalMixture":
+        """The mean of the distributions moved by each of the changes (changes,)."""
+        return NormalMixture.joined([self.moved(change).times(1 / len(changes)) for change in changes.tolist()])
+
     @classmethod
     def joined(cls, mixtures: Sequence["NormalMixture"]) -> Self:
         """All components of several mixtures."""

@@ -1,8 +1,7 @@
 """d33 of a report: over all answers, whether it is to be quoted, and what would change it without showing.
 
-The level at which the factor of an unlisted law is 1 is a convention of its form. A resonance may leave the low
-frequencies as they are, or the high ones: both fit equally well, and d33 differs by what the law does in between. d33
-is therefore averaged over the law's factor at all rows (`law_levels`).
+d33 is averaged over the level at which the factor of an unlisted law is 1 (`numbers.law_levels`): a resonance may leave
+the low frequencies as they are, or the high ones, and d33 differs by what the law does in between.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,13 +14,13 @@ from underskin.diagnosis.data.names import MOST_QUOTED, in_words
 from underskin.diagnosis.inference.evidence import marginalise_sensor_spread
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.inference.residuals import declared_d33, with_hidden_mechanism
 from underskin.diagnosis.reporting.numbers import (
-    COUNTS,
     HIDES,
+    LEAST_DESCRIBED,
     covariance_of,
-    law_shares,
+    explanations_of,
+    law_levels,
     of_logarithms,
     parameter_index,
 )
@@ -29,42 +28,10 @@ from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, even_laws
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
 from underskin.findings.formatting import in_digits, listed
-from underskin.mechanisms.unlisted.laws import UnlistedLaw
-from underskin.units import Floats
 
-_LEVELS = 9  # quantiles over the rows
 _FACTORS = ("gain", "frequency_response")
 SEVERAL_ANSWERS = "several answers remain"
 BY_NUISANCES = ("d33", "noise")  # confounders of mechanisms that d33, E, h or the noise hide
-
-
-def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
-    """Logarithms of equally probable factors on d33 (levels,) from the reference level of unlisted laws; only 0 where
-    no law is a factor."""
-    mechanisms, names = problem.lines.mechanisms, explanation.names
-    laws = [
-        name
-        for name in names
-        if isinstance(law := mechanisms[name], UnlistedLaw) and law.description.acts_on in _FACTORS
-    ]
-    if not laws:
-        return np.zeros(1)
-    other_names = tuple(name for name in names if name not in laws)
-    with_law, without = (
-        problem.hypothesis(mechanism_names, has_position_scatter=False, all_lines=True)
-        for mechanism_names in (names, other_names)
-    )
-    fit = np.zeros(len(without.model.parameters))
-    for name, span in parameter_slices(other_names, without.lines).items():
-        fit[span] = explanation.coordinates(name)
-    fit[without.mechanism_parameter_count :] = explanation.point.fit[with_law.mechanism_parameter_count :]
-    here, there = (
-        np.abs(hypothesis.frf_model.predict(at, slopes=False, place=False).value)
-        for hypothesis, at in ((with_law, explanation.point.fit), (without, fit))
-    )
-    nonzero = (there > 0) & (here > 0)
-    shares = (np.arange(_LEVELS) + 0.5) / _LEVELS
-    return np.quantile(np.log(here[nonzero] / there[nonzero]), shares)
 
 
 def d33_over_answers(search: Search, problem: FittingProblem, unsure: float) -> dict[str, Any] | None:
@@ -75,16 +42,8 @@ def d33_over_answers(search: Search, problem: FittingProblem, unsure: float) -> 
     tolerances of the skin's declared values widen the interval, but not `relative`, which is for comparing sensors,
     dates and spheres. `unsure` is a further relative standard uncertainty.
     """
-    probabilities: dict[int, float] = {}  # by identity: curves' own mechanisms do not change d33
-    explanations: dict[int, Explanation] = {}
-    for answer in search.answers:
-        parts = law_shares(search) if answer.explanation is None else [(answer.explanation, 1.0)]
-        for explanation, share in parts:
-            key = id(explanation)
-            explanations[key] = explanation
-            probabilities[key] = answer.probability * share + probabilities.get(key, 0.0)
-    weighted = [(probability, explanations[key]) for key, probability in probabilities.items() if probability > COUNTS]
-    if sum(probability for probability, _ in weighted) < 0.5:
+    weighted = explanations_of(search)
+    if sum(probability for probability, _ in weighted) < LEAST_DESCRIBED:
         return None
     mixtures = [
         _d33_under(search, problem, explanation, probability).times(probability)
@@ -134,8 +93,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
             parts.append(hidden.times(unseen))
     mixture = NormalMixture.joined(parts)
     mixture = mixture.times(1 / float(mixture.share.sum()))
-    levels = law_levels(problem, explanation)
-    return NormalMixture.joined([mixture.moved(level).times(1 / len(levels)) for level in levels.tolist()])
+    return mixture.averaged_over(law_levels(problem, explanation, _FACTORS))
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,10 @@ from underskin.diagnosis.localisation import AxisResult, EffectSize, Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.d33 import BY_NUISANCES, SEVERAL_ANSWERS, StatedD33, d33_over_answers
-from underskin.diagnosis.reporting.numbers import parameter_index, parameter_with_interval, parameters_of, rounded
+from underskin.diagnosis.reporting.modulus import modulus_over_answers, modulus_under
+from underskin.diagnosis.reporting.numbers import parameter_index, parameters_of, rounded
 from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, law_document
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.other_kinds import hidden_factors, may_hide
 from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether
 from underskin.diagnosis.validation import cross_validation
@@ -161,14 +161,21 @@ class Facts:
 
     @cached_property
     def fit(self) -> dict[str, Any]:
-        """Errors before and after, held-out groups, the fitted noise, and the modulus of curves."""
+        """Errors before and after, held-out groups, the fitted noise; and the modulus of curves, under the base model
+        and over all answers."""
         groups, named = self.diagnosis.groups, self.problem.lines.mechanisms.named
         outside = cross_validation.total(groups)
         levels = self.shown.best.levels
         floor = (outside[1] if outside[1].recordings else self.scores[1]).floor_percent
+        before = self._errors(self.base, self.scores[0], outside[0])
+        after = self._errors(self.shown, self.scores[1], outside[1])
+        if self.problem.lines.curves:
+            before["youngs_modulus"] = modulus_under(self.problem, self.base)
+            modulus = modulus_over_answers(self.search, self.problem, self.shown)
+            after |= {} if modulus is None else {"youngs_modulus": modulus}
         return {
-            "before": self._errors(self.base, self.scores[0], outside[0]),
-            "after": self._errors(self.shown, self.scores[1], outside[1]),
+            "before": before,
+            "after": after,
             "mechanisms": [name for name in self.shown.names if name in named],  # also where more is unexplained
             "noise_floor_percent": rounded(floor),
             "groups": [
@@ -212,7 +219,6 @@ class Facts:
             **({"correlated_rmse_percent": error} if lines.curves else {}),
             "heldout_rmse_percent": rounded(outside.rmse_percent),
             "log_score": rounded(outside.log_score / outside.recordings) if outside.recordings else None,
-            **({"youngs_modulus": self._modulus(explanation)} if lines.curves else {}),
         }
 
     def _plainly(self, name: str) -> str:
@@ -221,24 +227,6 @@ class Facts:
         if not isinstance(law, UnlistedLaw):
             return name
         return f"unnamed: {law.description.acts_on} over {law.description.axis}, {law.description.form}"
-
-    def _modulus(self, explanation: Explanation) -> dict[str, Any]:
-        """Young's modulus under an explanation with its 95 % interval, from factors on the declared one, or free.
-
-        The interval allows for mechanisms that an apparent modulus may hide.
-        """
-        mechanisms, campaign = self.problem.lines.mechanisms, self.problem.lines.campaign
-        index = parameter_index(explanation, "youngs_modulus")
-        modulus = parameter_with_interval(explanation, index)
-        declared = campaign.skin.youngs_modulus_mpa
-        if declared is not None:
-            factors = [i for i, parameter in enumerate(explanation.model.parameters) if parameter.name == _FACTOR]
-            if factors:
-                value, factor = numbers.product(explanation, [index, *factors])
-                modulus |= numbers.with_ends(value, value / factor, value * factor, digits=6)
-            modulus |= {"unit": "MPa", **numbers.scaled(modulus, declared)}
-        hiding = may_hide(campaign, mechanisms.named)
-        return numbers.with_hidden(modulus, hidden_factors(hiding, explanation.names))
 
     @cached_property
     def present(self) -> dict[str, float]:

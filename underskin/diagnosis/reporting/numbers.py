@@ -26,8 +26,10 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, mixture_quantile
 from underskin.mechanisms.base import Parameter
-from underskin.mechanisms.unlisted.laws import in_plain_words
-from underskin.units import Floats
+from underskin.mechanisms.models.composed import Model
+from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
+from underskin.units import Array, Floats
 
 ENDS = ("value", "low", "high")
 QUANTILES_OF_95 = (0.5, 0.025, 0.975)  # for these
@@ -194,6 +196,7 @@ def at_bounds(explanation: Explanation) -> dict[str, Finding]:
 
 
 COUNTS = 0.003  # probability below which an answer is left out of averages
+LEAST_DESCRIBED = 0.5  # probability of all answers with a fit, below which none has a number
 HIDES = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
 _TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
 _LEAST_NAMED = 3  # groups, however improbable
@@ -205,6 +208,61 @@ def law_shares(search: Search) -> list[tuple[Explanation, float]]:
     weights = np.array([weight for _, weight in search.weighed_laws])
     shares = np.exp(weights - np.logaddexp.reduce(weights)) if len(weights) else weights
     return [(law, share) for (law, _), share in zip(search.weighed_laws, shares.tolist(), strict=True)]
+
+
+def explanations_of(search: Search) -> list[tuple[float, Explanation]]:
+    """The explanations behind all answers with their probabilities, above `COUNTS`; of `none_of_these` all laws that
+    show."""
+    probabilities: dict[int, float] = {}  # by identity: mechanisms of other kinds' curves alone change nothing here
+    explanations: dict[int, Explanation] = {}
+    for answer in search.answers:
+        parts = law_shares(search) if answer.explanation is None else [(answer.explanation, 1.0)]
+        for explanation, share in parts:
+            key = id(explanation)
+            explanations[key] = explanation
+            probabilities[key] = answer.probability * share + probabilities.get(key, 0.0)
+    return [(probability, explanations[key]) for key, probability in probabilities.items() if probability > COUNTS]
+
+
+_LEVELS = 9  # quantiles over the rows
+
+
+def law_levels(problem: FittingProblem, explanation: Explanation, factors: Collection[str]) -> Floats:
+    """Logarithms of equally probable factors (levels,), over all rows, on what is measured, from the reference level of
+    unlisted laws that act on one of the `factors`; only 0 where there is no such law.
+
+    The level at which the factor of an unlisted law is 1 is a convention of its form.
+    """
+    mechanisms, names = problem.lines.mechanisms, explanation.names
+    laws = [
+        name
+        for name in names
+        if isinstance(law := mechanisms[name], UnlistedLaw) and law.description.acts_on in factors
+    ]
+    if not laws:
+        return np.zeros(1)
+    other_names = tuple(name for name in names if name not in laws)
+    with_law, without = (
+        problem.hypothesis(mechanism_names, has_position_scatter=False, all_lines=True)
+        for mechanism_names in (names, other_names)
+    )
+    fit = np.zeros(len(without.model.parameters))
+    for name, span in parameter_slices(other_names, without.lines).items():
+        fit[span] = explanation.coordinates(name)
+    fit[without.mechanism_parameter_count :] = explanation.point.fit[with_law.mechanism_parameter_count :]
+    here, there = np.abs(_response(with_law.model, explanation.point.fit)), np.abs(_response(without.model, fit))
+    nonzero = (there > 0) & (here > 0)
+    shares = (np.arange(_LEVELS) + 0.5) / _LEVELS
+    return np.quantile(np.log(here[nonzero] / there[nonzero]), shares)
+
+
+def _response(model: Model, fit: Floats) -> Array:
+    """FRFs or forces (rows,) at one point."""
+    return (
+        model.predict(fit, slopes=False, place=False).value
+        if isinstance(model, FrfModel)
+        else model.forces(fit[None])[0]
+    )
 
 
 def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any]]:

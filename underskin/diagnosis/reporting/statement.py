@@ -48,6 +48,7 @@ _INSUFFICIENT = "The recordings cannot tell anything: "
 _TO_CORRECT = "Nothing can be told before a correction: "
 _CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
 _SMALL = 5.0  # % of the response
+_OVER_ANSWERS = "over the answers that remain"
 
 
 def statement(facts: Facts) -> str:
@@ -98,7 +99,7 @@ def statement(facts: Facts) -> str:
             second += [_misfit_clause(fit, model)] if of_curves else []
         elif of_curves:
             settled = verdict != "ambiguous"
-            how = "under this answer" if settled else f"with {in_words(fit['mechanisms'])}, which is not settled"
+            how = "under this answer" if settled else _OVER_ANSWERS
             last = [*quoted, _modulus_clause(fit["after"], how)]
         second += facts.meanings
         if verdict == "no_mismatch":
@@ -253,8 +254,10 @@ def _depths_clause(facts: Facts) -> str:
 
 
 def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
-    """A clause on E of curves, and on the answer under which it holds."""
-    modulus = after["youngs_modulus"]
+    """A clause on E of curves, and on the answers under which it holds."""
+    modulus = after.get("youngs_modulus")
+    if modulus is None:
+        return "Young's modulus: none, as nothing describes these curves"
     if modulus.get("at_bound"):
         bound = f"{modulus['value']:.3g} {modulus['unit']}"
         return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
@@ -271,7 +274,7 @@ def _misfit_clause(fit: Mapping[str, Any], model: str, *law: str) -> str:
     if not added:
         return text
     left = in_digits(after["rmse_percent"], 2)
-    return f"{text}, with {added} {left} %; {_modulus_clause(after, f'with {added}')}"
+    return f"{text}, with {added} {left} %; {_modulus_clause(after, _OVER_ANSWERS)}"
 
 
 def _power_clause(power: Sequence[Power], kind: Kind) -> str:

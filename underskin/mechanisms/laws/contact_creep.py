@@ -42,13 +42,14 @@ _POWER = Parameter(
 )
 _COMPRESSION = (*_FRF, _POWER)
 _INDENTATION = (
-    replace(_FRF[0], high=0.95, starts=(0.0, 0.35)),
+    replace(_FRF[0], high=0.95, starts=(0.0, 0.1, 0.35)),
     Parameter(
         "relaxation_time", "s", _SHORTEST, 5e4, Normal(2.0, 2.5), "log", limit=None, shown=40.0, reason=_CURVE_TIME
     ),
     _POWER,
 )
-_STARTS = (0.02, 0.1, 0.4)  # of the longest recording, where fits of its time begin
+# Of the longest recording, where fits of its time begin: one much shorter than the loading shows at its foot alone
+_STARTS = (0.005, 0.02, 0.1, 0.4)
 
 
 class ContactCreep(Mechanism):

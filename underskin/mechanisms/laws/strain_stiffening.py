@@ -1,6 +1,7 @@
 """The mechanism `strain_stiffening`."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +25,7 @@ _LEAST_FORM = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
 
 _OF_CONTACTS = "1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more"
 _M = "m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself"
+_M_OF_CONTACT = "m of J = 3 (I/3)^(m/2): 2 of laws in I, 1 where the modulus grows with the strain of the contact"
 _C = "c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels"
 _Q = "q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's"
 _C2 = "c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %"
@@ -44,7 +46,7 @@ _SPHERE = (
     Parameter(
         "stiffening_form", "-", -2.0, 2.0, Uniform(), "linear", None, _Q, shown=1.0, starts=(-1.0, 1.0), closed=_FORMS
     ),
-    _EXPONENT,
+    replace(_EXPONENT, prior=Uniform(), reason=_M_OF_CONTACT),
 )
 _CYLINDER = (
     Parameter("second_over_first", "-", -1.0, 2.0, Normal(0.0, 0.3), "linear", 0.0, _C2, shown=0.1),
