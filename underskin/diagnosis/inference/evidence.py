@@ -425,9 +425,9 @@ def marginalise_curve_noise(evidence: Evidence, indices: Sequence[int]) -> Norma
     shifted = _with_levels(fitter, at[np.zeros(len(covariance), dtype=np.intp)], covariance)
     shifted = shifted[np.flatnonzero(shifted.cost < shifted.cost.min() + NEGLIGIBLE_NATS)]
     values, means, covariances = _quadratics(fitter, shifted)
-    free = np.flatnonzero(fitter.free[0])
+    free = np.flatnonzero(fitter.free)
     rows = np.searchsorted(free, indices)
-    low, high = fitter.low[0, free], fitter.high[0, free]
+    low, high = fitter.low[free], fitter.high[free]
     parts = [_truncated(mean, full, low, high)[1:] for mean, full in zip(means, covariances, strict=True)]
     return NormalMixture(
         _shares(values),
