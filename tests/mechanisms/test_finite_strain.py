@@ -53,6 +53,7 @@ def test_solved_stiffening() -> None:
 
     def misfit(fit: Floats, share: float) -> Floats:
         values = {"youngs_modulus": np.exp(fit[0]), "stiffening_coefficient": np.exp(fit[1]), "stiffening_form": 1.0}
+        values["stiffening_exponent"] = 2.0
         return force_of(["layered_contact", "strain_stiffening"], H_MM, H_MM * depths, share, **values) / solved - 1
 
     right, linear = (least_squares(misfit, [0.0, 1.0], args=(share,)) for share in (1.0, 0.0))

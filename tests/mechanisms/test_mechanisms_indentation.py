@@ -332,3 +332,18 @@ def test_stage_expected_stiff_sphere_s_size_says() -> None:
         assert stiffness.bounds[0] < np.log(1e-5)  # N/mm: the softest cantilevers
     assert usual[0] - usual[1] == pytest.approx(np.log(1000.0))
     assert np.exp(usual[0]) == pytest.approx(150.0)
+
+
+def test_loops_held_noisy_finite() -> None:
+    """A held or a noisy loop has a finite force under creep."""
+    stepped = np.concatenate([LOOP[:40], np.full(20, LOOP[40]), LOOP[40:]])
+    for single in (LOOP, stepped, LOOP + 2e-3 * np.random.default_rng(1).normal(size=len(LOOP))):
+        assert np.isfinite(force_at(["contact_creep"], single)).all()
+
+
+def test_wobble_in_air_presses_once() -> None:
+    """A sphere that moves forth and back in the air before it touches has the force of one that does not."""
+    air = np.concatenate([np.linspace(-0.08, -0.03, 8), np.linspace(-0.03, -0.08, 8)])
+    laws = ["adhesion", "contact_creep"]
+    with_wobble = force_at(laws, np.concatenate([air, LOOP]))[len(air) :]
+    assert with_wobble == pytest.approx(force_at(laws, np.concatenate([np.full(len(air), -0.08), LOOP]))[len(air) :])

@@ -414,7 +414,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.TWO_RESPONSES: "the two recordings' responses are {ratio:.3g} times as far apart as expected: a slip of "
     "units?",
     Reason.D33_NEEDED: "charge over force would need a d33 of {d33_pc_per_n:.3g} pC/N"
-    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}{_GIVEN_IN}",
+    f"{{declared_pc_per_n:, where {{declared_pc_per_n:g}} is declared|}}{_GIVEN_IN}{{slip:: {{slip}}|}}",
     Reason.PLACES: f"places lie at their own sensors only {_THOUSANDFOLD}: were they given in {{given_in}}, or the "
     f"sensors in "
     "{sensors_in}?",

@@ -157,7 +157,7 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
         raise InvalidInput(
             "diagnosis_id", f"a diagnosis of verdict {report['verdict']}", f"must be explained: {why_not}"
         )
-    reason = implausible_d33(report)
+    reason = implausible_d33(report, units_checked=campaign.units_checked)
     if reason is not None:
         raise InvalidInput("diagnosis_id", "a diagnosis", f"its d33 cannot be right: {reason}")
     if not campaign.of(FrfRecording):
@@ -215,13 +215,14 @@ def _law(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | None
     return {"law": law, "of_law": dict(stored["parameters"])}
 
 
-def implausible_d33(report: Mapping[str, Any]) -> str | None:
-    """Why the d33 of a `report/1`, the middle of its interval, is impossible for PVDF; None where it is possible."""
+def implausible_d33(report: Mapping[str, Any], *, units_checked: bool) -> str | None:
+    """Why the d33 of a `report/1`, the middle of its interval, is impossible for PVDF; None where it is possible, and
+    where the units of another are checked."""
     interval = report["d33"] or {}
     if not {"low", "high"} <= set(interval):
         return None
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
-    implausible = plausibility.implausibility(d33)
+    implausible = plausibility.implausibility(d33, units_checked=units_checked)
     return None if implausible is None else f"{d33:.4g} pC/N, {implausible.words}"
 
 

@@ -147,9 +147,6 @@ def snap_in_interval(displacement: Floats, force: Floats, time: Floats | None) -
     return (before, contact_point, after) if before < contact_point < after else None
 
 
-_RETURN = 0.5  # of the range of displacement: a way back that may end a contact
-
-
 def visible_contact(displacement: Floats, force: Floats, time: Floats | None) -> Mask | None:
     """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
     seen = curve_landmarks(displacement, force, time)

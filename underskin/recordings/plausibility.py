@@ -38,8 +38,9 @@ def implausible(campaign: Campaign) -> list[Finding]:
 
 def at_reading(campaign: Campaign) -> list[Finding]:
     """`implausible`, with slips of units of curves and of the dynamic force of all FRFs."""
-    slips = [*curve_course.implausible(prepared(campaign).campaign), *loose_sphere(campaign.of(FrfRecording))]
-    return [*implausible(campaign), *slips]
+    curves = prepared(campaign)
+    slips = [*curve_course.implausible(curves.campaign), *loose_sphere(campaign.of(FrfRecording))]
+    return [*_times(campaign), *overlapping_sensors(campaign), *curves.findings, *slips]
 
 
 def loose_sphere(recordings: Sequence[FrfRecording]) -> list[Finding]:

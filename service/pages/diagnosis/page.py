@@ -229,7 +229,7 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
     if (why_not is None and report["d33"] is None) or (law is not None and law["axis"] in OF_SAMPLES):
         return "it is of curves, which have no d33: a model of a skin is of FRFs"
     if why_not is None:
-        reason = implausible_d33(report)
+        reason = implausible_d33(report, units_checked=True)  # whether they are is asked on adoption
         return None if reason is None else f"its d33 cannot be right: {reason}"
     return why_not
 

@@ -244,7 +244,7 @@ class Fitter:
         Where mechanisms have covariance parameters these are correlated, so the steps are joint.
         """
         low, high = self._lowest, self._highest
-        points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
+        points, cost, moving = at.points, at.cost.copy(), np.flatnonzero(np.isfinite(at.cost))
         products = at.products.values
         for _ in range(steps):
             part = Evaluated(points, products, cost.copy()).subset(moving)

@@ -40,9 +40,9 @@ def rounded(value: float, digits: int = 4) -> float | None:
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
-def with_ends(value: float, low: float, high: float, *, digits: int = 4) -> dict[str, float | None]:
+def with_ends(value: float, low: float, high: float) -> dict[str, float | None]:
     """`value`, `low` and `high` to significant digits."""
-    return {key: rounded(float(end), digits) for key, end in zip(ENDS, (value, low, high), strict=True)}
+    return {key: rounded(float(end)) for key, end in zip(ENDS, (value, low, high), strict=True)}
 
 
 def scaled(parameter: Mapping[str, Any], factor: float) -> dict[str, float | None]:

@@ -191,6 +191,7 @@ class _Sets:
         best = min(fitted.best.cost for fitted in self.explanations.values())
         for request in requests:
             names, fitted = frozenset(request.names), self.problem.explain(request, best)
+            self.tried.add(names)
             before = self.explanations.get(names)
             if fitted is not None and (before is None or fitted.best.cost < before.best.cost - _STUCK):
                 self.explanations[names] = fitted

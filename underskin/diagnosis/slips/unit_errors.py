@@ -107,5 +107,7 @@ def unlikely_d33(ratio: Floats, declared: float | None) -> list[Finding]:
     if low <= d33 <= high:
         return []
     usual = (low, high) if declared else OF_PVDF
-    arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "units": unit_guess(_D33, d33, usual).units}
+    guess = unit_guess(_D33, d33, usual)
+    slip = None if guess.units else str(guess)
+    arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "units": guess.units, "slip": slip}
     return [Finding(Reason.D33_NEEDED, "", "frf_re_pc_per_n", arguments)]

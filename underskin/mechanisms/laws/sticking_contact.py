@@ -21,7 +21,8 @@ class StickingContact(Mechanism):
     the same is added to Hertz' contact, at its a/h), neo-Hookean with ν = 0.5, bonded to its base and without
     adhesion; between them σ is linear in f, which partial slip is not; what sticks in the static contact sticks in the
     oscillation. On an incompressible half space sticking changes nothing; at rT/h 0.6 it adds 8 % to σ and 15 % to its
-    increment with the load at a/h 0.9, 23 % and 35 % at 1.5, much as an edge that moves less does."""
+    increment with the load where the layer's contact has a/h 0.9, 23 % and 35 % at 1.5, much as an edge that moves less
+    does; with Hertz' contact at the same a/h about twice as much to the increment."""
     source = """Mossakovskii, J. Appl. Math. Mech. 27 (1963) 418; Spence, Proc. R. Soc. A 305 (1968) 55, for the linear
     half space; tablegen/sticking.py for the layer at finite strain."""
     stage = Stage.CONTACT

@@ -388,7 +388,7 @@ def _relaxing_again(
     reach = np.maximum(depth.max(axis=-1, keepdims=True), _SMALLEST) * np.linspace(0.0, 1.0, _RINGS + 1) ** 2
     slope = np.diff(_elastic(sphere, sphere.radius_at(reach, None), None)[0]) / np.diff(reach)
     force, edge = np.zeros(depth.shape), np.full(depth.shape, -1.0)
-    inputs = (depth, path.time, path.first_contact, path.again, reach[..., :-1], np.diff(slope, prepend=0.0))
+    inputs = (depth, path.time, path.first_contact, path.again, reach, np.diff(slope, prepend=0.0))
     ring_rows(*map(contiguous, inputs), *relaxation.of_points(len(depth)), force, edge)
     contact_mask = edge >= 0
     if sphere.stiffening is not None:
@@ -502,7 +502,11 @@ class IndentationModel(CurveModel):
         self.hidden_jumps = sticks and not bool(self._seen.all())
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
         deepest = self.displacement.max(axis=1) - 1e-3 * middles
-        self._again = np.array([presses_again(recording.displacement_mm) for recording in recordings])
+        # A sphere that moves in the air before it touches presses once
+        travels = [
+            np.maximum(recording.displacement_mm, middle) for recording, middle in zip(recordings, middles, strict=True)
+        ]
+        self._again = np.array([presses_again(travel) for travel in travels])
         self._deep = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
 
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:

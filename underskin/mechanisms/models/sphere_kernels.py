@@ -515,7 +515,7 @@ def _march(
     edge: Floats,
 ) -> None:
     """As `ring_rows`, of one curve."""
-    rings, reached = len(reach), 0
+    rings, reached = len(stiffness), 0
     pressed, memory = np.zeros(rings), np.zeros((rings, len(pairs[0])))
     for sample in range(first, len(depth)):
         before = max(sample - 1, first)
@@ -531,11 +531,10 @@ def _march(
                 outermost, excess = ring, beyond
             elif ring == outermost + 1:
                 gap = -beyond
-        if outermost + 1 == reached and reached < rings:
+        if outermost + 1 == reached:
             gap = reach[reached] - depth[sample]
         if outermost >= 0:
-            following = reach[min(outermost + 1, rings - 1)]
-            edge[sample] = reach[outermost] + excess / (excess + gap) * (following - reach[outermost])
+            edge[sample] = reach[outermost] + excess / (excess + gap) * (reach[outermost + 1] - reach[outermost])
 
 
 @compiled(f"void({_ROWS}, {_ROWS}, int64[:, ::1], boolean[::1], {_ROWS}, {_ROWS}, {_PAIRS}, {_ROWS}, {_ROWS})")
