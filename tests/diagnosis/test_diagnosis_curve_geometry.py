@@ -59,7 +59,7 @@ def test_a_neo_hookean_block_lacks_nothing(largest: float) -> None:
     strain = np.linspace(0.0, largest, 200)
     report = diagnosed(block(strain, neo_hookean(strain)))
     assert report.verdict == "no_mismatch"
-    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.03)  # with a zero that is unknown by 2 %
 
 
 @pytest.mark.parametrize(("pulled", "largest"), [(True, (0.3, 1.5)), (False, (0.08, 0.35))])

@@ -173,7 +173,7 @@ def test_killed_server_sent_cleared_away(place: Place) -> None:
     under_way = threading.Event()
 
     def slow() -> Iterator[bytes]:
-        yield b" " * 1_000_000
+        yield b" " * 3_000_000
         under_way.wait(240)
         yield b" "
 
