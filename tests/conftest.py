@@ -23,6 +23,7 @@ settings.register_profile(
 )
 settings.load_profile("tests")
 
+# A request waits for a busy machine, not for the 5 s after which httpx gives up by itself.
 for call in (httpx.Client.__init__, httpx.get, httpx.post, httpx.put, httpx.patch, httpx.delete, httpx.request):
     assert call.__kwdefaults__ is not None
     call.__kwdefaults__["timeout"] = httpx.Timeout(300)
