@@ -228,7 +228,6 @@ class Search:
         log_unlisted = np.logaddexp.reduce([weight for _, weight in unlisted]) if unlisted else -np.inf
         if named:
             named = [(fitted, weight) for (fitted, _), weight in zip(named, without_occam(named), strict=True)]
-            named += self._with_companions(named)
         weights = np.array([*(weight for _, weight in named), log_unlisted])
         probabilities = (1 - P_NOT_IN_MODEL_SPACE) * np.exp(weights - np.logaddexp.reduce(weights))
         probabilities[-1] += P_NOT_IN_MODEL_SPACE
@@ -246,29 +245,6 @@ class Search:
         log_size = math.log(fitted.best.levels.smooth)
         beneath = self.log_prior_beneath(fitted) - self.log_prior(fitted)
         return beneath + float(DISCREPANCY.log_density(log_size) - USUAL.log_density(log_size))
-
-    def _with_companions(self, named: Sequence[tuple[Explanation, float]]) -> list[tuple[Explanation, float]]:
-        """Of indentations: the sets with one mechanism more than one of these that gain evidence, but less than shows.
-
-        So little is no evidence, as laws of contact idealise, but no reason against the mechanism either: beside the
-        smaller set each has the weight of its prior.
-        """
-        lines = self.explanations[0].best.hypothesis.lines
-        if lines.kind != "indentation":
-            return []
-        shown = {frozenset(fitted.names): (fitted, weight) for fitted, weight in named}
-        companions = []
-        for fitted in self.explanations:
-            names = frozenset(fitted.names)
-            smaller = [names - {name} for name in names - even_laws(names, lines) if names - {name} in shown]
-            gains = [fitted.log_evidence > self._log_evidence[less] for less in smaller]
-            if names not in shown and smaller and all(gains):
-                weights = [
-                    weight + self.log_prior(fitted) - self.log_prior(less)
-                    for less, weight in (shown[less] for less in smaller)
-                ]
-                companions.append((fitted, max(weights)))
-        return companions
 
     def _by_curves_alone(self, answer: Answer) -> list[Answer]:
         """An answer with each set of mechanisms that act on the curves of another kind alone."""
