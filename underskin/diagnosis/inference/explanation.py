@@ -422,8 +422,8 @@ class FittingProblem:
             starts = best_starts(scattered, request.starting_point)
         improved, evidence = _fitted(scattered, starts, request, best)
         if evidence is None:
-            gains_nothing = np.isfinite(request.cost_to_beat(has_position_scatter=True))
-            return Explanation.of(fits) if fits and not gains_nothing else None
+            gains = fits and fits[0][1].cost < request.cost_to_beat(has_position_scatter=True)
+            return Explanation.of(fits) if gains else None
         if not fits and (request.without_scatter or hardly_scatters(evidence)):
             _, without = _fitted(plain, without_scatter(improved), request, min(best, evidence.cost))
             fits += [] if without is None else [(log_priors[0], without)]

@@ -418,8 +418,8 @@ class Fitter:
     def _may_beat(self, at: Evaluated, cost_to_beat: CostToBeat) -> bool:
         """Whether some point may get below the cost, by twice what its tangent, a Gauss–Newton step, promises to gain:
         of the pairs of curves that were fitted without this question none that gained was promised less."""
-        _, slope = self._step(at, np.full(len(at), _LEAST_DAMPING))
-        return bool((at.cost - slope < cost_to_beat(at)).any())
+        *_, promised = self._step(at, np.full(len(at), _LEAST_DAMPING))
+        return bool((at.cost - promised < cost_to_beat(at)).any())
 
     def _between_samples(self, at: Evaluated) -> Self:
         """With contact points confined to the interval between samples that they are in, where adhesion moves them."""
@@ -442,9 +442,9 @@ class Fitter:
         moving = np.arange(len(best))
         for _ in range(_MOST_ITERATIONS):
             part = best.subset(moving)
-            step, slope = self._step(part, damping[moving])
+            step, slope, promised = self._step(part, damping[moving])
             if cost_to_beat is not None:
-                promising = part.cost - _PROMISED * slope - _MARGIN < cost_to_beat(best)[moving]
+                promising = part.cost - _PROMISED * promised - _MARGIN < cost_to_beat(best)[moving]
                 moving, part, step, slope = moving[promising], part[promising], step[promising], slope[promising]
             resting = (slope < _CONVERGED) & self.has_log_slope_gradient(part)
             going = np.ones(len(part), dtype=bool)
@@ -543,9 +543,9 @@ class Fitter:
         log_slope_gradient[number, :, index] = (there - here[number]) / step[number, index][:, None]
         return replace(at, log_slope_gradient=log_slope_gradient)
 
-    def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats]:
-        """Damped Gauss–Newton steps of the mean parameters within the bounds, and the gains that the gradients
-        promise."""
+    def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats, Floats]:
+        """Damped Gauss–Newton steps of the mean parameters within the bounds, limited in length, and the gains that the
+        gradients promise for them and for the steps of full length."""
         information, gradient = self.posterior_equations(at)
         fit, low, high = at.points.fit, self.low, self.high
         free, every = np.broadcast_to(self.free, fit.shape), np.arange(fit.shape[1])
@@ -557,12 +557,14 @@ class Fitter:
             matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + least, 1.0)
             step = np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
             scale = np.abs(step) / np.maximum(_LARGEST_STEP, 0.3 * (high - low))
-            step /= np.maximum(1.0, scale.max(axis=1))[:, None]
+            shortened = np.maximum(1.0, scale.max(axis=1))
+            step /= shortened[:, None]
             leaving = free & (((fit <= low) & (step < 0)) | ((fit >= high) & (step > 0)))
             if not leaving.any():
                 break
             free = free & ~leaving
-        return step, (gradient * step).sum(axis=1)
+        slope = (gradient * step).sum(axis=1)
+        return step, slope, slope * shortened
 
 
 def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
