@@ -316,6 +316,7 @@ class Request:
     single: Explanation | None = None
     nuisances: FitPoint | None = None  # starting values of the nuisances, if not the parent's
     initial: Explanation | None = None  # starting values of all parameters
+    rival: Explanation | None = None  # what a fit must gain on, if not on the parent's
     never_pruned: bool = False  # fitted to convergence and explained, however far behind and even without gain
 
     @property
@@ -335,17 +336,14 @@ class Request:
         return self.parent is None or self.parent.p_position_scatter < _SCATTER_CERTAINTY
 
     def cost_to_beat(self, has_position_scatter: bool) -> float:
-        """The cost below which a fit gains enough on the parent's; ∞ where there is none to compare.
+        """The cost below which a fit gains enough on its rival's; ∞ where there is none to compare.
 
         Only fits that both have position scatter, or both lack it, are compared.
         """
-        if (
-            self.parent is None
-            or self.never_pruned
-            or (self.parent.p_position_scatter > 0.5) is not has_position_scatter
-        ):
+        rival = self.rival or self.parent
+        if rival is None or self.never_pruned or (rival.p_position_scatter > 0.5) is not has_position_scatter:
             return np.inf
-        return self.parent.best.cost - _LEAST_GAIN
+        return rival.best.cost - _LEAST_GAIN
 
 
 OtherKindsLikelihood = Callable[[Model, Lines], Gaussian | None]

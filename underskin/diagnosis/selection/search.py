@@ -190,10 +190,12 @@ class _Sets:
         """Fits that are better take the place of those before."""
         best = min(fitted.best.cost for fitted in self.explanations.values())
         for request in requests:
-            names, fitted = frozenset(request.names), self.problem.explain(request, best)
+            names = frozenset(request.names)
+            smaller = [self.explanations[part] for name in names if (part := names - {name}) in self.explanations]
+            rival = min((self.explanations.get(names), *smaller), key=lambda fitted: fitted.best.cost if fitted else np.inf)
             self.tried.add(names)
-            before = self.explanations.get(names)
-            if fitted is not None and (before is None or fitted.best.cost < before.best.cost - _STUCK):
+            fitted = self.problem.explain(replace(request, rival=rival), best)
+            if fitted is not None:
                 self.explanations[names] = fitted
 
 

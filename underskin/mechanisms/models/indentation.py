@@ -44,8 +44,9 @@ curve. The functions of a are compiled (sphere_kernels).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, cached_property, lru_cache, partial
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -403,6 +404,18 @@ def _relaxing_again(
     return force + adhesive, contact_mask | sticking
 
 
+def _at_points(state: Any, points: Indices) -> Any:
+    """A state whose arrays (points or 1, curves, samples, …) are those at some of the points."""
+    if isinstance(state, np.ndarray):
+        return state[points] if state.ndim > 2 and len(state) > 1 else state
+    if isinstance(state, Layers):
+        ratios = state.by_point if len(state.by_point) == 1 else [state.by_point[point] for point in points]
+        return Layers(_at_points(state.thickness, points), ratios)
+    if not is_dataclass(state) or isinstance(state, type):
+        return state
+    return replace(state, **{part.name: _at_points(getattr(state, part.name), points) for part in fields(state)})
+
+
 def relaxing_on_stage(
     sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
 ) -> tuple[Floats, Mask]:
@@ -418,16 +431,23 @@ def relaxing_on_stage(
     force, contact_mask = relaxing(sphere, relaxation, adhesion, replace(path, travel=depth))
     for _ in range(_ITERATIONS):
         residual = np.where(touched, depth + compliance * force - travel, 0.0)
-        if (np.abs(residual) <= _SETTLED * scale).all():
+        moving = np.flatnonzero((np.abs(residual) > _SETTLED * scale).any(axis=(1, 2)))
+        if not len(moving):
             break
-        moved = depth - residual / (1 + compliance * slope)
-        after, contact_mask = relaxing(sphere, relaxation, adhesion, replace(path, travel=moved))
-        change = moved - depth
+        before, steepness, compliances = depth[moving], slope[moving], _at_points(compliance, moving)
+        moved = before - residual[moving] / (1 + compliances * steepness)
+        after, contact_mask[moving] = relaxing(
+            _at_points(sphere, moving),
+            _at_points(relaxation, moving),
+            _at_points(adhesion, moving),
+            Path(moved, path.time[moving], path.first_contact[moving], path.again),
+        )
+        change = moved - before
         with np.errstate(divide="ignore", invalid="ignore"):
-            secant = (after - force) / change
-        far = np.abs(change) > 1e-12 * scale
-        slope = np.where(far & np.isfinite(secant) & (secant > 0), 0.5 * (slope + np.minimum(secant, 4 * slope)), slope)
-        depth, force = moved, after
+            secant = (after - force[moving]) / change
+        far = (np.abs(change) > 1e-12 * scale[moving]) & np.isfinite(secant) & (secant > 0)
+        slope[moving] = np.where(far, 0.5 * (steepness + np.minimum(secant, 4 * steepness)), steepness)
+        depth[moving], force[moving] = moved, after
     lost = np.maximum.accumulate(np.abs(residual) > _UNSETTLED * scale, axis=-1) & touched
     contact_mask = contact_mask & ~lost
     return np.where(contact_mask, force, 0.0), contact_mask

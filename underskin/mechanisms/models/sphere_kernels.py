@@ -310,7 +310,8 @@ def edge_rows(advancing: Floats, receding: Floats, contact_mask: Mask, a: Floats
 
 
 _SERIES = 1e-3
-_SECANTS, _SETTLED = 12, 1e-9  # of the edge's place between two samples
+_SECANTS, _SETTLED = 12, 1e-6  # of the edge's place between two samples
+_SAME_INTERVAL = 1e-9  # relative, of clocks whose steps differ by rounding
 
 Pairs = tuple[Floats, Floats]  # g and τ
 Now = tuple[float, float, Floats]  # depth, time, memory of depths
@@ -335,10 +336,13 @@ def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) ->
             u, t, memories = history[point, curve], time[point, curve], memory[point, curve]
             for pair in range(times.shape[1]):
                 memories[0, pair] = u[0]
+                interval, decay, lagging = -1.0, 0.0, 0.0
                 for sample in range(1, samples):
-                    x = max(t[sample] - t[sample - 1], 0.0) / times[point, pair]
-                    step = _lagging(x) * (u[sample] - u[sample - 1])
-                    memories[sample, pair] = math.exp(-x) * memories[sample - 1, pair] + step
+                    passed = max(t[sample] - t[sample - 1], 0.0)
+                    if abs(passed - interval) > _SAME_INTERVAL * passed:
+                        interval, x = passed, passed / times[point, pair]
+                        decay, lagging = math.exp(-x), _lagging(x)
+                    memories[sample, pair] = decay * memories[sample - 1, pair] + lagging * (u[sample] - u[sample - 1])
 
 
 @compiled()
@@ -371,17 +375,34 @@ def _between(low: int, high: int, share: float, rings: Rings, pairs: Pairs, memo
 
 
 @compiled()
-def _last_sample(low: int, high: int, record: Indices, rings: Rings, pairs: Pairs, now: Now) -> int:
-    """The last of the samples from `low`, whose ring holds, to `high` whose ring holds."""
-    if _excess(high, rings, pairs, now) >= 0:
-        return high
-    while high - low > 1:
-        middle = (low + high) // 2
-        # What was reached between two records was not deeper than the first of them.
+def _last_sample(first: int, high: int, near: int, record: Indices, rings: Rings, pairs: Pairs, now: Now) -> int:
+    """The last of the samples from `first` to `high` whose ring holds, searched from a sample `near` it in ever longer
+    steps and then by halving; −1 where not even the first one does.
+
+    What was reached between two records was not deeper than the first of them.
+    """
+    step = 1
+    if _excess(record[near], rings, pairs, now) >= 0:
+        low, beyond = near, near + step
+        while beyond <= high and _excess(record[beyond], rings, pairs, now) >= 0:
+            step *= 2
+            low, beyond = beyond, min(beyond + step, max(high, beyond + 1))
+        beyond = min(beyond, high + 1)
+    else:
+        low, beyond = near - step, near
+        while low > first and _excess(record[low], rings, pairs, now) < 0:
+            step *= 2
+            low, beyond = low - step, low
+        if low <= first:
+            if beyond <= first or not _excess(first, rings, pairs, now) >= 0:
+                return -1
+            low = first
+    while beyond - low > 1:
+        middle = (low + beyond) // 2
         if _excess(record[middle], rings, pairs, now) >= 0:
             low = middle
         else:
-            high = middle
+            beyond = middle
     return low
 
 
@@ -449,13 +470,16 @@ def creep_edge_rows(
         for curve in range(curves):
             here = point, curve
             rings = depth[here], time[here], depth_memory[here], advancing_stretch[here], receding_stretch[here]
-            first = first_contact[here]
+            first, low = first_contact[here], samples
             for sample in range(first, samples):
                 high = record[point, curve, sample]
                 now = depth[point, curve, sample], time[point, curve, sample], depth_memory[point, curve, sample]
-                if high == sample or not _excess(first, rings, pairs, now) >= 0:
+                if high == sample:
+                    low = sample
                     continue
-                low = _last_sample(first, high, record[here], rings, pairs, now)
+                low = _last_sample(first, high, min(max(low, first), high), record[here], rings, pairs, now)
+                if low < 0:
+                    continue
                 high = min(low + 1, high)
                 share = _share(low, high, rings, pairs, now, memory) if high > low else 0.0
                 _between(low, high, share, rings, pairs, memory)
