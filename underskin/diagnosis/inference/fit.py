@@ -54,6 +54,7 @@ _TRIES, _SHORTER, _LEAST_GAIN = (
     1e-3,
 )  # tries of a step without gain, its shortening, and the gain that ends them
 _LEAST_DAMPING = 1e-3  # of a first Gauss–Newton step
+_MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
 CostToBeat = Callable[[Evaluated], Floats]  # costs (points,) that points must get below
 
 
@@ -399,19 +400,23 @@ class Fitter:
             moves[span] &= not self.lines.mechanisms[name].needs_lines
         return moves
 
-    def improve(self, start: Points, cost_to_beat: CostToBeat | None = None) -> Evaluated:
-        """The most probable points near the starts; only roughly where they will not reach `cost_to_beat`."""
+    def improve(self, start: Points, cost_to_beat: CostToBeat | None = None, near_cost: float = np.inf) -> Evaluated:
+        """The most probable points near the starts; only roughly where they will not reach `cost_to_beat`.
+
+        Curves are not fitted where no start's tangent promises that; tangents count if a start is below `near_cost`.
+        """
         if not self.lines.curves:
             return self.update_noise_levels(
                 self.descend(self.update_noise_levels(self.evaluate(start), 3), 1, cost_to_beat), 2
             )
         from_starts = self.update_noise_levels(self.evaluate(start), _CURVE_SETTLING)
-        if cost_to_beat is not None and not self._may_beat(from_starts, cost_to_beat):
+        is_near = from_starts.cost.min() < near_cost
+        if cost_to_beat is not None and is_near and not self._may_beat(from_starts, cost_to_beat):
             return from_starts
         initial = by_least_squares(self, start)
         if from_starts.cost.min() < initial.cost[0]:
             initial = from_starts.best
-        if cost_to_beat is not None and not self._may_beat(initial, cost_to_beat):
+        if cost_to_beat is not None and initial.cost[0] > cost_to_beat(initial)[0] + _MAY_GAIN:
             return initial
         return self.update_noise_levels(self._between_samples(initial).descend(initial, 1), _CURVE_SETTLING)
 

@@ -192,7 +192,9 @@ class _Sets:
         for request in requests:
             names = frozenset(request.names)
             smaller = [self.explanations[part] for name in names if (part := names - {name}) in self.explanations]
-            rival = min((self.explanations.get(names), *smaller), key=lambda fitted: fitted.best.cost if fitted else np.inf)
+            rival = min(
+                (self.explanations.get(names), *smaller), key=lambda fitted: fitted.best.cost if fitted else np.inf
+            )
             self.tried.add(names)
             fitted = self.problem.explain(replace(request, rival=rival), best)
             if fitted is not None:
