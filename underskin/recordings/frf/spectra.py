@@ -14,7 +14,7 @@ refined by the advance of the phase over the step. Amplitude X means x = Re(X e^
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,7 @@ def without_drift(blocks: Floats) -> Floats:
 
 _CLIPPED_RUN = 3  # samples in a row at the extreme value
 _CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1) = 2.4 times the samples of the next
+_FLICKERING = (1, 2, 4)  # levels: none, one or two bits flicker
 _HELD_RUN = 5  # samples in a row of one value
 _COARSE = 0.2  # share of samples equal to the one before, above which the levels are coarse
 _ONE_LEVEL = 1.5
@@ -161,7 +162,7 @@ def defects(channel: str, signal: Floats) -> list[Defect]:
     if len(signal) < 3:
         return []
     rest = _rest(signal)
-    clipped = _overload(signal) & ~rest
+    clipped = _overload(signal, rest)
     held = _held(signal) & ~clipped & ~rest
     jump = _jumps(signal) & ~clipped & ~held
     kinds = ((DefectKind.OVERLOAD, clipped), (DefectKind.HELD_SAMPLES, held), (DefectKind.JUMP, jump))
@@ -181,16 +182,18 @@ def _rest(signal: Floats) -> Mask:
     return np.asarray(signal == np.median(signal)) if _kurtosis(signal) > _BLOW else np.zeros(len(signal), dtype=bool)
 
 
-def _overload(signal: Floats) -> Mask:
+def _overload(signal: Floats, rest: Mask) -> Mask:
+    """Runs of samples, not at `rest`, at either end of the range, where they accumulate on one level, or on a few of a
+    converter whose last bits flicker."""
     mask = np.zeros(len(signal), dtype=bool)
-    levels, counts = np.unique(signal, return_counts=True)
-    if len(levels) < 3:
-        return mask
-    for end, neighbour in ((0, 1), (-1, -2)):
-        if counts[end] > _CLIPPED_RATIO * counts[neighbour]:
-            for first, count in _runs(signal == levels[end]):
-                if count >= _CLIPPED_RUN:
-                    mask[first : first + count] = True
+    levels, counts = np.unique(signal[~rest], return_counts=True)
+    for several, ordered in product(_FLICKERING, (slice(None), slice(None, None, -1))):
+        level, count = levels[ordered], counts[ordered]
+        ends, next_ones = count[:several].sum(), count[several : 2 * several].sum()
+        if len(levels) > 2 * several and ends > _CLIPPED_RATIO * next_ones:
+            for first, samples in _runs(np.isin(signal, level[:several]) & ~rest):
+                if samples >= _CLIPPED_RUN:
+                    mask[first : first + samples] = True
     return mask
 
 
