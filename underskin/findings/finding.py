@@ -535,8 +535,6 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.NO_SIMPLE_LAW: no_simple_law,
     Reason.UNUSUAL_SCATTER: "the gain of the recordings scatters by {percent:.2g} %, and by {usual:.2g} % on a poor "
     "rig: something that no recording states changes from one to the next",
-    Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for {mechanisms}: a platen that is "
-    "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it",
     Reason.LOAD_NOT_LINEAR: "L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left "
     "out; it "
     "adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere"
