@@ -139,7 +139,7 @@ def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
         stretch = 1.0 - sign * strain
         if farthest > 0 and (beside := nominal_stress(stretch, *law) / neo_hookean(stretch)).min() < _BELOW:
             places = dict.fromkeys((int(beside.argmin()), len(strain) - 1))
-            parts = [f"{beside[place]:.2g} at {100 * strain[place]:.2g} % strain" for place in places]
+            parts = [f"{beside[place]:.2g} at {100 * strain[place]:.0f} % strain" for place in places]
             said.append(f"as it is {how}, its force over that of a neo-Hookean solid is {' and '.join(parts)}")
     return f"A{'; '.join(said)[1:]}." if said else ""
 
