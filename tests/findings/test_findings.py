@@ -14,7 +14,17 @@ from tests.support.repository import ROOT
 from underskin.array_stress.request import read_request
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_one_of, required, unequal_lengths, wrong_type
 from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
-from underskin.findings.finding import ENGLISH, LACKING, OPTIONAL, Finding, ImplausibleD33, UnitGuess, Words, lacking
+from underskin.findings.finding import (
+    ENGLISH,
+    LACKING,
+    OPTIONAL,
+    Finding,
+    ImplausibleD33,
+    UnitGuess,
+    Words,
+    lacking,
+    statement,
+)
 from underskin.recordings.campaign import from_dict, parse
 from underskin.units import checked
 
@@ -47,6 +57,10 @@ def test_the_page_explains_each_code_once() -> None:
     for part, codes in ((findings, FindingCode), (errors, ErrorCode)):
         explained = re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)
         assert sorted(explained) == sorted(codes)
+
+
+def test_no_percent_is_less_than_nothing() -> None:
+    assert "(0 % of the array's d33)" in statement(Reason.DEAD, {"percent": -1e-3})
 
 
 def test_code_reason_reason_words() -> None:

@@ -170,12 +170,22 @@ def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> s
     return f"{faint} of {measured} lines of {of} are left out: {why}{beyond}"
 
 
+_STATED_PERCENT = 0.1  # of an FRF: less is not worth a word
+
+
 def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
     """Noise that biases an estimator."""
     channel = {"H1": "the force", "H2": "the charge", "Hv": "force and charge"}[estimator]
     size = "small" if percent < 0 else "large"
+    if abs(percent) < _STATED_PERCENT:
+        either = "noise in force or charge, which these lines do not tell apart, may bias"
+        return f"{either} {estimator}: ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
     text = f"noise in {channel} makes {estimator} too {size} by {in_digits(abs(percent), 2)} %: that was taken off"
-    return f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open" if unsure_percent >= 0.1 else text
+    return (
+        f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
+        if unsure_percent >= _STATED_PERCENT
+        else text
+    )
 
 
 def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
@@ -323,7 +333,7 @@ def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
 
 
 _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
-_OF_ARRAY = "{percent:.0f} % of the array's d33"
+_OF_ARRAY = "{percent:z.0f} % of the array's d33"
 _MORE_ROWS = "{more: ({more} more rows like it)|}"
 _UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
 _GIVEN_IN = "{units:; was charge over force given in {units:or}?|}"
@@ -479,7 +489,7 @@ ENGLISH: Mapping[Reason, Words] = {
     "others': is their "
     "dynamic force or charge given as {meant} instead of peak? Put right by this factor ({of:listed recordings})"
     "{left_out:; {left_out} that do not tell were left out|}",
-    Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
+    Reason.WARM_UP: "the response drifts by {percent:+z.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "
     f"{{charge_mean_pc:.3g}}, where "
@@ -554,7 +564,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.STRONG: f"strong: {_OF_ARRAY}",
     Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
     Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",
-    Reason.BENT: "bent: its d33 curves by {percent:+.0f} % over the preloads",
+    Reason.BENT: "bent: its d33 curves by {percent:+z.0f} % over the preloads",
 }
 
 
