@@ -193,4 +193,4 @@ def test_a_filter_far_off_the_band_is_not_told(table: SigmaTable) -> None:
 def test_a_dead_sensor_stays_dead(table: SigmaTable) -> None:
     """No delay is read from noise."""
     inversion = invert(shaken(charge=lambda f: np.zeros(len(f), dtype=complex)), table)
-    assert [str(flag.code) for flag in inversion.flags] == ["dead"]
+    assert [flag.sentence for flag in inversion.flags] == ["sensor s01: dead: no charge beyond noise"]

@@ -268,6 +268,7 @@ OPTIONAL: Mapping[str, Any] = {
     "guess": None,
     "example": "",
     "frequency_hz": None,
+    "others": True,
 }  # arguments of some findings
 
 
@@ -554,7 +555,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CONTACT_SLIPS: "the tangential force is {ratio:.3g} times the normal one: it slips unless friction is "
     "stronger"
     "{more: ({more} more contacts like it)|}",
-    Reason.DEAD: f"dead: no charge beyond noise ({_OF_ARRAY})",
+    Reason.DEAD: f"dead: no charge beyond noise{{others: ({_OF_ARRAY})|}}",
     Reason.INVERTED: f"inverted polarity: {_OF_ARRAY}",
     Reason.WEAK: f"weak: {_OF_ARRAY}",
     Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
