@@ -111,6 +111,7 @@ def test_a_limit_at_which_the_last_bit_flickers_or_noise_lies_is_one(bits: int, 
     for force in (
         np.round(clipped / step) * step - step * (random.random(len(depth)) < 0.5) * (clipped == limit),
         clipped + 1e-3 * limit * random.normal(size=len(depth)),
+        np.round((clipped + 3e-4 * limit * random.normal(size=len(depth))) / (5e-4 * limit)) * 5e-4 * limit,
     ):
         finding = only(campaign(depth, force))
         assert finding.code == "force_saturates"

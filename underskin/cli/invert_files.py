@@ -163,7 +163,7 @@ def _array(inversion: Inversion, estimators: str) -> Table:
     listed.add_row("skin as declared", f"± {inversion.declared_percent:.2g} % of all d33, in the array's alone")
     chosen = f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz, as asked"
     if estimators:
-        listed.add_row("FRFs of series", f"by {estimators}, its bias by noise taken off where it is known")
+        listed.add_row("FRFs of series", f"by {estimators}; its bias by noise is taken off where it is known")
     listed.add_row("band", chosen if zone.chosen_by_user else zone.reason)
     return listed
 

@@ -340,7 +340,7 @@ _MOVED = 0.02  # of the range of travel: least travel during them
 _LONGER = 4.0  # times the longest run of any other value: steps of a converter are equally long everywhere
 _MOST_OF_WAY, _PACE = 0.75, 0.5  # of the travel at the limit, and of the stage's speed, at least: creep is slower
 _DEEP = 0.8  # share of the other samples that lie less deep than the saturated ones
-_NOISE_BAND, _DEVIATIONS_OF_MEDIAN = 7.0, 1.4826  # standard deviations that hold a thousand samples of one value
+_NOISE_BAND = 7.0  # standard deviations that hold a thousand samples of one value
 _DIGITS, _ROUNDED = 9, 1e-6  # of the range of force, and of a width at its edge: below are errors of rounding
 _LEAST_BANDS = 10.0  # such bands between air and limit: in fewer a contact may look as constant
 _NEARLY_ALL = 0.9  # of the samples within the widest of these bands: a narrower one holds the same
@@ -394,13 +394,13 @@ def saturated(travel: Floats, force: Floats, *, sphere: bool) -> tuple[Mask, lis
     shallow = force[depth <= np.quantile(depth, _SHALLOW_SHARE)]
     air = float(np.quantile(shallow, 0.5, method="nearest"))
     step = float(np.diff(np.unique(np.round(force / np.ptp(force), _DIGITS))).min()) * float(np.ptp(force))
-    noise = float(np.quantile(np.abs(shallow - air), 0.5)) * _DEVIATIONS_OF_MEDIAN
+    noise = float(np.sqrt(np.pi / 2) * np.mean(np.abs(shallow - air)))  # the median is 0 where a converter is coarse
     pressed = max(extremes, key=lambda extreme: (extreme - air) * (force[np.argmax(depth)] - air))
     for extreme in extremes:
         widths = [0.0]  # adhesion makes a least force, and foam a plateau, that lie within noise as well
         if extreme == pressed:
-            is_narrow = _LEAST_BANDS * _NOISE_BAND * noise < abs(extreme - air)
-            widths += [2 * step, _NOISE_BAND * noise] if sphere and is_narrow else [2 * step]
+            band = max(_NOISE_BAND * noise, 2 * step)
+            widths += [2 * step, band] if sphere and _LEAST_BANDS * band < abs(extreme - air) else [2 * step]
         found = [
             mask
             for width in widths
