@@ -422,7 +422,8 @@ def _at_limit(travel: Floats, depth: Floats, below: Floats, air: float, width: f
     at_limit = np.asarray(level == 0)
     runs_at_limit = [run for run in runs if level[run[0][0]] == 0]
     longest, moved = max(runs_at_limit, key=lambda run: run[1], default=(np.zeros(0, dtype=np.intp), 0.0))
-    is_long = moved >= max(_MOVED * np.ptp(travel), _LONGER * max(others, default=0.0))
+    by_slope = width / max(air, width) * np.ptp(travel) if width else 0.0  # the travel through a band, as on average
+    is_long = moved >= max(_MOVED * np.ptp(travel), _LONGER * max(others, default=0.0), _LONGER * by_slope)
     is_deep = (
         is_long and (~at_limit).sum() >= _EQUAL and np.median(depth[at_limit]) > np.quantile(depth[~at_limit], _DEEP)
     )
