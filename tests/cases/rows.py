@@ -52,7 +52,7 @@ CURVES: list[Row] = [
     ("curves", _by_rig("tension_and_compression"), ONE, Right(1.0, 0.05)),
     ("curves", _by_rig("side_by_side"), Right(0.005), None),
     ("curves", "side_by_side.csv --rig side_by_side_joined.yaml", Right(0.005), None),
-    ("curves", _by_rig("helper_columns", "xlsx"), ONE, None),
+    ("curves", _by_rig("helper_columns", "xlsx"), ONE, _nothing(never="does not describe")),
     ("curves", _by_rig("headings_without_units", "txt"), Right(0.5), None),
     ("curves", _by_rig("comma_property"), Right(0.05), None),
 ]
@@ -132,7 +132,7 @@ FRF: list[Row] = [
     ("frf", _by_rig("force-in-lbs-ac-coupled"), Right(14.0, or_none=True), None),
     ("frf", "blows-force-window.csv --rig blows.yaml", Right(14.0), None),
     ("frf", "blows-force-noise.csv --rig blows.yaml", Right(14.0, 0.2, says="noise|H2"), None),
-    ("frf", "blows-force-noise.csv --rig blows.yaml --estimator H2", Right(14.0), None),
+    ("frf", "blows-force-noise.csv --rig blows.yaml --estimator H2", Right(14.0, says="its bias by noise"), None),
 ]
 MAY = "glove7_may_tpl.xlsx"
 LAB: list[Row] = [

@@ -288,6 +288,28 @@ def test_friction_platens_told_modulus_two(table: SigmaTable) -> None:
 
 
 @pytest.mark.slow
+def test_a_strip_is_called_softer_only_where_it_is(table: SigmaTable) -> None:
+    """A strip that softens first and then stiffens is said to do both, with the strains of the recording."""
+    random, stretch = np.random.default_rng(1), np.linspace(1.0, 2.2, 160)
+    invariant = stretch**2 + 2 / stretch - 3
+    force = -9 * np.pi / 3 * (stretch - stretch**-2) * (0.7 + 0.3 / stretch + 0.05 * invariant**2)
+    strip = {
+        "id": "strip", "kind": "compression", "sample_height_mm": 20.0, "sample_diameter_mm": 6.0,
+        "displacement_mm": (20 * (1 - stretch)).tolist(),
+        "force_n": (force + 2e-3 * np.abs(force).max() * random.normal(size=160)).tolist(),
+    }  # fmt: skip
+    campaign = {"schema": "campaign/1", "name": "strip", "skin": {"poisson_ratio": 0.5}, "recordings": [strip]}
+    report = underskin.diagnose(parse(campaign), table)
+    words = r"force over that of a neo-Hookean solid is ([\d.]+) at (\d+) % strain and ([\d.]+) at 118 % strain"
+    said = re.search(words, report.statement)
+    assert said, report.statement
+    softest, strain, end = map(float, said.groups())
+    assert softest == pytest.approx(0.92, abs=0.03)
+    assert 30 < strain < 70
+    assert end == pytest.approx(1.18, abs=0.06)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", first(1, [1, 2]))
 def test_seating_platen_no_stiffening_stiffening(seed: int, table: SigmaTable) -> None:
     """A seating platen is no stiffening and stiffening no seat."""

@@ -14,7 +14,17 @@ from tests.support.repository import ROOT
 from underskin.array_stress.request import read_request
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_one_of, required, unequal_lengths, wrong_type
 from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
-from underskin.findings.finding import ENGLISH, LACKING, OPTIONAL, Finding, ImplausibleD33, UnitGuess, Words, lacking
+from underskin.findings.finding import (
+    ENGLISH,
+    LACKING,
+    OPTIONAL,
+    Finding,
+    ImplausibleD33,
+    UnitGuess,
+    Words,
+    lacking,
+    statement,
+)
 from underskin.recordings.campaign import from_dict, parse
 from underskin.units import checked
 
@@ -49,9 +59,13 @@ def test_the_page_explains_each_code_once() -> None:
         assert sorted(explained) == sorted(codes)
 
 
+def test_no_percent_is_less_than_nothing() -> None:
+    assert "(0 % of the array's d33)" in statement(Reason.DEAD, {"percent": -1e-3})
+
+
 def test_code_reason_reason_words() -> None:
     """Each code has a reason and each reason words."""
-    assert {reason.code for reason in Reason} == set(FindingCode)
+    assert {reason.code for reason in Reason} == set(FindingCode) - {FindingCode.SEATING}  # of stored reports
     assert set(ENGLISH) == set(Reason)
     assert set(LACKING) == set(Lack)
 

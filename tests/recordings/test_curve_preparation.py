@@ -100,6 +100,25 @@ def test_quiet_zero_hold_hide_no_saturation(corners: tuple[float, ...]) -> None:
     assert finding.arguments["samples"] == int((force > force.max() - 1e-4).sum())
 
 
+@pytest.mark.parametrize("corners", [(-0.1, 0.3), (-0.1, 0.3, -0.1)])
+@pytest.mark.parametrize("bits", [12, 16])
+def test_a_limit_at_which_the_last_bit_flickers_or_noise_lies_is_one(bits: int, corners: tuple[float, ...]) -> None:
+    """A channel at its limit reads one value, but for the last bit of a converter and for noise added behind it."""
+    depth, random = ways(*corners), np.random.default_rng(bits)
+    limit = 0.75 * hertz(np.array(0.3))
+    step = 2.0 * limit / 2**bits
+    clipped = np.minimum(pressed(depth), limit)
+    for force in (
+        np.round(clipped / step) * step - step * (random.random(len(depth)) < 0.5) * (clipped == limit),
+        clipped + 1e-3 * limit * random.normal(size=len(depth)),
+        np.round((clipped + 3e-4 * limit * random.normal(size=len(depth))) / (5e-4 * limit)) * 5e-4 * limit,
+    ):
+        finding = only(campaign(depth, force))
+        assert finding.code == "force_saturates"
+        assert finding.arguments["samples"] >= 0.98 * int((clipped == limit).sum())
+        assert modulus_mpa(campaign(depth, force)) == pytest.approx(1.0, rel=0.02)
+
+
 @pytest.mark.parametrize("creep", [0.05, 0.1])
 def test_a_held_load_is_no_saturation(creep: float) -> None:
     """The load rises to one value and stays there while the sample creeps, by a share of the depth."""

@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from underskin.recordings.frf.flat_zone import (
     mains_lines,
     roll_off,
 )
-from underskin.recordings.frf.line_choice import usable_lines
+from underskin.recordings.frf.line_choice import bin_of, edges_over, usable_lines
 from underskin.recordings.frf.spectra import Frf, stacked
 from underskin.units import Complexes, Floats
 
@@ -173,6 +174,17 @@ def test_lowest_resonances_ends_zone_named() -> None:
     assert zone.low_hz == LOG_GRID[0]
     assert "the sphere of 4 mm radius at 0.5 N" in zone.reason
     assert "moving with the contact" in zone.reason
+
+
+def test_a_low_end_that_only_scatters_is_no_high_pass() -> None:
+    """A single bin that is low at the end of the range tells no filter."""
+    frfs, conditions = recorded(LOG_GRID, "", line=0.002)
+    edges = edges_over(LOG_GRID)
+    lowest = bin_of(LOG_GRID, edges) == 0
+    low = [replace(frf, values=np.where(lowest, 0.9, 1.0) * frf.values) for frf in frfs]
+    reason = flat_zone(stacked(low), conditions).reason
+    assert "falls or scatters" in reason
+    assert "high-pass" not in reason
 
 
 def test_high_pass_begins_relaxation_not_end() -> None:

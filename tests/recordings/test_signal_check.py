@@ -18,6 +18,21 @@ def test_overload_seen_nowhere_else() -> None:
     assert defects("charge_pc", charge) == []
 
 
+@pytest.mark.parametrize("bits", [1, 2])
+def test_overload_of_a_converter_whose_last_bits_flicker(bits: int) -> None:
+    """At the limit of a converter its last bits flicker; samples accumulate on the levels that they make."""
+    random, (_, charge) = np.random.default_rng(bits), shaken(7)
+    step = np.ptp(charge) / 2**14
+    ceiling = np.quantile(charge, 0.98)
+    levels = np.round(np.minimum(charge, ceiling) / step)
+    flickering = levels - (levels == levels.max()) * random.integers(0, 2**bits, len(charge))
+    found = defects("charge_pc", step * flickering)
+    assert {defect.kind for defect in found} == {"overload"}
+    steady = defects("charge_pc", step * levels)
+    assert sum(defect.samples for defect in found) == pytest.approx(sum(defect.samples for defect in steady), rel=0.05)
+    assert defects("charge_pc", step * np.round(charge / step)) == []
+
+
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_a_few_samples_show_no_defect(samples: int) -> None:
     signal = np.arange(float(samples))
@@ -40,7 +55,7 @@ def test_broadband_leaves_damaged_blocks_out() -> None:
 
 def test_coarse_whole_sine_not_called_overloaded() -> None:
     """A coarse but whole sine is not called overloaded or held."""
-    for amplitude in (7.3, 20.0, 50.5):
+    for amplitude in (7.3, 20.0, 50.5, 203.2):
         sine = np.round(amplitude * np.sin(2 * np.pi * np.arange(20_000) * 3.1 / RATE))
         assert defects("force_n", sine) == []
 

@@ -26,6 +26,7 @@ from underskin.inversion.elastomer import RecordingModulus
 from underskin.inversion.invert import Inversion, array_d33_by_other, invert
 from underskin.prediction.answers import OTHER, WORDS
 from underskin.recordings import plausibility, validation
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.reading import Reading, join, read_file
 from underskin.recordings.rig_description import RigDescription
@@ -92,7 +93,7 @@ def write_tables(results: Iterable[InvertedFile]) -> None:
     for result in results:
         console.print(Text(result.title, style="bold"))
         if isinstance(result.inversion, Inversion):
-            console.print(_array(result.inversion))
+            console.print(_array(result.inversion, _estimators(result.reading.campaign)))
             console.print(_sensors(result.inversion))
         if any(not isinstance(modulus.result, InvalidInput) for modulus in result.moduli):
             console.print(_elastomer(result.moduli))
@@ -136,7 +137,13 @@ def _full(numbers: Sequence[float]) -> list[str]:
     return ["NaN" if number != number else repr(number) for number in numbers]
 
 
-def _array(inversion: Inversion) -> Table:
+def _estimators(campaign: Campaign) -> str:
+    """Those of FRFs that are estimated from time series, in words; empty without any."""
+    series = [recording for recording in campaign.of(FrfRecording) if recording.sample_rate_hz is not None]
+    return " and ".join(dict.fromkeys(recording.estimator or "H1" for recording in series))
+
+
+def _array(inversion: Inversion, estimators: str) -> Table:
     listed = Table.grid(padding=(0, 2))
     zone = inversion.zone
     quantities = ("d33 of the array", inversion.absolute_d33), ("relative to others", inversion.campaign_d33)
@@ -155,6 +162,8 @@ def _array(inversion: Inversion) -> Table:
             listed.add_row(name, f"± {value:.2g} {unit} (95 %: {low:.2g} to {high:.2g})")
     listed.add_row("skin as declared", f"± {inversion.declared_percent:.2g} % of all d33, in the array's alone")
     chosen = f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz, as asked"
+    if estimators:
+        listed.add_row("FRFs of series", f"by {estimators}; its bias by noise is taken off where it is known")
     listed.add_row("band", chosen if zone.chosen_by_user else zone.reason)
     return listed
 

@@ -196,7 +196,7 @@ def _departure(sensor: Document) -> str:
         return "none: it answers in one campaign at most"
     value, low, high = (departure[name] for name in ("change_percent", "change_low_percent", "change_high_percent"))
     weight = "departs" if departure["significant"] else "as the array"
-    return f"{value:+.1f} % ({low:+.1f} to {high:+.1f}), {weight}"
+    return f"{value:+z.1f} % ({low:+z.1f} to {high:+z.1f}), {weight}"
 
 
 def _trend(sensor: Document) -> str:

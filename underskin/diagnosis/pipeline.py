@@ -38,7 +38,6 @@ from underskin.diagnosis.validation.signatures import (
     hidden_shifts,
     power,
     remaining_confounding,
-    without_seating,
 )
 from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
@@ -180,10 +179,6 @@ def _diagnose_curves(
 
     joined = other_kinds.joined(fit)
     problem, result = joined.problem, joined.search
-    unseated = without_seating(campaign, result.answers[0].names, table) if kind == "compression" else None
-    if unseated is not None:
-        problem, seating_finding = unseated
-        partial, result = partial.with_findings(seating_finding), search(problem)
     result = replace(result, laws=tuple(with_laws(problem, result)))
     return _complete(replace(partial, curves=campaign, joined=joined), problem, result, progress, limits)
 

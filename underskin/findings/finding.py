@@ -170,12 +170,22 @@ def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> s
     return f"{faint} of {measured} lines of {of} are left out: {why}{beyond}"
 
 
+_STATED_PERCENT = 0.1  # of an FRF: less is not worth a word
+
+
 def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
     """Noise that biases an estimator."""
     channel = {"H1": "the force", "H2": "the charge", "Hv": "force and charge"}[estimator]
     size = "small" if percent < 0 else "large"
+    if abs(percent) < _STATED_PERCENT:
+        either = "noise in force or charge, which these lines do not tell apart, may bias"
+        return f"{either} {estimator}: ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
     text = f"noise in {channel} makes {estimator} too {size} by {in_digits(abs(percent), 2)} %: that was taken off"
-    return f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open" if unsure_percent >= 0.1 else text
+    return (
+        f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
+        if unsure_percent >= _STATED_PERCENT
+        else text
+    )
 
 
 def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
@@ -258,6 +268,7 @@ OPTIONAL: Mapping[str, Any] = {
     "guess": None,
     "example": "",
     "frequency_hz": None,
+    "others": True,
 }  # arguments of some findings
 
 
@@ -323,7 +334,7 @@ def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
 
 
 _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
-_OF_ARRAY = "{percent:.0f} % of the array's d33"
+_OF_ARRAY = "{percent:z.0f} % of the array's d33"
 _MORE_ROWS = "{more: ({more} more rows like it)|}"
 _UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
 _GIVEN_IN = "{units:; was charge over force given in {units:or}?|}"
@@ -479,7 +490,7 @@ ENGLISH: Mapping[Reason, Words] = {
     "others': is their "
     "dynamic force or charge given as {meant} instead of peak? Put right by this factor ({of:listed recordings})"
     "{left_out:; {left_out} that do not tell were left out|}",
-    Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
+    Reason.WARM_UP: "the response drifts by {percent:+z.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "
     f"{{charge_mean_pc:.3g}}, where "
@@ -535,8 +546,6 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.NO_SIMPLE_LAW: no_simple_law,
     Reason.UNUSUAL_SCATTER: "the gain of the recordings scatters by {percent:.2g} %, and by {usual:.2g} % on a poor "
     "rig: something that no recording states changes from one to the next",
-    Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for {mechanisms}: a platen that is "
-    "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it",
     Reason.LOAD_NOT_LINEAR: "L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left "
     "out; it "
     "adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere"
@@ -546,7 +555,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CONTACT_SLIPS: "the tangential force is {ratio:.3g} times the normal one: it slips unless friction is "
     "stronger"
     "{more: ({more} more contacts like it)|}",
-    Reason.DEAD: f"dead: no charge beyond noise ({_OF_ARRAY})",
+    Reason.DEAD: f"dead: no charge beyond noise{{others: ({_OF_ARRAY})|}}",
     Reason.INVERTED: f"inverted polarity: {_OF_ARRAY}",
     Reason.WEAK: f"weak: {_OF_ARRAY}",
     Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
@@ -556,7 +565,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.STRONG: f"strong: {_OF_ARRAY}",
     Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
     Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",
-    Reason.BENT: "bent: its d33 curves by {percent:+.0f} % over the preloads",
+    Reason.BENT: "bent: its d33 curves by {percent:+z.0f} % over the preloads",
 }
 
 

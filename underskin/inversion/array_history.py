@@ -356,16 +356,17 @@ _MOST_NAMED = 5  # sensors of each sort
 
 
 def array_change_in_words(
-    value: float, low: float, high: float, d33: Sequence[float], between: str, days: int | None
+    value: float, low: float, high: float, d33: Sequence[float], between: str, days: int | None, by: str = ""
 ) -> str:
     """ "d33 of the array fell by 7.8 % (95 %: 7.1 to 8.5) in 182 days, between 2017-05-02 and … (14.29, … pC/N)".
 
-    `value` with the 95 % interval `low` to `high` is relative; `d33` [pC/N] is that of each date.
+    `value` with the 95 % interval `low` to `high` is relative; `d33` [pC/N] is that of each date, `by` what
+    it is calculated with beside the declared skin, in words.
     """
     span = between if days is None else f"in {days} day{'' if days == 1 else 's'}, {between}"
-    values = f"{', '.join(f'{level:.4g}' for level in d33)} pC/N"
+    values = f"{', '.join(f'{level:.4g}' for level in d33)} pC/N{f' with {by}' if by else ''}"
     if low * high <= 0:
-        sizes = f"{100 * value:+.1f} % (95 %: {100 * low:+.1f} to {100 * high:+.1f})"
+        sizes = f"{100 * value:+z.1f} % (95 %: {100 * low:+z.1f} to {100 * high:+z.1f})"
         return f"d33 of the array did not change beyond chance {span}: by {sizes}, {values}"
     way = "fell" if value < 0 else "rose"
     least, most = sorted((abs(100 * low), abs(100 * high)))
@@ -386,7 +387,7 @@ def departures_in_words(
     if few_dates:
         parts.append(TWO_DATES)
     parts += [
-        f"{sensor} changed by {100 * value:+.1f} % ({100 * low:+.1f} to {100 * high:+.1f}) beside the others"
+        f"{sensor} changed by {100 * value:+z.1f} % ({100 * low:+z.1f} to {100 * high:+z.1f}) beside the others"
         for sensor, value, low, high in departures[:_MOST_NAMED]
     ]
     parts += [f"{sensor} is dead since {date}" for sensor, date in list(dead.items())[:_MOST_NAMED]]

@@ -154,7 +154,8 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
             reason = Reason.STRONG
         else:
             continue
-        flags[index] = Flag(ids[index], reason, {"percent": float(100 * value[index] * sign / array)})
+        percent = float(100 * value[index] * sign / array)
+        flags[index] = Flag(ids[index], reason, {"percent": percent, "others": bool(alive.any())})
     pilot = np.full(count, array)
     pilot[list(flags)] = np.maximum(size[list(flags)], _LEAST_PILOT * array)
     return flags, pilot

@@ -209,7 +209,7 @@ class OtherContact:
         if differs.size == 1:
             return f"d33 {WORDS[self.name]}: {significant(float(self.d33.flat[0]), 4)} pC/N"
         percent = 100 * (self.ratio[differs] - 1)
-        low, high = (f"{value:+.1f}" for value in (percent.min(), percent.max()))
+        low, high = (f"{value:+z.1f}" for value in (percent.min(), percent.max()))
         by = f"{low} %" if low == high else f"{low} to {high} %"
         return f"d33 {WORDS[self.name]} differs in {differs.sum()} of {differs.size} rows, by {by}"
 

@@ -340,6 +340,10 @@ _MOVED = 0.02  # of the range of travel: least travel during them
 _LONGER = 4.0  # times the longest run of any other value: steps of a converter are equally long everywhere
 _MOST_OF_WAY, _PACE = 0.75, 0.5  # of the travel at the limit, and of the stage's speed, at least: creep is slower
 _DEEP = 0.8  # share of the other samples that lie less deep than the saturated ones
+_NOISE_BAND = 7.0  # standard deviations that hold a thousand samples of one value
+_DIGITS, _ROUNDED = 9, 1e-6  # of the range of force, and of a width at its edge: below are errors of rounding
+_LEAST_BANDS = 10.0  # such bands between air and limit: in fewer a contact may look as constant
+_NEARLY_ALL = 0.9  # of the samples within the widest of these bands: a narrower one holds the same
 _SHALLOW_SHARE = 0.05  # share of shallowest samples, whose median is the reading in air
 _AIR, _ABOVE = 0.05, 2.5  # of the range of force, and standard deviations there: limits of means in air
 _FEWEST = 24  # least number of samples in air
@@ -374,31 +378,56 @@ class PeriodicError:
         return np.asarray(self.cosine * np.cos(phase) + self.sine * np.sin(phase))
 
 
-def saturated(travel: Floats, force: Floats, *, sphere: bool) -> Mask:
-    """Which samples (samples,) are saturated: they read the largest or the smallest force while the travel goes on.
+def saturated(travel: Floats, force: Floats, *, sphere: bool) -> tuple[Mask, list[float]]:
+    """Which samples (samples,) are saturated, and the largest or smallest force that they read while the travel goes
+    on: one value, two of a converter whose last bit flickers, or what the noise in air makes of one.
 
     They must lie deeper than the others: a force in air, or one held while the sample creeps, is constant as well.
     """
-    at_limits = np.zeros(len(force), dtype=bool)
+    at_limits, limits = np.zeros(len(force), dtype=bool), list[float]()
     if not np.ptp(force) or not np.ptp(travel):
-        return at_limits
-    runs = _runs(travel, force)
+        return at_limits, limits
     extremes = float(force.max()), float(force.min())
     between = ~np.isin(force, extremes)
     sign = -1.0 if TRAVEL in falling(force[between], travel[between], sphere=sphere) else 1.0
     depth = sign * travel
-    air = float(np.quantile(force[depth <= np.quantile(depth, _SHALLOW_SHARE)], 0.5, method="nearest"))
-    usual = max((moved for rows, moved in runs if force[rows[0]] not in (*extremes, air)), default=0.0)
+    shallow = force[depth <= np.quantile(depth, _SHALLOW_SHARE)]
+    air = float(np.quantile(shallow, 0.5, method="nearest"))
+    step = float(np.diff(np.unique(np.round(force / np.ptp(force), _DIGITS))).min()) * float(np.ptp(force))
+    noise = float(np.sqrt(np.pi / 2) * np.mean(np.abs(shallow - air)))  # the median is 0 where a converter is coarse
+    pressed = max(extremes, key=lambda extreme: (extreme - air) * (force[np.argmax(depth)] - air))
     for extreme in extremes:
-        at_limit = force == extreme
-        runs_at_limit = [run for run in runs if force[run[0][0]] == extreme]
-        longest, moved = max(runs_at_limit, key=lambda run: run[1], default=(np.zeros(0, dtype=np.intp), 0.0))
-        if moved < max(_MOVED * np.ptp(travel), _LONGER * usual) or (~at_limit).sum() < _EQUAL:
-            continue
-        is_deep = np.median(depth[at_limit]) > np.quantile(depth[~at_limit], _DEEP)
-        if is_deep and _goes_on(travel, longest):
-            at_limits |= at_limit
-    return at_limits
+        widths = [0.0]  # adhesion makes a least force, and foam a plateau, that lie within noise as well
+        if extreme == pressed:
+            band = max(_NOISE_BAND * noise, 2 * step)
+            widths += [2 * step, band] if sphere and _LEAST_BANDS * band < abs(extreme - air) else [2 * step]
+        found = [
+            mask
+            for width in widths
+            if (mask := _at_limit(travel, depth, np.abs(force - extreme), abs(air - extreme), width)).any()
+        ]
+        if found:
+            most = max(int(mask.sum()) for mask in found)
+            at_limits |= next(mask for mask in found if mask.sum() >= _NEARLY_ALL * most)
+            limits.append(extreme)
+    return at_limits, limits
+
+
+def _at_limit(travel: Floats, depth: Floats, below: Floats, air: float, width: float) -> Mask:
+    """Which samples lie within `width` of an extreme force where it is a limit, by their distances `below` it and that
+    of the reading in air; none where it is not."""
+    level, of_air = (np.floor(part / width + _ROUNDED) if width else part for part in (below, np.array([air])))
+    runs = _runs(travel, level)
+    others = (moved for rows, moved in runs if level[rows[0]] and abs(level[rows[0]] - of_air[0]) > (width > 0))
+    at_limit = np.asarray(level == 0)
+    runs_at_limit = [run for run in runs if level[run[0][0]] == 0]
+    longest, moved = max(runs_at_limit, key=lambda run: run[1], default=(np.zeros(0, dtype=np.intp), 0.0))
+    by_slope = width / max(air, width) * np.ptp(travel) if width else 0.0  # the travel through a band, as on average
+    is_long = moved >= max(_MOVED * np.ptp(travel), _LONGER * max(others, default=0.0), _LONGER * by_slope)
+    is_deep = (
+        is_long and (~at_limit).sum() >= _EQUAL and np.median(depth[at_limit]) > np.quantile(depth[~at_limit], _DEEP)
+    )
+    return at_limit if is_deep and _goes_on(travel, longest) else np.zeros_like(at_limit)
 
 
 def _goes_on(travel: Floats, rows: Indices) -> bool:
@@ -420,10 +449,10 @@ def _keeps_pace(inside: Floats, outside: Floats) -> bool:
     )
 
 
-def _runs(travel: Floats, force: Floats) -> list[tuple[Indices, float]]:
-    """Runs of consecutive samples of equal force, at least `_EQUAL` long, and the travel during each."""
-    starts = np.flatnonzero(np.append(True, np.diff(force) != 0))
-    ends = np.append(starts[1:], len(force))
+def _runs(travel: Floats, level: Floats) -> list[tuple[Indices, float]]:
+    """Runs of consecutive samples of equal level, at least `_EQUAL` long, and the travel during each."""
+    starts = np.flatnonzero(np.append(True, np.diff(level) != 0))
+    ends = np.append(starts[1:], len(level))
     long = ends - starts >= _EQUAL
     runs = [np.arange(first, end) for first, end in zip(starts[long].tolist(), ends[long].tolist(), strict=True)]
     return [(rows, float(np.ptp(travel[rows]))) for rows in runs]
@@ -614,14 +643,13 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
     if len(finite) < _LEAST:
         return curve, []
     travel, force = curve.displacement_mm[finite], curve.force_n[finite]
-    at_limit = saturated(travel, force, sphere=curve.has_sphere)
+    at_limit, limits = saturated(travel, force, sphere=curve.has_sphere)
     if not at_limit.any():
         return curve, []
-    limits = np.unique(force[at_limit])
     arguments = {
         "percent": 100 * float(at_limit.mean()),
         "samples": int(at_limit.sum()),
-        "limits_n": [float(value) for value in limits],
+        "limits_n": sorted(limits),
     }
     unsaturated = np.setdiff1d(np.arange(len(curve.force_n)), finite[at_limit])
     return samples_of(curve, unsaturated), [Finding(Reason.FORCE_SATURATES, curve.id, "force_n", arguments)]

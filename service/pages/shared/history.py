@@ -50,5 +50,5 @@ def _trend_in_words(sensor: SensorHistory) -> str:
 
 def _besides(departure: SensorDeparture) -> str:
     low, high = departure.change_low_percent, departure.change_high_percent
-    size = f"{departure.change_percent:+.1f} % ({low:+.1f} to {high:+.1f})"
+    size = f"{departure.change_percent:+z.1f} % ({low:+z.1f} to {high:+z.1f})"
     return f"besides the array {size}" if departure.significant else f"as the array does, within chance: {size}"

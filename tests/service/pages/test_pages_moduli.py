@@ -49,7 +49,7 @@ def test_modulus_under_answer_first_quote(visitor: Visit, server: Server, width:
     )
     visitor.require_accessible()
     visitor.go(f"/diagnoses/{diagnosis_id}")
-    assert "Young's modulus under this answer 1.75 MPa" in page.locator(".summary").inner_text()
+    assert "Young's modulus over all answers 1.75 MPa" in page.locator(".summary").inner_text()
     page.get_by_text("How well the models describe").click()
     rows = page.locator("table", has_text="Young's modulus [MPa]").locator("tbody tr").all_inner_texts()
     assert [row.split("\t")[0].partition(":")[0] for row in rows] == [

@@ -132,7 +132,7 @@ def test_raw_curve_gives_known_modulus_every_way(server: Server, tmp_path: Path)
     report = diagnose(parse(documents[0]), load_table())
     assert report["verdict"] == "no_mismatch"
     found = re.search(
-        r"Young's modulus under this answer: ([\d.]+) MPa \(95 %: ([\d.]+) to ([\d.]+)\)", report["statement"]
+        r"Young's modulus over all answers: ([\d.]+) MPa \(95 %: ([\d.]+) to ([\d.]+)\)", report["statement"]
     )
     assert found is not None, report["statement"]
     value, low, high = map(float, found.groups())

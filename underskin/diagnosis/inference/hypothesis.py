@@ -76,8 +76,7 @@ def log_likelihoods(
     slopes = products.place_slopes
     squared_slopes = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)
-    yy = sums.yy if sums.yy.ndim == 3 else sums.yy[None, None]
-    arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, squared_slopes))
+    arrays = map(contiguous, (products.level, sums.uu, sums.uy, sums.across, squared_slopes))
     add(
         *arrays, lines.sensor, contiguous(sensor_log_gain), curvature.laplacian, curvature.square, noise, log_likelihood
     )

@@ -20,7 +20,7 @@ def log_likelihood(
     level: Floats,
     uu: Floats,
     uy: Floats,
-    yy: Floats,
+    across: Floats,
     squared_slopes: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
@@ -32,9 +32,9 @@ def log_likelihood(
 ) -> float:
     """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten.
 
-    With V = s'² a² + p² |t|² a recording's χ² is |y|² + ((Re u*r)²/(1 + V u*u) − (Re u*y)²)/u*u, the square completed
-    along u: |r|² minus what V takes out would cancel to rounding error where a model predicts far more than was
-    measured.
+    With V = s'² a² + p² |t|² a recording's χ² is |y|² − (Re u*y)²/u*u, the part of y `across` u, and
+    (Re u*r)²/((1 + V u*u) u*u), the square completed along u: |r|² minus what V takes out would cancel to rounding
+    error where a model predicts far more than was measured.
     """
     gain2, k2, p2, tau2 = noise[0] ** 2, noise[1] ** 2, noise[2] ** 2, noise[3] ** 2
     mm[:], mr[:] = 0.0, 0.0
@@ -47,9 +47,8 @@ def log_likelihood(
         factor = np.exp(exponent) if exponent != 0 else 1.0
         a = level[recording] * factor
         mean = a * (1 - log_gain)
-        u, u_y = uu[recording], uy[recording]
-        u_r, u_y = (u_y - mean * u) * inverse, u_y * inverse
-        u = max(u * inverse, _NONE)
+        u_r = (uy[recording] - mean * uu[recording]) * inverse
+        u = max(uu[recording] * inverse, _NONE)
         a2 = a * a
         variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
         if len(squared_slopes):
@@ -57,7 +56,7 @@ def log_likelihood(
         inflation = 1 + variance * u
         scale = 1 / (inflation * u)
         reduced = scale * u
-        chi2 += yy[recording] * inverse + (u_r * u_r - inflation * u_y * u_y) * scale
+        chi2 += across[recording] * inverse + u_r * u_r * scale
         mm[sensor_index] += a2 * u * reduced
         mr[sensor_index] += a * u_r * reduced
         determinant *= inflation
@@ -79,7 +78,7 @@ def log_likelihoods(
     level: Floats,
     uu: Floats,
     uy: Floats,
-    yy: Floats,
+    across: Floats,
     squared_slopes: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
@@ -94,8 +93,8 @@ def log_likelihoods(
     ----------
     level
         (points, recordings).
-    uu, uy, yy
-        The sums Re u*u, Re u*y and |y|².
+    uu, uy, across
+        The sums Re u*u and Re u*y, and the square of y's part across u.
     squared_slopes
         (points, recordings) |t|² of the position slopes, (points, 0) without positioning scatter.
     sensor
@@ -114,7 +113,7 @@ def log_likelihoods(
                 level[point],
                 uu[min(point, uu.shape[0] - 1), min(number, uu.shape[1] - 1)],
                 uy[min(point, uy.shape[0] - 1), min(number, uy.shape[1] - 1)],
-                yy[min(point, yy.shape[0] - 1), min(number, yy.shape[1] - 1)],
+                across[min(point, across.shape[0] - 1), min(number, across.shape[1] - 1)],
                 squared_slopes[point],
                 sensor,
                 sensor_log_gain[point],

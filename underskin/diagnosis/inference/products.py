@@ -22,18 +22,30 @@ from underskin.mechanisms.models.contact_state import FrfDesign, Pickup, Respons
 from underskin.units import Array, Floats, Indices
 from underskin.weak_cache import cached_while_alive
 
+_TINY = float(np.finfo(float).tiny)
+
 
 @dataclass(frozen=True)
 class Sums:
     """Re u*u, Re u*y and |y|² of each recording, and the noise levels' contribution to log|C|.
 
-    Of FRFs |y|² is that of each recording's mean: the rest is the same in all models (`Lines.about_means`).
+    Of FRFs |y|² is that of each recording's mean: the rest is the same in all models (`Lines.about_means`). `departure`
+    is the square of y's part across u, where it was computed as that: the difference |y|² − (Re u*y)²/u*u of curves,
+    whose noise may be 1e-5 of y, has errors of rounding as large as the noise.
     """
 
     uu: Floats
     uy: Floats
     yy: Floats
     log_determinant: Floats | float
+    departure: Floats | None = None
+
+    @property
+    def across(self) -> Floats:
+        """The square of y's part across u."""
+        if self.departure is not None:
+            return self.departure
+        return np.asarray(self.yy - self.uy**2 / np.maximum(self.uu, _TINY))
 
 
 @dataclass(frozen=True)
@@ -93,6 +105,10 @@ class CurveLines:
         """Over the samples of each recording (…, samples) to (…, recordings)."""
         return np.add.reduceat(products, self.first, axis=-1)
 
+    def on_samples(self, values: Floats) -> Floats:
+        """Values of recordings (…, recordings), at their samples (…, samples)."""
+        return np.repeat(values, np.diff(np.append(self.first, len(self.measured))), axis=-1)
+
 
 @dataclass(frozen=True)
 class CurveProducts:
@@ -136,7 +152,10 @@ class CurveProducts:
         uu = woodbury.products(force, force, by_force, by_force)
         uy = woodbury.products(force, measured, by_force, by_measured)
         yy = woodbury.products(measured, measured, by_measured, by_measured)
-        return Sums(uu, uy, yy, woodbury.log_determinant)
+        across = measured - self.lines.on_samples(uy / np.maximum(uu, _TINY)) * force
+        by_across = woodbury.projections(across)
+        departure = woodbury.products(across, across, by_across, by_across)
+        return Sums(uu, uy, yy, woodbury.log_determinant, departure)
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives, at the first of the sets of noise levels."""

@@ -290,7 +290,8 @@ class Facts:
         """The joint meaning of each mechanism's parameters, where a single value does not show it."""
         meanings = [
             _MEANINGS[mechanism["name"]](
-                {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+                {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]},
+                self.problem.lines.campaign,
             )
             for mechanism in self.mechanisms
             if mechanism["name"] in _MEANINGS

@@ -99,7 +99,7 @@ def statement(facts: Facts) -> str:
             second += [_misfit_clause(fit, model)] if of_curves else []
         elif of_curves:
             settled = verdict != "ambiguous"
-            how = "under this answer" if settled else _OVER_ANSWERS
+            how = "over all answers" if settled else _OVER_ANSWERS
             last = [*quoted, _modulus_clause(fit["after"], how)]
         second += facts.meanings
         if verdict == "no_mismatch":

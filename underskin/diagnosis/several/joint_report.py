@@ -375,7 +375,7 @@ def _change_clauses(skin: SkinOverDates) -> list[str]:
     steps = [change for change in skin.changes if change.sensor is None and change.is_step and several]
     of_array = [_change_in_words(change, dates) for change in steps]
     if over is not None and not steps:
-        of_array = _array_clauses(over, skin.changes, dates)
+        of_array = _array_clauses(over, skin.changes, dates, skin.histories[0].mechanisms)
     sensors = [change for change in changed_once(skin.changes) if change.sensor is not None]
     clauses = [_change_in_words(change, dates) for change in sensors[:MOST_NAMED]]
     more = len(sensors) - MOST_NAMED
@@ -398,11 +398,18 @@ def _change_in_words(change: Change, dates: CampaignDates) -> str:
     return f"d33 {whose} {size} between {dates.called(change.before)} and {dates.called(change.until)}{causes}"
 
 
-def _array_clauses(over: ArrayOverDates, changes: Sequence[Change], dates: CampaignDates) -> list[str]:
-    """On the array's d33 from the first to the last campaign."""
+def _array_clauses(
+    over: ArrayOverDates, changes: Sequence[Change], dates: CampaignDates, mechanisms: Sequence[str]
+) -> list[str]:
+    """On the array's d33 from the first to the last campaign, by the answer with these mechanisms."""
     first, last = over.numbers[0], over.numbers[-1]
     between, days = f"between {dates.called(first)} and {dates.called(last)}", dates.days(first, last)
-    clause = array_change_in_words(over.change.value, over.low, over.high, over.d33.tolist(), between, days)
+    found = (
+        f"{in_words(mechanisms)} as in this answer, where a campaign's own d33 takes the skin as declared"
+        if mechanisms
+        else ""
+    )
+    clause = array_change_in_words(over.change.value, over.low, over.high, over.d33.tolist(), between, days, found)
     if not over.is_significant:
         return [clause]
     stated = next((change for change in changes if change.sensor is None), over.change)

@@ -1,4 +1,4 @@
-"""Signatures of mechanisms: detection limits, confounding, hidden shifts of d33; and seating of compression curves.
+"""Signatures of mechanisms: detection limits, confounding and hidden shifts of d33.
 
 A signature is what a typical strength of a mechanism (the quartile of its prior away from the limit) changes in the
 base model's response. A mechanism has further signatures with each shape parameter (the onset of ageing, the stress at
@@ -11,38 +11,28 @@ h is one matrix JᵀC⁻¹J; projecting out the nuisances, with their priors, le
   information on them, P the precision of their priors, Hₛ the information they share with the signature.
 - Confounding: the cosine between two signatures after projection, under usual noise, before any fit. The typical
   signature of one mechanism is compared with all signatures of the other.
-- Seating: while a tilted platen or uneven end closes, the force rises too slowly, and linearly from full contact on,
-  shifted by half the wedge, so the curve looks stiffer at its end. Stiffening goes on, seating does not: stiffening
-  that only the first tenth of the displacement supports is seating. Samples that are pulled are gripped and do not
-  seat.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.dataset import Lines, curve_lines
+from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import EXPLAINED, RIVAL_SHARE
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.hypothesis import Likelihoods
 from underskin.diagnosis.noise import TYPICAL, NoiseLevels, SeveralLevels
 from underskin.diagnosis.selection.answers import Answer
-from underskin.diagnosis.selection.priors import SHOWS, least_evidence, log_prior
-from underskin.findings.codes import Reason
-from underskin.findings.finding import Finding
+from underskin.diagnosis.selection.priors import least_evidence, log_prior
 from underskin.inversion.mixed_model import USUAL_GAIN
 from underskin.mechanisms.base import Kind, Normal, Parameter, Stage, Unsupported
-from underskin.mechanisms.laws.contact_creep import ContactCreep
-from underskin.mechanisms.laws.strain_stiffening import StrainStiffening
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.recordings.campaign import Campaign, CompressionRecording, Recording, samples_of
-from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats
 
 Split = tuple[Floats, NDArray[np.float32] | None]
@@ -377,48 +367,3 @@ def remaining_confounding(confounded: Sequence[Confounding], answers: Sequence[A
 def _sets(answers: Sequence[Answer]) -> list[tuple[str, ...]]:
     """The sets of mechanisms among the answers."""
     return [answer.names for answer in answers if answer.explanation is not None and answer.explanation.names]
-
-
-_SEATING_SHARE = 0.1  # of each curve's displacement
-
-
-def without_seating(
-    campaign: Campaign, names: Sequence[str], table: SigmaTable
-) -> tuple[FittingProblem, Finding] | None:
-    """Compression curves without their beginning, and the finding, where these no longer support the stiffening.
-
-    None where they do, and where `names` has no stiffening, or a law that needs a curve's whole history, such as
-    relaxation, which cannot be fitted to the shortened curves.
-    """
-    if StrainStiffening.name not in names or ContactCreep.name in names:
-        return None
-    if not all(_is_pressed(recording) for recording in campaign.recordings):
-        return None
-    rows = curve_lines(_without_beginning(campaign), "compression")
-    if rows.recordings < len(campaign.recordings):
-        return None
-    problem = FittingProblem(rows, table)
-    stiffening_fit = problem.explain(Request(tuple(names)))
-    plain_fit = problem.explain(Request(tuple(name for name in names if name != StrainStiffening.name)))
-    assert stiffening_fit is not None
-    assert plain_fit is not None
-    if stiffening_fit.log_evidence - plain_fit.log_evidence > SHOWS:
-        return None
-    arguments = {"percent": 100 * _SEATING_SHARE, "mechanisms": StrainStiffening.name}
-    return problem, Finding(Reason.SEATING, "", "displacement_mm", arguments)
-
-
-def _is_pressed(recording: Recording) -> bool:
-    """Whether a sample is pressed farther than it is pulled."""
-    assert isinstance(recording, CompressionRecording)
-    travel = recording.displacement_mm - recording.displacement_mm[0]
-    return float(travel.max()) > -float(travel.min())
-
-
-def _without_beginning(campaign: Campaign) -> Campaign:
-    shortened = []
-    for recording in campaign.recordings:
-        assert isinstance(recording, CompressionRecording)
-        travel = np.abs(recording.displacement_mm - recording.displacement_mm[0])
-        shortened.append(samples_of(recording, travel > _SEATING_SHARE * np.nanmax(travel)))
-    return replace(campaign, recordings=tuple(shortened))

@@ -129,7 +129,7 @@ class ContactCreep(Mechanism):
             state.relaxation, state.power_exponent = ((fraction, time),), values.get("relaxation_exponent")
 
 
-def meaning(values: Mapping[str, float]) -> str:
+def meaning(values: Mapping[str, float], _: Conditions) -> str:
     """Of a power law, how much the force falls from 1 s to 10 s, and to which time E belongs."""
     exponent = values.get("relaxation_exponent", 0.0)
     if exponent < _PLAIN_EXPONENT:

@@ -12,13 +12,13 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.physics.uniaxial import neo_hookean
 from underskin.physics.uniaxial import stiffening as nominal_stress
 from underskin.recordings.campaign import CompressionRecording, Conditions
-from underskin.units import Array
+from underskin.units import Array, Floats
 
 _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8
 _LEAST_STRETCH = 0.02
 _ALPHAS = (-20.0, -5.0, 2.0, 5.0)  # of brain, between, neo-Hookean, of rubbers
-_STRAINED = 0.2  # at which a sample is said to be softer or not
+_STRAINS, _BELOW = 101, 0.995  # strains compared with a neo-Hookean solid's, and what is less than 1 in two digits
 _COMPARED = 0.1  # the strain at which laws of curves and of FRFs are compared, as large as a contact's
 _LOCKED = 0.05  # of 1 + q c J, which is 0 where Gent's law locks
 _LEAST_FORM = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
@@ -125,25 +125,36 @@ def shared_parameters(kind: Kind, values: Values) -> Mapping[str, Differentiated
     return {"stiffening": (factor - 1.0) / _COMPARED}
 
 
-def meaning(values: Mapping[str, float]) -> str:
-    """That a compressed or pulled sample is softer than a neo-Hookean solid, where it is by a fifth of its height."""
+def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
+    """Where a compressed or pulled sample is softer than a neo-Hookean solid of its modulus, over what was recorded."""
     if "ogden_exponent" not in values:
         return ""
-    stretch = np.array([1.0 - _STRAINED, 1.0 + _STRAINED])
-    law = nominal_stress(stretch, *(np.array(values[parameter.name]) for parameter in _CYLINDER))
-    pressed, pulled = np.abs(law) < np.abs(neo_hookean(stretch))
-    if not (pressed or pulled):
-        return ""
-    how = "strained" if pressed and pulled else "pressed" if pressed else "pulled"
-    return f"As it is {how}, the sample gets softer than a neo-Hookean solid."
+    law = [np.array(values[parameter.name]) for parameter in _CYLINDER]
+    cylinders = [curve for curve in conditions.recordings if isinstance(curve, CompressionRecording)]
+    strains = [1.0 - _stretch(curve) for curve in cylinders]
+    said = []
+    for how, sign in (("pressed", 1.0), ("pulled", -1.0)):
+        farthest = max(float(np.nanmax(sign * strain)) for strain in strains)
+        strain = np.linspace(0.0, min(farthest, 1.0) if sign > 0 else farthest, _STRAINS)[1:-1]
+        stretch = 1.0 - sign * strain
+        if farthest > 0 and (beside := nominal_stress(stretch, *law) / neo_hookean(stretch)).min() < _BELOW:
+            places = dict.fromkeys((int(beside.argmin()), len(strain) - 1))
+            parts = [f"{beside[place]:.2g} at {100 * strain[place]:.0f} % strain" for place in places]
+            said.append(f"as it is {how}, its force over that of a neo-Hookean solid is {' and '.join(parts)}")
+    return f"A{'; '.join(said)[1:]}." if said else ""
+
+
+def _stretch(curve: CompressionRecording) -> Floats:
+    """λ of each sample, from where the force is least."""
+    unloaded = curve.displacement_mm[np.abs(curve.force_n).argmin()]
+    return np.asarray(1.0 - (curve.displacement_mm - unloaded) / curve.sample_height_mm)
 
 
 def _polynomial(curves: Sequence[CompressionRecording], alpha: float) -> tuple[float, float]:
     """c2 and c3 of the least residual of nominal stress at m = 2."""
     rows = []
     for curve in curves:
-        unloaded = curve.displacement_mm[np.abs(curve.force_n).argmin()]
-        stretch = np.maximum(1.0 - (curve.displacement_mm - unloaded) / curve.sample_height_mm, _LEAST_STRETCH)
+        stretch = np.maximum(_stretch(curve), _LEAST_STRETCH)
         ogden = nominal_stress(stretch, *map(np.array, (0.0, 0.0, 2.0, alpha)))
         invariant = stretch**2 + 2.0 / stretch - 3.0
         columns = ogden, 2.0 * ogden * invariant, 3.0 * ogden * invariant**2

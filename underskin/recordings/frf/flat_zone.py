@@ -61,14 +61,15 @@ def reason_of(
 ) -> str:
     """The reason for a zone over `bins` (first, last) of the `curves` (conditions and all, bins) over `middle_hz`."""
     first, last = bins
-    departure = curves / levels_of(curves[:, first : last + 1]) - 1
+    level = levels_of(curves[:, first : last + 1])
+    departure = curves / np.where(level == 0, np.nan, level) - 1
     parts = [f"{low_hz:.4g} to {high_hz:.4g} Hz: no resonance in any recording"]
     if last + 1 < len(middle_hz):
         parts.append(_above(high_hz, middle_hz, departure, conditions, last))
     elif idle.above:
         parts.append(f"above {high_hz:.4g} Hz {_NOT_EXCITED}")
     if first > 0:
-        parts.append(_below(low_hz, float(departure[-1, first - 1])))
+        parts.append(_below(low_hz, departure[-1, :first]))
     elif idle.below:
         parts.append(f"below {low_hz:.4g} Hz {_NOT_EXCITED}")
     if first == 0 and last + 1 == len(middle_hz) and not (idle.below or idle.above):
@@ -111,10 +112,13 @@ def _above(
     return f"above {high_hz:.4g} Hz the response {side} or scatters by more than 2 %, without a peak in range"
 
 
-def _below(low_hz: float, departure: float) -> str:
-    if departure < 0:
+def _below(low_hz: float, departure: Floats) -> str:
+    """By the departures of the bins below: a high-pass lowers each more than the next."""
+    departure = departure[np.isfinite(departure)]
+    if len(departure) > 1 and departure[-1] < 0 and (np.diff(departure) > 0).all():
         return f"below {low_hz:.4g} Hz the response falls off, as behind a high-pass"
-    return f"below {low_hz:.4g} Hz the response rises"
+    side = "falls" if len(departure) and departure[-1] < 0 else "rises"
+    return f"below {low_hz:.4g} Hz the response {side} or scatters by more than 2 %"
 
 
 FLATNESS = 0.02
@@ -536,7 +540,8 @@ class _Curve:
         def misfit(corners: Floats) -> float:
             return self.fitted(moved(corners))[0]
 
-        return moved(np.asarray(minimize(misfit, start, method="Nelder-Mead").x, dtype=np.float64))
+        bounds = [(corner - np.log(_BELOW), corner + np.log(_BELOW)) for corner in start.tolist()]
+        return moved(np.asarray(minimize(misfit, start, method="Nelder-Mead", bounds=bounds).x, dtype=np.float64))
 
 
 def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:

@@ -38,10 +38,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.frf.spectra import Frf, Stack, expected_coherence, information, stacked
+from underskin.recordings.frf.spectra import AROUND, Frf, Stack, expected_coherence, information, stacked
 from underskin.units import Floats, Indices, Mask
 
 MAINS_HZ = (50.0, 60.0)
@@ -266,26 +267,27 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
         return measured
     weight = information(expected_coherence(coherence[used]))
     weight /= weight.sum()
-    true_coherence = coherence - (1 - coherence) ** 2 / np.maximum(count, 1.0)  # of n blocks γ² is that much too large
+    true_coherence = coherence - (1 - coherence) ** 2 / averages  # of n blocks γ² is that much too large
     loss = float(weight @ (1 - true_coherence[used]))
     if loss < _LEAST_LOSS:
         return measured
-    noise = _posterior(force, charge, coherence, count, _groups(used, valid))
+    noise = _posterior(force, charge, coherence, averages, count, _groups(used, valid))
     in_force = np.minimum(noise.force / force, _WORST)
     in_charge = np.minimum(noise.charge / charge, _WORST)
     if measured.estimator == "H2":
         size = np.sqrt(charge / np.maximum(coherence * force, _TINY)) * (1 - in_charge)
-        sensitive = noise.charge_sd / charge
+        sensitive, share = noise.charge_sd / charge, in_charge
     elif noise.force == noise.charge == 0.0:
         return replace(measured, bias_unsure=loss / float(np.sqrt(3.0)))
     else:
         size = _total_least_squares(force, charge, coherence, noise)
-        sensitive = noise.force_sd / force
+        sensitive, share = noise.force_sd / force, in_force
     raw = np.abs(measured.values)
     factor = np.where(valid & (raw > 0), size / np.where(raw > 0, raw, 1.0), 1.0)
     explained = float(weight @ (1 - (1 - in_force[used]) * (1 - in_charge[used])))
     unexplained = max(loss - explained, 0.0)
-    uncertainty = float(np.hypot(weight @ sensitive[used], unexplained / np.sqrt(3.0)))
+    second_order = float(weight @ ((share / (1 - share)) ** 2 / averages)[used])  # variance of what noise leaves
+    uncertainty = float(np.hypot(weight @ sensitive[used], np.hypot(unexplained, second_order) / np.sqrt(3.0)))
     bias = float(weight @ (1 / factor[used] - 1))
     return replace(measured, values=measured.values * factor, bias=bias, bias_unsure=uncertainty)
 
@@ -314,26 +316,28 @@ class _Noise:
         self.charge_sd = float(np.sqrt(max(charge**2 @ of_charge - self.charge**2, 0.0)))
 
 
-def _posterior(force: Floats, charge: Floats, coherence: Floats, count: Floats, groups: Sequence[Indices]) -> _Noise:
-    """The posterior of the noise powers of both channels from powers, estimated γ² and numbers of blocks (lines,).
+def _posterior(
+    force: Floats, charge: Floats, coherence: Floats, averages: Floats, passes: Floats, groups: Sequence[Indices]
+) -> _Noise:
+    """The posterior of the noise powers of both channels from powers, estimated γ², the number n of averaged blocks and
+    that of blocks in which the force has its power (lines,), which decides how much γ² scatters.
 
     The grid ends at the least power of any group of lines, or the share of it that its loss of coherence allows. Over
     the lines of a group γ² is Σ |S_fq|²/Σ S_ff S_qq; for n blocks the expected sums are those of the spectra times
-    γ² + 1/n and 1 + γ²/n.
+    γ² + 1/n and 1 + γ²/n for a random force, γ² + (1 − γ²)/n and 1 for one that acts in some blocks alone.
     """
     product = force * charge
     sums = np.array([[part[group].sum() for part in (product, coherence * product, force, charge)] for group in groups])
     lines = np.array([len(group) for group in groups])
-    blocks = np.array([float(np.mean(count[group])) for group in groups])
+    blocks, in_blocks = (np.array([float(np.mean(part[group])) for group in groups]) for part in (averages, passes))
     estimated = sums[:, 1] / sums[:, 0]
     true = np.clip((estimated - 1 / blocks) / (1 - estimated / blocks), 0.0, 1.0)
     inverse_force, inverse_charge = sums[:, 3] / sums[:, 0], sums[:, 2] / sums[:, 0]  # 1/S_ff and 1/S_qq of a group
     independent = np.maximum(lines / _CORRELATED, 1.0)
-    variance = (2 * true + 1 / blocks) * (1 - true) ** 2 / (blocks * independent) + _MODEL**2
+    variance = (2 * true + 1 / in_blocks) * (1 - true) ** 2 / (in_blocks * independent) + _MODEL**2
     loss = 1 - true + 3 * np.sqrt(variance)  # of coherence: no noise takes a larger share of a group's power
     most_force, most_charge = (
-        min(_MARGIN / float(inverse.max()), float((loss / inverse).min()))
-        for inverse in (inverse_force, inverse_charge)
+        _MARGIN * float((np.minimum(loss, 1.0) / inverse).min()) for inverse in (inverse_force, inverse_charge)
     )
     shares = np.linspace(0.0, 1.0, _NODES)
     of_force = 1 - np.minimum(np.outer(shares, most_force * inverse_force), 1.0)
@@ -371,6 +375,7 @@ def noise_findings(measured: Sequence[Frf]) -> list[Finding]:
 _UNSURE, _SURE = 0.2, 0.05  # relative uncertainty
 _TIMES_BEST, _BEST = 5.0, 0.1  # times the best uncertainty, which is this quantile
 _BY_CHANCE = 1e-6
+_FOLLOWS = 4.75  # standard deviations: as improbable by chance
 _LEAST_LINES = 8  # with fewer lines all are kept
 _BIASED, _BIASED_ONCE = 2, 16  # lines, next to 0 Hz
 _ONCE = 2.0  # passes; noise has half as many as there are blocks
@@ -469,10 +474,12 @@ def choose_lines(measured: Frf) -> Choice:
     usual = _usual(force)
     typical = float(np.median(uncertainty[force >= usual]))
     powerful = force >= usual * np.clip((typical / _UNSURE) ** 2, 1 / _TIMES_BEST**2, 1.0)
-    best = float(np.quantile(uncertainty[powerful], _BEST))
-    if best > _UNSURE:
-        return Choice(none)
-    powerful[powerful] = _expected(measured, powerful) <= _UNSURE
+    expected = _expected(measured, powerful)
+    if not (expected <= _UNSURE).any():  # no line by itself: those that follow together with the lines around
+        powerful[powerful] = _follows(measured, powerful)
+    else:
+        powerful[powerful] = expected <= _UNSURE
+    best = float(np.quantile(uncertainty[powerful], _BEST)) if powerful.any() else np.inf
     powerful |= (uncertainty <= min(_SURE, _TIMES_BEST * best)) & _beyond_chance(measured)
     if not powerful.any():
         return Choice(none)
@@ -503,6 +510,16 @@ def _beyond_chance(measured: Frf) -> Mask:
     assert measured.coherence is not None
     assert measured.averages is not None
     return np.asarray((1 - measured.coherence) ** (measured.averages - 1) < _BY_CHANCE)
+
+
+def _follows(measured: Frf, lines: Mask) -> Mask:
+    """At which of these lines the mean γ² of the lines around is beyond chance: that of noise of n blocks has mean 1/n
+    and variance (n − 1)/(n² (n + 1)) (Carter 1987)."""
+    assert measured.coherence is not None
+    assert measured.averages is not None
+    count, around = measured.averages[lines], uniform_filter1d(measured.coherence[lines], AROUND)
+    deviation = np.sqrt((count - 1) / (count + 1) * _CORRELATED / AROUND) / count
+    return np.asarray(around - 1 / count > _FOLLOWS * deviation + _MODEL)
 
 
 def _usual(power: Floats) -> float:

@@ -14,7 +14,7 @@ refined by the advance of the phase over the step. Amplitude X means x = Re(X e^
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,7 @@ def without_drift(blocks: Floats) -> Floats:
 
 _CLIPPED_RUN = 3  # samples in a row at the extreme value
 _CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1) = 2.4 times the samples of the next
+_FLICKERING = (1, 2, 4)  # levels: none, one or two bits flicker
 _HELD_RUN = 5  # samples in a row of one value
 _COARSE = 0.2  # share of samples equal to the one before, above which the levels are coarse
 _ONE_LEVEL = 1.5
@@ -81,6 +82,7 @@ _BLOW, _RINGING = 20.0, 6.0  # kurtosis: 1.5 of a sine, 3 of noise, hundreds of 
 _AS_SHARP = 0.5  # of a jump: least second difference a period later, where a periodic signal restarts
 _GIVE_OR_TAKE = 2  # samples, since a period need not be a whole number of them
 _CLEAR = 3.0  # standard deviations from 0
+_BOTH = 0.5  # least correlation of both channels around a blow; a spike in one reaches 4/√128 = 0.35 by chance
 _LOCAL = 64  # samples that make a neighbourhood
 
 
@@ -105,7 +107,8 @@ def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
     """Every defect of force and charge.
 
     Jumps are no defects where the force is a blow that the charge follows, nor where a periodic force, such as a sweep,
-    restarts: these recur in each period.
+    restarts: these recur in each period. In noise that hides the blows of one channel those of the other are no defects
+    where both correlate.
     """
     every = [*defects("force_n", force), *defects("charge_pc", charge)]
     if _kurtosis(force) > _BLOW and _kurtosis(charge) > _RINGING:
@@ -113,10 +116,24 @@ def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
     if all(defect.kind != DefectKind.JUMP for defect in every):
         return every
     period = period_of(force)
-    recurs = {name: _recurs(signal, period) for name, signal in (("force_n", force), ("charge_pc", charge))}
-    return [
-        defect for defect in every if defect.kind != DefectKind.JUMP or not recurs[defect.channel][defect.first_sample]
-    ]
+    recurs, struck = {}, {}
+    for name, signal in (("force_n", force), ("charge_pc", charge)):
+        recurs[name], struck[name] = _recurs(signal, period), _kurtosis(signal) > _BLOW
+
+    def is_physical(jump: Defect) -> bool:
+        if recurs[jump.channel][jump.first_sample]:
+            return True
+        around = slice(max(jump.first_sample - _LOCAL, 0), jump.first_sample + jump.samples + _LOCAL)
+        return struck[jump.channel] and abs(_correlation(force[around], charge[around])) > _BOTH
+
+    return [defect for defect in every if defect.kind != DefectKind.JUMP or not is_physical(defect)]
+
+
+def _correlation(force: Floats, charge: Floats) -> float:
+    """Their correlation coefficient; 0 where either is constant."""
+    force, charge = force - force.mean(), charge - charge.mean()
+    power = float((force @ force) * (charge @ charge))
+    return float(force @ charge) / power**0.5 if power > 0 else 0.0
 
 
 def _recurs(signal: Floats, period: int) -> Mask:
@@ -145,7 +162,7 @@ def defects(channel: str, signal: Floats) -> list[Defect]:
     if len(signal) < 3:
         return []
     rest = _rest(signal)
-    clipped = _overload(signal) & ~rest
+    clipped = _overload(signal, rest)
     held = _held(signal) & ~clipped & ~rest
     jump = _jumps(signal) & ~clipped & ~held
     kinds = ((DefectKind.OVERLOAD, clipped), (DefectKind.HELD_SAMPLES, held), (DefectKind.JUMP, jump))
@@ -165,16 +182,18 @@ def _rest(signal: Floats) -> Mask:
     return np.asarray(signal == np.median(signal)) if _kurtosis(signal) > _BLOW else np.zeros(len(signal), dtype=bool)
 
 
-def _overload(signal: Floats) -> Mask:
+def _overload(signal: Floats, rest: Mask) -> Mask:
+    """Runs of samples, not at `rest`, at either end of the range, where they accumulate on one level, or on a few of a
+    converter whose last bits flicker."""
     mask = np.zeros(len(signal), dtype=bool)
-    levels, counts = np.unique(signal, return_counts=True)
-    if len(levels) < 3:
-        return mask
-    for end, neighbour in ((0, 1), (-1, -2)):
-        if counts[end] > _CLIPPED_RATIO * counts[neighbour]:
-            for first, count in _runs(signal == levels[end]):
-                if count >= _CLIPPED_RUN:
-                    mask[first : first + count] = True
+    levels, counts = np.unique(signal[~rest], return_counts=True)
+    for several, ordered in product(_FLICKERING, (slice(None), slice(None, None, -1))):
+        level, count = levels[ordered], counts[ordered]
+        ends, next_ones = count[:several].sum(), count[several : 2 * several].sum()
+        if len(levels) > 2 * several and ends > _CLIPPED_RATIO * next_ones:
+            for first, samples in _runs(np.isin(signal, level[:several]) & ~rest):
+                if samples >= _CLIPPED_RUN:
+                    mask[first : first + samples] = True
     return mask
 
 
@@ -502,7 +521,7 @@ def _refined(signal: Floats, start: float, end: float, cycles: int) -> float:
     return float(frequency + advance / (2 * np.pi * (samples[-size] - samples[0])))
 
 
-_AROUND = 11  # lines whose median γ² is the expected one of the middle line
+AROUND = 11  # lines whose median γ² is the expected one of the middle line
 
 
 @dataclass(frozen=True)
@@ -539,9 +558,9 @@ def information(coherence: Floats) -> Floats:
 
 def expected_coherence(coherence: Floats) -> Floats:
     """γ² of each line (lines,) by those around it: weights by a line's own γ² would favour estimates too large."""
-    if not np.isfinite(coherence).all() or len(coherence) < _AROUND:
+    if not np.isfinite(coherence).all() or len(coherence) < AROUND:
         return coherence
-    return np.asarray(median_filter(coherence, _AROUND, mode="nearest"))
+    return np.asarray(median_filter(coherence, AROUND, mode="nearest"))
 
 
 def stacked(frfs: Sequence[Frf]) -> list[Stack]:
