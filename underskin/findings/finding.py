@@ -447,6 +447,8 @@ ENGLISH: Mapping[Reason, Words] = {
     "the first"
     "{is_timed:, without its times, since a way out alone does not tell what relaxes|}",
     Reason.FORCE_SATURATES: force_saturates,
+    Reason.READING_STEPS: "the displacement jumps by {step_mm:.3g} mm at sample {sample}{further:, and {further} times "
+    "more|}, and the force stays: its reading jumps, as between the segments of a file, and not the stage; taken out",
     Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
     "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "
     "screw or an encoder{frequency_hz:; or hum, or a vibration of {frequency_hz:.3g} Hz|}); it was subtracted",
