@@ -304,7 +304,8 @@ def contact_samples(force: Floats, seen: CurveLandmarks) -> tuple[int, int]:
     line = np.polyfit(last_half, force[last_half], 1)
     away = np.abs(force[end:] - np.polyval(line, np.arange(end, len(force))))
     band = max(band, _BEYOND_NOISE * float(away[-len(last_half) :].std()))
-    return int(first), end + int(np.flatnonzero(away > band)[-1] + 1 if (away > band).any() else 0)
+    off = (away[:-1] > band) & (away[1:] > band)  # of thousands of samples in the air, one is by chance
+    return int(first), end + int(np.flatnonzero(off)[-1] + 2 if off.any() else 0)
 
 
 def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -> Floats:
