@@ -236,6 +236,13 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
     )
 
 
+def pressed_depth(displacement: Floats, force: Floats, time: Floats | None = None) -> float:
+    """The travel of a sphere from its last sample in the air, or from the first sample, to the deepest one."""
+    landmarks = curve_landmarks(displacement, force, time)
+    before = landmarks.air[landmarks.air < landmarks.turn]
+    return float(displacement[landmarks.turn] - displacement[before[-1] if len(before) else 0])
+
+
 def _deepest(displacement: Floats) -> int:
     """The deepest sample of a moving mean over `hidden_samples`."""
     count = hidden_samples(displacement)
@@ -478,9 +485,7 @@ def _indentation_from_contact(displacement: Floats, force: Floats) -> tuple[floa
     """Force and indentation of a sphere at its deepest sample, from the contact point: the approach through air may be
     long, and adhesion may exceed the load. NaN (and 1) where the sphere is not pressed."""
     landmarks = curve_landmarks(displacement, force)
-    before = landmarks.air[landmarks.air < landmarks.turn]
-    contact_point = float(displacement[before[-1]]) if len(before) else float(displacement[0])
-    load, moved = float(force[landmarks.turn]) - landmarks.zero, float(displacement[landmarks.turn]) - contact_point
+    load, moved = float(force[landmarks.turn]) - landmarks.zero, pressed_depth(displacement, force)
     return (load, moved) if load > 0 and moved > 0 else (float("nan"), 1.0)
 
 
