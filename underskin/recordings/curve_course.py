@@ -168,6 +168,26 @@ def visible_contact(displacement: Floats, force: Floats, time: Floats | None) ->
     return known, in_contact
 
 
+def contact_events(curve: IndentationRecording) -> list[Finding]:
+    """The snap-in, at the first sample in contact, and the pull-off, at the last one, as a finding; none without."""
+    columns = [curve.displacement_mm, curve.force_n, *([] if curve.time_s is None else [curve.time_s])]
+    finite = np.isfinite(np.stack(columns)).all(axis=0)
+    displacement, force, *time = (column[finite] for column in columns)
+    if not len(force):
+        return []
+    seen = curve_landmarks(displacement, force, *time)
+    events = {
+        name: {
+            "displacement_mm": float(displacement[sample]),
+            "time_s": float(time[0][sample]) if time else None,
+            "force_n": float(force[sample]) - seen.zero,
+        }
+        for name, sample in (("snap_in", seen.snap_in), ("pull_off", seen.detaches))
+        if sample is not None
+    }
+    return [Finding(Reason.CONTACT_EVENTS, curve.id, "force_n", {"events": events})] if events else []
+
+
 def foot(displacement: Floats, force: Floats) -> int | None:
     """The sample of an approach (samples,) from which the force rises by Hertz's law; None for too few samples.
 
