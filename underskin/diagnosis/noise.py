@@ -284,7 +284,7 @@ def path_fractions(displacement: Floats, force: Floats, seen: CurveLandmarks, ki
     return np.concatenate([[0.0], total])
 
 
-def contact_samples(force: Floats, seen: CurveLandmarks) -> tuple[int, int]:
+def contact_samples(displacement: Floats, force: Floats, seen: CurveLandmarks) -> tuple[int, int]:
     """The first sample of an indentation's contact, and the one after its last.
 
     Contact ends with a visible pull-off; else not where the force passes zero, below which the sphere may still stick,
@@ -294,7 +294,7 @@ def contact_samples(force: Floats, seen: CurveLandmarks) -> tuple[int, int]:
     first = seen.snap_in if seen.snap_in is not None else (int(without[-1]) + 1 if len(without) else 0)
     if seen.pull_off is not None:
         return first, seen.pull_off
-    air = back_in_air(force, seen.turn, seen.noise)
+    air = back_in_air(displacement, force, seen.turn, seen.noise)
     if air is None:
         return first, len(force)
     end, away = air
@@ -308,7 +308,7 @@ def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -
     The depth on each way is that from where its contact begins or ends, as a share of the deepest; after a snap-in it
     begins as wide as it is there on the way back.
     """
-    first, end = contact_samples(force, seen)
+    first, end = contact_samples(displacement, force, seen)
     coarse = _evenly(len(force))
     share = np.zeros(len(force))
     deepest = float(displacement[first:end].max())

@@ -262,7 +262,7 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
             zero = float(np.median(force[air] - drift * (time[air] - time[0])))
             return CurveLandmarks(noise, turn, arrive, leave, None, None, None, air, zero, drift)
     if pull_off is None:
-        detaches, pull_off = _slow_pull_off(force, turn, start_force, noise, least)
+        detaches, pull_off = _slow_pull_off(displacement, force - start_force, turn, noise, least)
     air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
     return CurveLandmarks(
@@ -277,17 +277,20 @@ def pressed_depth(displacement: Floats, force: Floats, time: Floats | None = Non
     return float(displacement[landmarks.turn] - displacement[before[-1] if len(before) else 0])
 
 
-def back_in_air(force: Floats, turn: int, noise: float) -> tuple[int, Floats] | None:
+def back_in_air(displacement: Floats, force: Floats, turn: int, noise: float) -> tuple[int, Floats] | None:
     """The first sample after the deepest one whose force, less that in the air, is no more than noise; and the distance
-    of the force from there on from the straight line through the second half of these samples. None where too few
-    follow for a line."""
+    of the force from there on from the straight line, over the travel, through the second half of these samples. None
+    where too few follow for a line."""
     after = np.flatnonzero(force[turn + 1 :] <= max(_AIR_NOISES * noise, LEAST_CONTACT * float(np.abs(force).max())))
     end = turn + 1 + int(after[0]) if len(after) else len(force)
-    last_half = np.arange(end + (len(force) - end) // 2, len(force))
-    if len(last_half) <= _LINE:
+    half = end + (len(force) - end) // 2
+    if len(force) - half <= _LINE:
         return None
-    line = np.polyfit(last_half, force[last_half], 1)
-    return end, force[end:] - np.polyval(line, np.arange(end, len(force)))
+    travel = displacement[end:] - displacement[half:].mean()
+    air, about = travel[half - end :], force[half:] - force[half:].mean()
+    square = float(air @ air)
+    slope = float(air @ about) / square if square > 0 else 0.0
+    return end, force[end:] - force[half:].mean() - slope * travel
 
 
 def leaves_line(away: Floats, noise: float, least: float) -> Indices:
@@ -298,13 +301,13 @@ def leaves_line(away: Floats, noise: float, least: float) -> Indices:
 
 
 def _slow_pull_off(
-    force: Floats, turn: int, air_force: float, noise: float, least: float
+    displacement: Floats, force: Floats, turn: int, noise: float, least: float
 ) -> tuple[int, int] | tuple[None, None]:
     """Of a sphere that comes off without a jump, the sample of least force, and the first one back in the air.
 
     A sphere that still sticks pulls the force below the air. Strands of a gel, or a slow cell, draw its end out.
     """
-    air = back_in_air(force - air_force, turn, noise)
+    air = back_in_air(displacement, force, turn, noise)
     if air is None:
         return None, None
     end, away = air
