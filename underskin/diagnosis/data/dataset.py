@@ -571,7 +571,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
             time,
             path_fraction,
             drift,
-            contact_samples(*columns[:2], seen)[1],
+            contact_samples(columns[0], columns[1], seen)[1],
             (*_straight_lines(columns[1], counts), np.full(len(force), slow)),
         )
         errors.append(error)
