@@ -45,7 +45,7 @@ from underskin.findings.finding import Finding
 from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, ActiveCatalogue
-from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, RecordingProblem
+from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.curve_course import contact_events
 from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.plausibility import implausible
@@ -172,8 +172,7 @@ def _diagnose_curves(
 ) -> DiagnosisResult:
     mechanisms.bind(campaign, table, kind)
     rows = replace(curve_lines(campaign, kind), mechanisms=mechanisms)
-    spheres = (curve for curve in campaign.curves if isinstance(curve, IndentationRecording))
-    partial = partial.with_findings(*(event for curve in spheres for event in contact_events(curve)))
+    partial = partial.with_findings(*(event for curve in campaign.curves for event in contact_events(curve)))
 
     def fit(
         curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]

@@ -168,12 +168,13 @@ def visible_contact(displacement: Floats, force: Floats, time: Floats | None) ->
     return known, in_contact
 
 
-def contact_events(curve: IndentationRecording) -> list[Finding]:
-    """The snap-in, at the first sample in contact, and the pull-off, at the last one, as a finding; none without."""
+def contact_events(curve: CurveRecording) -> list[Finding]:
+    """The snap-in of a sphere, at the first sample in contact, and its pull-off, at the last one, as a finding; none
+    without."""
     columns = [curve.displacement_mm, curve.force_n, *([] if curve.time_s is None else [curve.time_s])]
     finite = np.isfinite(np.stack(columns)).all(axis=0)
     displacement, force, *time = (column[finite] for column in columns)
-    if not len(force):
+    if not (curve.has_sphere and len(force)):
         return []
     seen = curve_landmarks(displacement, force, *time)
     events = {
