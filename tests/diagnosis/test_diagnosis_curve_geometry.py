@@ -1,5 +1,6 @@
 """What a curve's declared geometry, its tip and its course make of a diagnosis: no confident number of a wrong law."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -156,6 +157,25 @@ def test_an_idealised_contact_lacks_nothing(percent: float) -> None:
     assert report.verdict == "no_mismatch"
     assert "within the noise" not in report.statement
     assert modulus_mpa(report) == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_pull_off_without_a_jump_is_an_event() -> None:
+    """On the way back strands hold the sphere for as long as its depth; a noisy air follows.
+
+    No law of contact describes strands as they let go: they ask for no thin layer, and for no other modulus.
+    """
+    depth = ways(-3.0, 0.3, -3.0, samples=1000)
+    press = pressed(depth, noise=0.0)
+    strands = 0.1 * press.max() * np.exp(-np.maximum(-depth, 0.0) / 0.15) * np.clip(1 - depth / 0.3, 0.0, 1.0)
+    noise = 3e-3 * press.max() * np.random.default_rng(0).standard_t(5, size=len(depth))
+    force = press - np.where(np.arange(len(depth)) < 1000, 0.0, strands) + noise
+    report = diagnosed(campaign(depth, force), "adhesion")
+    assert [mechanism.name for mechanism in report.mechanisms] == ["adhesion"]
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.1)
+    (told,) = (finding.statement for finding in report.findings if finding.code == "contact_events")
+    place, force = map(float, re.search(r"comes off at (\S+) mm .* from (\S+) N", told).groups())  # type: ignore[union-attr]
+    assert place == pytest.approx(0.0, abs=0.03)
+    assert force == pytest.approx(-0.1 * press.max(), rel=0.1)
 
 
 def test_displacement_wrong_sign_turned_told() -> None:

@@ -119,6 +119,22 @@ def test_a_limit_at_which_the_last_bit_flickers_or_noise_lies_is_one(bits: int, 
         assert modulus_mpa(campaign(depth, force)) == pytest.approx(1.0, rel=0.02)
 
 
+def test_a_step_of_the_reading_is_taken_out() -> None:
+    """Between the hold and the way back the displacement reads 0.02 mm more at once, and the force stays."""
+    depth = ways(-0.1, 0.3, 0.3, -0.1)
+    read = np.where(np.arange(len(depth)) < 480, depth, depth + 0.02)
+    (finding,) = implausible(campaign(read, pressed(depth)))
+    assert finding.code == "reading_steps"
+    assert finding.arguments["step_mm"] == pytest.approx(0.02, rel=0.15)
+    assert modulus_mpa(campaign(read, pressed(depth))) == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_snap_in_is_no_step_of_the_reading() -> None:
+    """A soft stage lets the sphere jump: displacement and force together."""
+    depth = np.concatenate([np.linspace(-0.1, 0.0, 200), np.linspace(0.03, 0.3, 300)])
+    assert implausible(campaign(depth, pressed(depth))) == []
+
+
 @pytest.mark.parametrize("creep", [0.05, 0.1])
 def test_a_held_load_is_no_saturation(creep: float) -> None:
     """The load rises to one value and stays there while the sample creeps, by a share of the depth."""

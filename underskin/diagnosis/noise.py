@@ -49,7 +49,7 @@ from scipy.optimize import minimize
 
 from underskin.inversion.mixed_model import GAIN_RANGE, POSITION_RANGE
 from underskin.mechanisms.base import Kind
-from underskin.recordings.curve_course import CurveLandmarks
+from underskin.recordings.curve_course import LEAST_CONTACT, CurveLandmarks, back_in_air, leaves_line
 from underskin.units import Complexes, Floats, Indices
 
 GAIN_FALL = (0.6, 0.35)  # sd of the logarithm below and above
@@ -257,8 +257,6 @@ def _correlation(path_fraction: Floats) -> Floats:
 
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which a way is summed, standard deviations of noise
 _RADIUS_SHARE = 0.7  # of the way along a curve, that of the contact radius
-_LINE = 3  # samples, of which a straight line leaves scatter
-_LEAST_CONTACT = 1e-3  # of the largest force, below which a sample is out of contact
 
 
 def path_fractions(displacement: Floats, force: Floats, seen: CurveLandmarks, kind: Kind) -> Floats:
@@ -286,25 +284,22 @@ def path_fractions(displacement: Floats, force: Floats, seen: CurveLandmarks, ki
     return np.concatenate([[0.0], total])
 
 
-def contact_samples(force: Floats, seen: CurveLandmarks) -> tuple[int, int]:
+def contact_samples(displacement: Floats, force: Floats, seen: CurveLandmarks) -> tuple[int, int]:
     """The first sample of an indentation's contact, and the one after its last.
 
     Contact ends with a visible pull-off; else not where the force passes zero, below which the sphere may still stick,
     but where it joins the straight line on which it stays: the zero on the way back may be another one than before.
     """
-    band = max(_BEYOND_NOISE * seen.noise, _LEAST_CONTACT * float(np.abs(force).max()))
-    without = np.flatnonzero(force <= band)
-    before, after = without[without < seen.turn], without[without > seen.turn]
-    first = seen.snap_in if seen.snap_in is not None else (before[-1] + 1 if len(before) else 0)
-    if seen.pull_off is not None or not len(after):
-        return int(first), len(force) if seen.pull_off is None else seen.pull_off
-    end, last_half = int(after[0]), np.arange(int(after[0]) + (len(force) - int(after[0])) // 2, len(force))
-    if len(last_half) <= _LINE:
-        return int(first), end
-    line = np.polyfit(last_half, force[last_half], 1)
-    away = np.abs(force[end:] - np.polyval(line, np.arange(end, len(force))))
-    band = max(band, _BEYOND_NOISE * float(away[-len(last_half) :].std()))
-    return int(first), end + int(np.flatnonzero(away > band)[-1] + 1 if (away > band).any() else 0)
+    without = np.flatnonzero(force[: seen.turn] <= max(_BEYOND_NOISE * seen.noise, LEAST_CONTACT * np.abs(force).max()))
+    first = seen.snap_in if seen.snap_in is not None else (int(without[-1]) + 1 if len(without) else 0)
+    if seen.pull_off is not None:
+        return first, seen.pull_off
+    air = back_in_air(displacement, force, seen.turn, seen.noise)
+    if air is None:
+        return first, len(force)
+    end, away = air
+    off = leaves_line(away, seen.noise, 0.0)
+    return first, end + int(off[-1] + 2 if len(off) else 0)
 
 
 def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -> Floats:
@@ -313,7 +308,7 @@ def _contact_radius(displacement: Floats, force: Floats, seen: CurveLandmarks) -
     The depth on each way is that from where its contact begins or ends, as a share of the deepest; after a snap-in it
     begins as wide as it is there on the way back.
     """
-    first, end = contact_samples(force, seen)
+    first, end = contact_samples(displacement, force, seen)
     coarse = _evenly(len(force))
     share = np.zeros(len(force))
     deepest = float(displacement[first:end].max())

@@ -45,6 +45,7 @@ from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, ActiveCatalogue
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
+from underskin.recordings.curve_course import contact_events
 from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
@@ -170,6 +171,7 @@ def _diagnose_curves(
 ) -> DiagnosisResult:
     mechanisms.bind(campaign, table, kind)
     rows = replace(curve_lines(campaign, kind), mechanisms=mechanisms)
+    partial = partial.with_findings(*(event for curve in campaign.curves for event in contact_events(curve)))
 
     def fit(
         curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]

@@ -111,6 +111,17 @@ def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> 
     )
 
 
+def contact_events(events: Mapping[str, Mapping[str, float | None]]) -> str:
+    """Snap-in and pull-off of a sphere, with place, time and force."""
+    parts = []
+    for name, verb, how in (("snap_in", "snaps in", "to"), ("pull_off", "comes off", "from")):
+        if name in events:
+            at = events[name]
+            time = "" if at["time_s"] is None else f" ({at['time_s']:.4g} s)"
+            parts.append(f"{verb} at {at['displacement_mm']:.6g} mm{time}, {how} {at['force_n']:.3g} N beside the air")
+    return f"the sphere {' and '.join(parts)}: the samples of these events count for no law"
+
+
 def thickness_unknown(answer: str, is_tried: bool) -> str:
     """An undeclared thickness, and what it leaves open."""
     layer = "a thin layer on a stiff base (layered contact)"
@@ -458,6 +469,9 @@ ENGLISH: Mapping[Reason, Words] = {
     "the first"
     "{is_timed:, without its times, since a way out alone does not tell what relaxes|}",
     Reason.FORCE_SATURATES: force_saturates,
+    Reason.CONTACT_EVENTS: contact_events,
+    Reason.READING_STEPS: "the displacement jumps by {step_mm:.3g} mm at sample {sample}{further:, and {further} times "
+    "more|}, and the force stays: its reading jumps, as between the segments of a file, and not the stage; taken out",
     Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
     "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "
     "screw or an encoder{frequency_hz:; or hum, or a vibration of {frequency_hz:.3g} Hz|}); it was subtracted",

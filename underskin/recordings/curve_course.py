@@ -102,6 +102,8 @@ _BACK = 0.25  # of the range of displacement, from its start
 _QUIET = 3e-3  # noise of a quiet force, of its range
 _STRAIGHT = 1.5  # times the noise: largest scatter of samples about the line of a drift
 _LOW = 0.3  # of the range of force: the foot of a contact
+_AIR_NOISES, LEAST_CONTACT = 4.0, 1e-3  # standard deviations, and of the largest force: less is out of contact
+_LINE = 3  # samples, of which a straight line leaves scatter
 _RISE = 0.02  # of the range of force: below it a sphere has not yet pressed
 
 
@@ -109,7 +111,8 @@ _RISE = 0.02  # of the range of force: below it a sphere has not yet pressed
 class CurveLandmarks:
     """Landmarks of one curve. `air`: the samples before or after contact, empty where none were recorded.
 
-    `snap_in` and `pull_off` are the first samples after those jumps; None without one.
+    `snap_in` and `pull_off` are the first samples after those events, `detaches` the last one before the latter: of a
+    jump that before it, else that of least force; None without one.
     """
 
     noise: float  # standard deviation of a sample of force
@@ -117,6 +120,7 @@ class CurveLandmarks:
     arrive: int  # the first sample of the hold there
     leave: int  # the last one
     snap_in: int | None
+    detaches: int | None
     pull_off: int | None
     air: Indices
     zero: float  # force in air (less the drift where the air is after contact), or of the first sample
@@ -147,14 +151,42 @@ def snap_in_interval(displacement: Floats, force: Floats, time: Floats | None) -
     return (before, contact_point, after) if before < contact_point < after else None
 
 
-def visible_contact(displacement: Floats, force: Floats, time: Floats | None) -> Mask | None:
-    """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
+def visible_contact(displacement: Floats, force: Floats, time: Floats | None) -> tuple[Mask, Mask]:
+    """For which samples (samples,) a snap-in or a pull-off shows whether there is contact, and which are in contact.
+
+    The pull-off shows it of the way back, the snap-in of the way in, where contact ends with a pull-off or not at all.
+    """
     seen = curve_landmarks(displacement, force, time)
     number = np.arange(len(force))
-    retraction = float(displacement[seen.turn] - displacement[-1])
-    if seen.snap_in is None or (seen.pull_off is None and retraction > _RETURN * float(np.ptp(displacement))):
-        return None
-    return np.asarray((number >= seen.snap_in) & (number < (len(number) if seen.pull_off is None else seen.pull_off)))
+    returns = float(displacement[seen.turn] - displacement[-1]) > _RETURN * float(np.ptp(displacement))
+    in_contact = number >= (0 if seen.snap_in is None else seen.snap_in)
+    if seen.pull_off is not None:
+        in_contact &= number < seen.pull_off
+    known = np.full(len(number), seen.pull_off is not None)
+    known[: seen.turn + 1] = seen.snap_in is not None and (seen.pull_off is not None or not returns)
+    known[seen.turn + 1 :] |= known[0]
+    return known, in_contact
+
+
+def contact_events(curve: CurveRecording) -> list[Finding]:
+    """The snap-in of a sphere, at the first sample in contact, and its pull-off, at the last one, as a finding; none
+    without."""
+    columns = [curve.displacement_mm, curve.force_n, *([] if curve.time_s is None else [curve.time_s])]
+    finite = np.isfinite(np.stack(columns)).all(axis=0)
+    displacement, force, *time = (column[finite] for column in columns)
+    if not (curve.has_sphere and len(force)):
+        return []
+    seen = curve_landmarks(displacement, force, *time)
+    events = {
+        name: {
+            "displacement_mm": float(displacement[sample]),
+            "time_s": float(time[0][sample]) if time else None,
+            "force_n": float(force[sample]) - seen.zero,
+        }
+        for name, sample in (("snap_in", seen.snap_in), ("pull_off", seen.detaches))
+        if sample is not None
+    }
+    return [Finding(Reason.CONTACT_EVENTS, curve.id, "force_n", {"events": events})] if events else []
 
 
 def foot(displacement: Floats, force: Floats) -> int | None:
@@ -221,6 +253,7 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
         else _single_snap(force[: turn + 1], start_force, noise)
     )
     pull_off = int(jump_samples[up[np.argmax(step[up])]]) if len(up) else None
+    detaches = None if pull_off is None else pull_off - 1
     arrive, leave = _hold(displacement, turn)
     drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
     if drifting is None and snap_in is None and pull_off is None:
@@ -228,12 +261,61 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
         if after_contact is not None:
             air, drift = np.arange(len(force) - after_contact[0], len(force)), after_contact[1]
             zero = float(np.median(force[air] - drift * (time[air] - time[0])))
-            return CurveLandmarks(noise, turn, arrive, leave, None, None, air, zero, drift)
+            return CurveLandmarks(noise, turn, arrive, leave, None, None, None, air, zero, drift)
+    if pull_off is None:
+        detaches, pull_off = _slow_pull_off(displacement, force - start_force, turn, noise, least)
     air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
     return CurveLandmarks(
-        noise, turn, arrive, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1]
+        noise, turn, arrive, leave, snap_in, detaches, pull_off, air, zero, 0.0 if drifting is None else drifting[1]
     )
+
+
+def pressed_depth(displacement: Floats, force: Floats, time: Floats | None = None) -> float:
+    """The travel of a sphere from its last sample in the air, or from the first sample, to the deepest one."""
+    landmarks = curve_landmarks(displacement, force, time)
+    before = landmarks.air[landmarks.air < landmarks.turn]
+    return float(displacement[landmarks.turn] - displacement[before[-1] if len(before) else 0])
+
+
+def back_in_air(displacement: Floats, force: Floats, turn: int, noise: float) -> tuple[int, Floats] | None:
+    """The first sample after the deepest one whose force, less that in the air, is no more than noise; and the distance
+    of the force from there on from the straight line, over the travel, through the second half of these samples. None
+    where too few follow for a line."""
+    after = np.flatnonzero(force[turn + 1 :] <= max(_AIR_NOISES * noise, LEAST_CONTACT * float(np.abs(force).max())))
+    end = turn + 1 + int(after[0]) if len(after) else len(force)
+    half = end + (len(force) - end) // 2
+    if len(force) - half <= _LINE:
+        return None
+    travel = displacement[end:] - displacement[half:].mean()
+    air, about = travel[half - end :], force[half:] - force[half:].mean()
+    square = float(air @ air)
+    slope = float(air @ about) / square if square > 0 else 0.0
+    return end, force[end:] - force[half:].mean() - slope * travel
+
+
+def leaves_line(away: Floats, noise: float, least: float) -> Indices:
+    """The first samples of pairs beyond the line of the air, whose second half `away` (samples,) shows the scatter: of
+    thousands of samples in the air, single ones are by chance."""
+    beyond = np.abs(away) > max(_AIR_NOISES * noise, least, _AIR_NOISES * float(away[len(away) // 2 :].std()))
+    return np.flatnonzero(beyond[:-1] & beyond[1:])
+
+
+def _slow_pull_off(
+    displacement: Floats, force: Floats, turn: int, noise: float, least: float
+) -> tuple[int, int] | tuple[None, None]:
+    """Of a sphere that comes off without a jump, the sample of least force, and the first one back in the air.
+
+    A sphere that still sticks pulls the force below the air. Strands of a gel, or a slow cell, draw its end out.
+    """
+    air = back_in_air(displacement, force, turn, noise)
+    if air is None:
+        return None, None
+    end, away = air
+    off = leaves_line(away, noise, least)
+    if not len(off) or away[off].min() > -least:
+        return None, None
+    return end + int(np.argmin(away)), end + int(off[-1]) + 2
 
 
 def _deepest(displacement: Floats) -> int:
@@ -478,9 +560,7 @@ def _indentation_from_contact(displacement: Floats, force: Floats) -> tuple[floa
     """Force and indentation of a sphere at its deepest sample, from the contact point: the approach through air may be
     long, and adhesion may exceed the load. NaN (and 1) where the sphere is not pressed."""
     landmarks = curve_landmarks(displacement, force)
-    before = landmarks.air[landmarks.air < landmarks.turn]
-    contact_point = float(displacement[before[-1]]) if len(before) else float(displacement[0])
-    load, moved = float(force[landmarks.turn]) - landmarks.zero, float(displacement[landmarks.turn]) - contact_point
+    load, moved = float(force[landmarks.turn]) - landmarks.zero, pressed_depth(displacement, force)
     return (load, moved) if load > 0 and moved > 0 else (float("nan"), 1.0)
 
 

@@ -574,6 +574,30 @@ def _splines(travel: Floats, apart: float) -> Floats:
     return np.asarray(BSpline.design_matrix(travel, knots, 3).toarray())
 
 
+_BESIDE = 5  # samples on either side of a step, whose steps are compared with it
+_SUDDEN = 6.0  # least ratio of a step of the reading to these, and to noise
+
+
+def reading_steps(travel: Floats, force: Floats) -> Floats:
+    """The jump of the travel's reading before each sample (samples,), 0 where there is none.
+
+    A sphere or platen that moves so fast takes the force with it, at least by the secant stiffness of the curve: at a
+    step of the reading alone, as between the segments of a file, the force stays. In the air nothing shows.
+    """
+    moved, changed = np.diff(travel, prepend=travel[0]), np.diff(force, prepend=force[0])
+    steps, noise = np.zeros(len(travel)), roughness(force)
+    least = _SUDDEN * max(roughness(travel), 1e-3 * float(np.ptp(travel)))
+    loaded = np.abs(force - force[0])
+    stiffness = loaded.max() / max(float(np.ptp(travel)), 1e-300)
+    for sample in np.flatnonzero(np.abs(moved) > least).tolist():
+        beside = np.abs(np.delete(moved[max(sample - _BESIDE, 1) : sample + _BESIDE + 1], min(sample - 1, _BESIDE)))
+        expected = stiffness * abs(moved[sample])
+        is_loaded = loaded[sample] > _SUDDEN * noise and expected > _SUDDEN * max(noise, abs(changed[sample]))
+        if is_loaded and len(beside) and abs(moved[sample]) > _SUDDEN * beside.max():
+            steps[sample] = moved[sample] - np.median(moved[sample + 1 : sample + 1 + _BESIDE])
+    return steps
+
+
 _LEAST = 16  # samples needed to detect a defect
 _TURNS_OF_ONE_WAY = 2  # turning points of a monotonic curve: its first and its last sample
 _STICKS = 0.05  # of the range of force below the shallow end: adhesion, so that the rows are a withdrawal
@@ -602,7 +626,7 @@ def prepared(campaign: Campaign) -> PreparedCurves:
         findings.extend((*of_damage, *of_saturation))
         oriented = orientation(curve)
         oriented_curves.append((curve, oriented))
-        for step in (_turned, _forwards, _without_periodic_error):
+        for step in (_turned, _forwards, _without_steps, _without_periodic_error):
             curve, curve_findings = step(curve, oriented)
             findings.extend(curve_findings)
         return curve
@@ -653,6 +677,22 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
     }
     unsaturated = np.setdiff1d(np.arange(len(curve.force_n)), finite[at_limit])
     return samples_of(curve, unsaturated), [Finding(Reason.FORCE_SATURATES, curve.id, "force_n", arguments)]
+
+
+def _without_steps(curve: CurveRecording, _: Orientation) -> tuple[CurveRecording, list[Finding]]:
+    finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
+    if len(finite) < _LEAST:
+        return curve, []
+    steps = reading_steps(curve.displacement_mm[finite], curve.force_n[finite])
+    if not steps.any():
+        return curve, []
+    displacement = np.array(curve.displacement_mm, dtype=float)
+    displacement[finite] -= np.cumsum(steps)
+    largest = int(np.abs(steps).argmax())
+    further = int(np.count_nonzero(steps)) - 1
+    arguments = {"step_mm": float(steps[largest]), "sample": int(finite[largest]), "further": further}
+    corrected = replace(curve, displacement_mm=displacement)
+    return corrected, [Finding(Reason.READING_STEPS, curve.id, "displacement_mm", arguments)]
 
 
 def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:

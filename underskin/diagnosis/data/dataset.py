@@ -168,10 +168,11 @@ def thinned(
     slope = np.where(held, 0.0, _slopes(means[0], means[1], unsteady / np.sqrt(counts), starts >= seen.turn))
     least = _LEAST_NOISE * float(np.ptp(force))
     deviation = np.sqrt((seen.noise**2 + (slope * unsteady) ** 2) / counts + least**2 + sag_deviation**2 + slow**2)
-    for jump in (seen.snap_in, seen.pull_off) if kind == "indentation" else ():
-        if jump is not None:  # an event: a sample during the jump may lie anywhere between
-            row = int(np.searchsorted(starts, jump, side="right")) - 1
-            near = slice(max(row - 1, 0), row + 1)
+    before = None if seen.snap_in is None else seen.snap_in - 1
+    for event in ((before, seen.snap_in), (seen.detaches, seen.pull_off)) if kind == "indentation" else ():
+        if None not in event:  # a sample during it may lie anywhere between
+            first, last = np.searchsorted(starts, np.array(event), side="right") - 1
+            near = slice(max(min(first, last - 1), 0), last + 1)
             deviation[near] = np.hypot(deviation[near], float(np.ptp(means[1][near])))
     return means, deviation, position, counts.astype(float)
 
@@ -198,7 +199,7 @@ def _slopes(displacement: Floats, force: Floats, noise: Floats, unloading: Mask)
 
 def _corners(seen: CurveLandmarks) -> Indices:
     """The first samples after jumps and corners."""
-    samples = (seen.snap_in, seen.pull_off, seen.turn, seen.leave)
+    samples = (seen.snap_in, seen.detaches, seen.pull_off, seen.turn, seen.leave)
     return np.unique(np.array([sample for sample in samples if sample is not None], dtype=np.intp))
 
 
@@ -570,7 +571,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
             time,
             path_fraction,
             drift,
-            contact_samples(columns[1], seen)[1],
+            contact_samples(columns[0], columns[1], seen)[1],
             (*_straight_lines(columns[1], counts), np.full(len(force), slow)),
         )
         errors.append(error)

@@ -86,7 +86,7 @@ def shown_curves(
         jumps: list[int | None] = [None, None]
         if recording.kind == "indentation":
             measured = measured - landmarks.zero
-            jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
+            jumps = [landmarks.snap_in, landmarks.detaches]
         snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
         along = path_fractions(sample_mm, measured, landmarks, problem.kind)
         shown = _thinned(along, [landmarks.turn, *(at for at in jumps if at is not None)])

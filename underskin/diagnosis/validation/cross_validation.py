@@ -111,14 +111,14 @@ def _curve_parts(lines: Lines) -> dict[str, Mask]:
         if lines.kind == "compression" and -travel.min() > travel.max():  # pulled
             travel = -travel
         turn = int(np.argmax(travel))
-        loaded = np.flatnonzero(force[first + turn : end] > _UNLOADING * force[first:end].max())
-        last_loaded = turn + (int(loaded[-1]) if len(loaded) else 0)
+        back = np.flatnonzero(travel[turn:] < travel[turn] - _UNLOADING * float(np.ptp(travel[: turn + 1])))
+        leave = turn + (int(back[0]) if len(back) else 0)  # a stage that holds may still give a little
+        loaded = np.flatnonzero(force[first + leave : end] > _UNLOADING * force[first:end].max())
+        last_loaded = leave + (int(loaded[-1]) if len(loaded) else 0)
         peak = int(np.argmax(force[first : first + turn + 1])) if turn else 0
-        if last_loaded - turn >= _LEAST_SAMPLES and travel[turn] - travel[last_loaded] > _UNLOADING * float(
-            np.ptp(travel[: turn + 1])
-        ):
-            third = (last_loaded - turn) // 3
-            unloading[first + turn + third : first + turn + 2 * third] = True
+        if len(back) and last_loaded - leave >= _LEAST_SAMPLES:
+            third = (last_loaded - leave) // 3
+            unloading[first + leave + third : first + leave + 2 * third] = True
         elif end - first - 1 - peak >= _LEAST_SAMPLES:
             hold[end - (end - first - 1 - peak) // 2 : end] = True
     parts = {"the middle of the way back": unloading, "the later half of what is held": hold}

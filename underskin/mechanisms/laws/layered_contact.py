@@ -8,7 +8,8 @@ import numpy as np
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import Conditions, IndentationConditions
+from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
+from underskin.recordings.curve_course import pressed_depth
 
 _THICKNESS = "layer_thickness"
 _USUAL, _SD = 5.0, 1.5  # contact radii, and of the logarithm
@@ -65,10 +66,18 @@ class LayeredContact(Mechanism):
 
 
 def _contact_radius_mm(conditions: Conditions) -> float:
-    """About the largest of the recordings, √(R δ), with half of the travel for the depth."""
+    """About the largest of the recordings, √(R δ)."""
     radii = [
-        math.sqrt(recording.indenter_radius_mm * max(0.5 * float(np.ptp(recording.displacement_mm)), 1e-12))
+        math.sqrt(recording.indenter_radius_mm * max(_depth_mm(recording), 1e-12))
         for recording in conditions.recordings
         if isinstance(recording, IndentationConditions)
     ]
     return max(radii, default=1.0)
+
+
+def _depth_mm(recording: IndentationConditions) -> float:
+    """The depth δ after the contact begins; of conditions alone, which begin with it, the travel."""
+    travel = recording.displacement_mm
+    if not isinstance(recording, IndentationRecording):
+        return float(np.ptp(travel))
+    return pressed_depth(travel, recording.force_n, recording.time_s)

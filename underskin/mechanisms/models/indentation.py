@@ -508,16 +508,9 @@ class IndentationModel(CurveModel):
             :, None
         ]  # m/N
         self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
-        contacts = [_visible_contact(recording) if sticks else None for recording in recordings]
-        self._seen = np.array([contact is not None for contact in contacts])[:, None]
-        self._seen_contact = (
-            self._arranged(
-                [
-                    np.zeros(len(recording.displacement_mm)) if contact is None else contact.astype(float)
-                    for recording, contact in zip(recordings, contacts, strict=True)
-                ]
-            )
-            > 0
+        contacts = [_visible_contact(recording, sticks) for recording in recordings]
+        self._seen, self._seen_contact = (
+            self._arranged([masks[number].astype(float) for masks in contacts]) > 0 for number in (0, 1)
         )
         self.hidden_jumps = sticks and not bool(self._seen.all())
         middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
@@ -575,8 +568,8 @@ class IndentationModel(CurveModel):
         return force, contact_mask, sphere.inside(a) | ~contact_mask
 
     def _as_seen(self, contact_mask: Mask) -> Mask:
-        """The contact between snap-in and pull-off of the curves that show both: jumps are events, whose place no law
-        of equilibrium predicts to a sample."""
+        """The contact as snap-in and pull-off show it: they are events, whose place no law of equilibrium predicts to a
+        sample."""
         return np.where(self._seen, self._seen_contact, contact_mask)
 
     def _last_travel(self, sphere: Sphere, work: Floats) -> Floats:
@@ -648,10 +641,11 @@ def _with_touch(travel: Floats, time: Floats, again: Mask) -> Path:
     return Path(travel, time, first_contact, again)
 
 
-def _visible_contact(recording: IndentationConditions) -> Mask | None:
-    """As `visible_contact`; None of conditions alone."""
-    if not isinstance(recording, IndentationRecording):
-        return None
+def _visible_contact(recording: IndentationConditions, sticks: bool) -> tuple[Mask, Mask]:
+    """As `visible_contact`; nothing shows of conditions alone, nor where nothing `sticks`."""
+    if not (sticks and isinstance(recording, IndentationRecording)):
+        nothing = np.zeros(len(recording.displacement_mm), dtype=bool)
+        return nothing, nothing
     return visible_contact(recording.displacement_mm, recording.force_n, recording.time_s)
 
 
