@@ -61,8 +61,7 @@ def reason_of(
 ) -> str:
     """The reason for a zone over `bins` (first, last) of the `curves` (conditions and all, bins) over `middle_hz`."""
     first, last = bins
-    level = levels_of(curves[:, first : last + 1])
-    departure = curves / np.where(level == 0, np.nan, level) - 1
+    departure = curves / levels_of(curves[:, first : last + 1]) - 1
     parts = [f"{low_hz:.4g} to {high_hz:.4g} Hz: no resonance in any recording"]
     if last + 1 < len(middle_hz):
         parts.append(_above(high_hz, middle_hz, departure, conditions, last))
@@ -84,9 +83,9 @@ def reason_of(
 
 
 def levels_of(curves: Floats) -> Floats:
-    """The mean of each curve over its bins, (curves, 1); NaN without any."""
-    filled = np.isfinite(curves).sum(axis=1, keepdims=True)
-    return np.nansum(curves, axis=1, keepdims=True) / np.where(filled, filled, np.nan)
+    """The mean of each curve over its bins, (curves, 1); NaN without any, and of a curve of zeros."""
+    filled, total = np.isfinite(curves).sum(axis=1, keepdims=True), np.nansum(curves, axis=1, keepdims=True)
+    return np.asarray(np.where(total == 0, np.nan, total) / np.where(filled, filled, np.nan))
 
 
 def _above(
@@ -114,11 +113,10 @@ def _above(
 
 def _below(low_hz: float, departure: Floats) -> str:
     """By the departures of the bins below: a high-pass lowers each more than the next."""
-    departure = departure[np.isfinite(departure)]
-    if len(departure) > 1 and departure[-1] < 0 and (np.diff(departure) > 0).all():
+    falls = bool(departure[-1] < 0)
+    if falls and len(departure) > 1 and not (np.diff(departure) <= 0).any():
         return f"below {low_hz:.4g} Hz the response falls off, as behind a high-pass"
-    side = "falls" if len(departure) and departure[-1] < 0 else "rises"
-    return f"below {low_hz:.4g} Hz the response {side} or scatters by more than 2 %"
+    return f"below {low_hz:.4g} Hz the response {'falls' if falls else 'rises'} or scatters by more than 2 %"
 
 
 FLATNESS = 0.02
@@ -540,8 +538,8 @@ class _Curve:
         def misfit(corners: Floats) -> float:
             return self.fitted(moved(corners))[0]
 
-        bounds = [(corner - np.log(_BELOW), corner + np.log(_BELOW)) for corner in start.tolist()]
-        return moved(np.asarray(minimize(misfit, start, method="Nelder-Mead", bounds=bounds).x, dtype=np.float64))
+        near = start[:, None] + np.log(_BELOW) * np.array([-1.0, 1.0])
+        return moved(np.asarray(minimize(misfit, start, method="Nelder-Mead", bounds=near).x, dtype=np.float64))
 
 
 def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:
