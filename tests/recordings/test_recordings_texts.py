@@ -7,7 +7,7 @@ import pytest
 
 from tests.recordings.contents_of_files import contents
 from underskin.errors import FileError
-from underskin.recordings import read_contents
+from underskin.recordings import read_contents, read_file, rig_description
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers.sandbox import parse_apart
 from underskin.recordings.rig_description import Property, common_value, spring_constant
@@ -104,7 +104,18 @@ def test_columns_text_left_out_warning(cells: tuple[str, str], place: str) -> No
     ]
     found = contents("\n".join(lines).encode(), "curve.txt")
     the_curve(found, LABELLED)
-    assert found.warnings == (f"column 'Note' holds text, such as {cells[0]!r}, and is left out",)
+    rig = rig_description.from_dict(
+        {
+            "schema": "rig/1",
+            "kind": "indentation",
+            "units_checked": True,
+            "skin": {"poisson_ratio": 0.5},
+            "recording": {"indenter_radius_mm": 1},
+            "channels": {"displacement_mm": {"channel": "Depth"}, "force_n": {"channel": "Force"}},
+        }
+    )
+    warnings = read_file("\n".join(lines).encode(), "curve.txt", rig).warnings
+    assert f"column 'Note' holds text, such as {cells[0]!r}, and is left out" in warnings
 
 
 def test_text_among_columns_numbers_refused_line() -> None:

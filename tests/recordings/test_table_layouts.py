@@ -242,3 +242,32 @@ def test_several_tables_in_a_file(lengths: list[int], separator: str, blank: boo
 def test_a_comma_in_the_name_of_a_property(line: str, name: str, value: str) -> None:
     found = contents(f"{line}\n\nDepth [mm],Force [N]\n0,1\n1,2\n2,3\n".encode(), "run.csv")
     assert found.properties[name] == value
+
+
+@given(
+    st.sampled_from([("CH1",), ("CH1", "CH2"), ("Voltage A", "Voltage B", "MATH")]),
+    st.sampled_from([1e-9, 3.90625e-05, 2.5e-3]),
+    st.sampled_from(["Increment", "Increment (ms)"]),
+    st.sampled_from([",", ";", "\t"]),
+    st.booleans(),
+)
+def test_a_time_base_beside_the_names(
+    names: tuple[str, ...], step: float, heading: str, separator: str, trailing: bool
+) -> None:
+    """An oscilloscope that counts its samples states start and increment in columns without numbers under them."""
+    end = separator if trailing else ""
+    lines = [
+        separator.join(["X", *names, "Start", heading]) + end,
+        separator.join(["Sequence", *["Volt"] * len(names), "-1.0e-01", f"{step:.6e}"]) + end,
+        *(
+            separator.join([str(row), *[f"{row / 8 - number}" for number in range(len(names))]]) + end
+            for row in range(9)
+        ),
+    ]
+    found = contents("\n".join(lines).encode(), "scope.csv")
+    (block,) = found.blocks
+    assert block.sample_rate_hz == pytest.approx(1 / (step * (1e-3 if "ms" in heading else 1)))
+    assert found.properties["Start"] == "-1.0e-01"
+    assert [(channel.name, channel.unit) for channel in block.channels[1:]] == [(name, "Volt") for name in names]
+    for number, channel in enumerate(block.channels[1:]):
+        assert channel.values.tolist() == [row / 8 - number for row in range(9)]

@@ -2,24 +2,29 @@
 
 Rows are found by table.py, names and units by headings.py. Columns of text are left out with a warning. Lines above the
 headings and under the numbers with a name and a value become properties, unless the name has two values. Where the
-headings are repeated, a new block starts. See Also csv_template.py, the template of this package.
+headings are repeated, a new block starts. Cells beside the units that hold values, as oscilloscopes write their time
+base, are properties, and an increment there is the step of the samples. See Also csv_template.py, the template of this
+package.
 """
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import BinaryIO
 
+import numpy as np
+
 from underskin.errors import FileError
-from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
+from underskin.recordings.channels import Block, Channel, Contents, TextColumn, text_left_out, with_distinct_names
 from underskin.recordings.readers import headings, text
 from underskin.recordings.readers import table as tables
 from underskin.recordings.readers.headings import Headings
 from underskin.recordings.readers.table import BLANKS, Lines, RowReader, Section, Table
-from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.readers.unit_labels import labelled_unit, unit
 
 _STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*)")
 _WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s\d].*)")
 _NAME_AND_UNIT = re.compile(r"(?P<name>[^,:=]+),\s*(?P<unit>[^,:=\s]+)\s*[:=]\s*(?P<value>[^\s:=].*)")  # X, um: 25
+_STEP = re.compile(r"increment|interval", re.IGNORECASE)
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
 _SHOWN = 30  # letters of a cell in a message
@@ -53,10 +58,16 @@ def of_text(written: str, file: str) -> Contents:
         )
     )
     properties, warnings = _properties([*above, *under], table)
+    properties |= found.beside
     blocks = []
+    first_row = 0
     for number, (section, section_lines) in enumerate(zip(reader.sections, [above, *between], strict=True), start=1):
         name = str(number) if len(reader.sections) > 1 else ""
-        blocks.append(Block(name, _channels(table, found, section), group_starts=section.group_starts))
+        texts = _texts(reader, found, slice(first_row, first_row + section.count))
+        first_row += section.count
+        channels = _channels(table, found, section)
+        rate = _rate(found, table)
+        blocks.append(Block(name, channels, rate, group_starts=section.group_starts, texts=texts))
         if name:
             section_properties, _ = _properties(section_lines, table)
             properties |= {f"{name}.{name_in_section}": value for name_in_section, value in section_properties.items()}
@@ -97,6 +108,15 @@ def _channels(table: Table, found: Headings, section: Section) -> tuple[Channel,
     return with_distinct_names([Channel(*name, column) for name, column in zip(names, columns, strict=True)])
 
 
+def _rate(found: Headings, table: Table) -> float | None:
+    """Samples a second by the increment that is stated beside the names."""
+    for name, value in found.beside.items():
+        step, label = text.number(value, table.decimal), unit(labelled_unit(name) or "s")
+        if _STEP.search(name) and step and step > 0 and label is not None and label.dimension == "time":
+            return 1 / (step * label.to_si)
+    return None
+
+
 def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: str) -> None:
     """Reject numbers under the rows, and rows above them with separated thousands: they would be lost."""
     for index, line in under:
@@ -110,13 +130,21 @@ def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: s
 
 
 def _text_column_warnings(reader: RowReader, table: Table, found: Headings, file: str) -> Iterator[str]:
-    """Messages on columns of text; raises FileError where one holds numbers in most rows."""
+    """Messages on columns of text that are too many; raises FileError where one holds numbers in most rows."""
     for column, seen in reader.texts.items():
         if seen.first is not None and seen.count < reader.count / 2:
             raise tables.no_row(*seen.first, table, file)
-        if seen.example:
-            name = found.names[column][0]
-            yield f"column {name!r} holds text, such as {seen.example[:_SHOWN]!r}, and is left out"
+        if seen.example and not seen.kept:
+            yield text_left_out(found.names[column][0], seen.example)
+
+
+def _texts(reader: RowReader, found: Headings, rows: slice) -> tuple[TextColumn, ...]:
+    """The columns of words in these of all rows."""
+    return tuple(
+        TextColumn(found.names[column][0], tuple(words.texts), np.array(words.codes[rows], dtype=np.intp))
+        for column, words in reader.texts.items()
+        if words.kept and words.example
+    )
 
 
 def _overload_warnings(reader: RowReader, found: Headings) -> Iterator[str]:

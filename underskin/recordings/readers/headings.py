@@ -6,8 +6,8 @@ may stand between names and numbers.
 """
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from underskin.errors import FileError
 from underskin.recordings.readers import text
@@ -26,10 +26,12 @@ _NO_UNITS = ("", "-", "–", "1", "%", "°C", "K", "#", "a.u.", "n/a")
 
 @dataclass(frozen=True)
 class Headings:
-    """Name and unit of each column; `lines`: the indices of the lines that state them, from 0."""
+    """Name and unit of each column; `lines`: the indices of the lines that state them, from 0; `beside`: values that
+    stand under names of their own to the right of the table's."""
 
     names: Sequence[tuple[str, str]]
     lines: tuple[int, ...] = ()
+    beside: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
     Raises FileError where the line above the numbers has quotes that do not close.
     """
     _require_closed_quotes(lines, table, file)
+    lines, beside = _without_values_beside(lines, table)
     candidates = list(_candidates(lines, table))
     units = _units(candidates)
     named = [candidate for candidate in candidates if candidate is not units and _is_full(candidate, table)]
@@ -80,8 +83,24 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
         for number, name, by_row in zip(range(1, table.width + 1), [*names.cells, *padding], stated_units, strict=False)
     ]
     return Headings(
-        headings, tuple(dict.fromkeys(candidate.line for candidate in (names, units) if candidate is not None))
+        headings, tuple(dict.fromkeys(candidate.line for candidate in (names, units) if candidate is not None)), beside
     )
+
+
+def _without_values_beside(lines: Sequence[str], table: Table) -> tuple[Sequence[str], dict[str, str]]:
+    """The lines with the two above the numbers cut to the table, and what stands beside it on them: names, and under
+    each of them a value, as oscilloscopes write their time base."""
+    above = [index for index in range(table.start - 1, -1, -1) if lines[index].strip()][:2]
+    if len(above) < 2 or table.separator == BLANKS:
+        return lines, {}
+    edge = max(table.columns) + 1
+    values, names = (split(lines[index], table.separator) for index in above)
+    beside = dict(zip(names[edge:], values[edge:], strict=False))
+    are_values = [bool(_VALUE.fullmatch(value)) and not _VALUE.fullmatch(name) for name, value in beside.items()]
+    if not beside or len(values) != len(names) or len(beside) < len(names) - edge or not all(are_values):
+        return lines, {}
+    cut = {index: table.separator.join(cells[:edge]) for index, cells in zip(above, (values, names), strict=True)}
+    return [cut.get(index, line) for index, line in enumerate(lines[: table.start])], beside
 
 
 def _units(candidates: Sequence[_Candidate]) -> _Candidate | None:

@@ -192,6 +192,7 @@ def no_row(index: int, line: str, table: Table, file: str) -> FileError:
 
 _FEW = 64  # lines that are read one by one where they are not plain
 _MOST_GROUPS = 1000
+_MOST_DIFFERENT = 10_000  # texts of a column that is kept
 _PLAIN = b"0123456789+-.eE\n"  # bytes of lines that are read at once, beside separators
 Lines = list[tuple[int, str]]  # with their numbers, from 0
 
@@ -276,6 +277,28 @@ class OtherCells:
         self.first = self.first or (index, line)
 
 
+@dataclass
+class Words(OtherCells):
+    """The cells of a column of words; of those that are numbers, `count` and `example` have none."""
+
+    texts: dict[str, int] = field(default_factory=dict)
+    codes: "array[int]" = field(default_factory=lambda: array("q"))
+
+    def add(self, cell: str, index: int, line: str, *, is_number: bool) -> None:
+        """Add the cell of the next row; of too many different ones none is kept."""
+        if not is_number:
+            self.see(cell, index, line)
+        if self.kept:
+            self.codes.append(self.texts.setdefault(cell.strip(), len(self.texts)))
+        else:
+            self.codes = array("q")
+
+    @property
+    def kept(self) -> bool:
+        """Whether it may tell recordings apart."""
+        return len(self.texts) <= _MOST_DIFFERENT
+
+
 class RowReader:
     """Reads the rows of a text from the table's start on.
 
@@ -290,7 +313,7 @@ class RowReader:
         self._is_plain = table.columns == tuple(range(table.width)) and not table.complex_ones
         self.sections: list[Section] = []
         self.under: Lines = []  # lines since the last row
-        self.texts = {column: OtherCells() for column in range(table.width) if column not in table.columns}
+        self.texts = {column: Words() for column in range(table.width) if column not in table.columns}
         self.overloads: dict[int, OtherCells] = {}
         self.count = 0
 
@@ -334,9 +357,9 @@ class RowReader:
         section.add(index, 1, numbers)
         if self.texts:
             cells = [*self._table.cells(line), *[""] * self._table.width]
-            for column, seen in self.texts.items():
-                if text.number(cells[column], self._table.decimal) is None:
-                    seen.see(cells[column], index, line)
+            for column, words in self.texts.items():
+                is_number = text.number(cells[column], self._table.decimal) is not None
+                words.add(cells[column], index, line, is_number=is_number)
 
     def _check(self, section: Section, index: int, line: str, row: Sequence[float | complex | None]) -> None:
         """Note overloads and the ends of columns; raises FileError where a number follows the end of its column."""
