@@ -171,4 +171,4 @@ def test_curves_of_a_long_table() -> None:
     assert curves.keys() == {"3", "5"}
     for well, curve in curves.items():
         assert curve.displacement_mm == pytest.approx([0, 0.01, 0.02, 0.03])
-        assert 1e3 * curve.force_n == pytest.approx(float(well) * curve.displacement_mm**1.5)
+        assert 1e3 * curve.force_n == pytest.approx(float(str(well)) * curve.displacement_mm**1.5)

@@ -721,7 +721,8 @@ def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[B
     blocks = [block for block in contents.blocks if not _lacking(rig, block)]
     if blocks:
         return blocks
-    missing = ", ".join(min((_lacking(rig, block) for block in contents.blocks or (Block("", ()),)), key=_count))
+    lacking = [_lacking(rig, block) for block in contents.blocks or (Block("", ()),)]
+    missing = ", ".join(min(lacking, key=len))
     lacks = f"no part holds all channels that the rig description names: it lacks {missing}"
     raise FileError(file, "", f"{lacks}; it has {contents.described()}")
 
@@ -761,10 +762,6 @@ def _lacking(rig: RigDescription, block: Block) -> list[str]:
     missing = [name for name in _channel_names(rig) if not block.headed(name)]
     columns = dict.fromkeys(signal.channel for signal in rig.row_fields)
     return [*missing, *(name for name in columns if not (block.words(name) or block.headed(name)))]
-
-
-def _count(names: Sequence[str]) -> int:
-    return len(names)
 
 
 def _channel_names(rig: RigDescription) -> Sequence[str]:
