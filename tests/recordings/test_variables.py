@@ -13,6 +13,7 @@ from tests.recordings.contents_of_files import contents, the_time_series
 from tests.support.instrument_files import CHARGE, FORCE, matlab_5, matlab_73, numpy_file, plain_hdf5, rig, wav
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
+from underskin.recordings.campaign import FrfRecording
 
 NAMES = ("force", "charge", "t1", "Kanal", "x")
 NUMBER = st.floats(-1e6, 1e6).map(lambda number: round(number, 3))
@@ -202,6 +203,7 @@ def test_sound_files(kind: Any) -> None:
         channels={"force_n": {"channel": "force"}, "charge_pc": {"channel": "charge"}},
     )
     (recording,) = read_file(data, "run.wav", described).campaign.recordings
+    assert isinstance(recording, FrfRecording)
     assert recording.sample_rate_hz == 1000
     precision = {np.uint8: 4 / 100, np.int16: 1e-3}.get(kind, 1e-6)
     assert recording.force_n == pytest.approx(FORCE, abs=precision)

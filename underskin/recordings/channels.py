@@ -104,10 +104,11 @@ class Contents:
     layout: str = ""
 
     def described(self) -> str:
-        """The channels and their units, for an error message."""
+        """The columns of words, the channels and their units, for an error message."""
         units = [(channel.name, f"[{channel.unit or '?'}]") for block in self.blocks for channel in block.channels]
         names = [name if name.endswith(unit) else f"{name} {unit}" for name, unit in units]
-        different = list(dict.fromkeys(names))
+        words = [f"{column.name} [words]" for block in self.blocks for column in block.texts]
+        different = list(dict.fromkeys([*words, *names]))
         return ", ".join(different[:20]) + (", …" if len(different) > 20 else "") if different else "no channels"
 
 

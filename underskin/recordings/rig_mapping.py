@@ -722,8 +722,8 @@ def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[B
     if blocks:
         return blocks
     lacking = [_lacking(rig, block) for block in contents.blocks or (Block("", ()),)]
-    missing = ", ".join(min(lacking, key=len))
-    lacks = f"no part holds all channels that the rig description names: it lacks {missing}"
+    missing = min(lacking, key=len)
+    lacks = f"no part holds all channels that the rig description names: it lacks {', '.join(missing)}"
     raise FileError(file, "", f"{lacks}; it has {contents.described()}")
 
 

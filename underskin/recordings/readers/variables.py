@@ -145,5 +145,5 @@ def _signals(axis: tuple[float, float, int, str], held: list[tuple[str, Channel]
     if abscissa is not None and abscissa.dimension == "time" and step > 0:
         return Block(name, channels, 1 / (step * abscissa.to_si))
     is_frequency = abscissa is not None and abscissa.dimension == "frequency"
-    values = start + step * np.arange(count)
+    values = start + step * np.arange(count, dtype=np.float64)
     return Block(name, (Channel("frequency" if is_frequency else "abscissa", label, values), *channels))
