@@ -71,9 +71,9 @@ def _columns(contents: "Contents", document: Mapping[str, Any] | None) -> Iterat
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-    others = len(contents.blocks) - 1
-    if others > 0:
-        yield f"and {others} more parts, such as {contents.blocks[1].name!r}"
+    others = [block.name for block in contents.blocks if block is not next(iter(rig_guess.main_blocks(contents)), None)]
+    if others:
+        yield f"and {len(others)} more parts, such as {others[0]!r}"
     for name, value in list(contents.properties.items())[:_MOST_LISTED]:
         yield f"property {name!r}: {str(value)[:80]}"
     for warning in contents.warnings:
@@ -83,7 +83,9 @@ def _columns(contents: "Contents", document: Mapping[str, Any] | None) -> Iterat
 def _rows(contents: "Contents", taken: Mapping[str, str]) -> Iterator[tuple[str, str, str, str]]:
     import numpy as np
 
-    for block in contents.blocks[:1]:
+    from underskin.recordings import rig_guess
+
+    for block in rig_guess.main_blocks(contents)[:1]:
         for column in block.texts:
             shown = ", ".join(filter(None, column.texts[:_MOST_TEXTS]))
             values = f"{shown}{', …' if len(column.texts) > _MOST_TEXTS else ''} ({len(column.texts)} different)"

@@ -12,9 +12,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from underskin.recordings.channels import Contents
+from underskin.recordings.channels import Block, Contents
 from underskin.recordings.readers.text import time_zone, with_zone
-from underskin.recordings.readers.unit_labels import in_brackets, lab_field, labelled_unit, unit
+from underskin.recordings.readers.unit_labels import decibel_reference, in_brackets, lab_field, labelled_unit, unit
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, SCHEMA, channel_fields
 
 _RATE = "sample_rate_hz"
@@ -30,14 +30,14 @@ _BY_DIMENSION = {
     "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
     "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
 }
-_MAGNITUDES = ("magnitude", "modulus", "|")  # as analysers call the absolute value of an FRF
+_MAGNITUDES = ("mag", "modulus", "|")  # as analysers call the absolute value of an FRF
 _OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
 _BY_WORD = {
     "force": "force_n",
     "load": "force_n",
     "charge": "charge_pc",
     "amplifier": "charge_pc",
-    "coherence": "coherence",
+    "coh": "coherence",
     "frequency": "frequency_hz",
     "phase": PHASE,
     "displacement": "displacement_mm",
@@ -67,6 +67,7 @@ _ROW_FIELDS = (  # of columns beside an FRF: field, dimension, and a word of the
 )
 _DIAMETER = re.compile(r"dia\w*m|durchmesser|diamètre|[øØ⌀]", re.IGNORECASE)
 _RADIUS = "radius"  # the derived channel
+_IMAGINARY = re.compile(r"imag|\bim\b")
 _QUOTED = re.compile(r"'([^']*)'")
 _FIRST_WORD = re.compile(r"(?P<first>[^\s_:]+)[\s_:]+(?P<rest>\S.*)")
 
@@ -91,14 +92,24 @@ class Heading:
     is_complex: bool = False
 
 
+def main_blocks(contents: Contents) -> list[Block]:
+    """The blocks with the channels of the longest one: beside the data, a file may hold a table of results."""
+    longest = max(
+        contents.blocks, key=lambda block: sum(len(channel.values) for channel in block.channels), default=None
+    )
+    names = {channel.name for channel in longest.channels} if longest is not None else set()
+    return [block for block in contents.blocks if names == {channel.name for channel in block.channels}]
+
+
 def of_contents(contents: Contents) -> dict[str, Any]:
     """The rig description that the contents of a file suggest, as a document; `None` stands for what is missing."""
+    blocks = main_blocks(contents)
     columns = {
         channel.name: Heading(channel.name, channel.label, np.iscomplexobj(channel.values))
-        for block in contents.blocks
+        for block in blocks
         for channel in block.channels
     }
-    texts = dict.fromkeys(column.name for block in contents.blocks for column in block.texts)
+    texts = dict.fromkeys(column.name for block in blocks for column in block.texts)
     dated = any(block.recorded_at is not None for block in contents.blocks)
     document = guessed(list(columns.values()), contents.properties, {}, list(texts), dated=dated)
     kind = document["kind"]
@@ -180,7 +191,9 @@ def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
         name = column.name.lower()
         word = next((field for word, field in _BY_WORD.items() if word in name), "")
         field = COMPLEX_FRF if column.is_complex else _BY_DIMENSION[kind].get(dimension) or word
-        if field == "frf_re_pc_per_n" and "imag" in name:
+        if decibel_reference(column.unit) is not None:
+            field = MAGNITUDE
+        if field == "frf_re_pc_per_n" and _IMAGINARY.search(name):
             field = "frf_im_pc_per_n"
         if field == "frf_re_pc_per_n" and (phases or any(part in name for part in _MAGNITUDES)):
             field = MAGNITUDE

@@ -612,7 +612,10 @@ def _text_left_out(rig: RigDescription, blocks: Sequence[Block]) -> list[str]:
     """Messages on the columns of words that the rig does not use."""
     used = {signal.channel for signal in rig.row_fields}
     columns = [
-        column for block in blocks for column in block.texts if not any(column is block.words(name) for name in used)
+        column
+        for block in blocks
+        for column in block.texts
+        if not block.channel(column.name) and not any(column is block.words(name) for name in used)
     ]
     return [text_left_out(column.name, next(filter(None, column.texts))) for column in columns]
 

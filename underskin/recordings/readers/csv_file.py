@@ -9,6 +9,7 @@ package.
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import BinaryIO
 
 import numpy as np
@@ -17,6 +18,7 @@ from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, TextColumn, text_left_out, with_distinct_names
 from underskin.recordings.readers import headings, text
 from underskin.recordings.readers import table as tables
+from underskin.recordings.readers.clock_column import seconds_of
 from underskin.recordings.readers.headings import Headings
 from underskin.recordings.readers.table import BLANKS, Lines, RowReader, Section, Table
 from underskin.recordings.readers.unit_labels import labelled_unit, unit
@@ -24,6 +26,8 @@ from underskin.recordings.readers.unit_labels import labelled_unit, unit
 _STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*)")
 _WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s\d].*)")
 _NAME_AND_UNIT = re.compile(r"(?P<name>[^,:=]+),\s*(?P<unit>[^,:=\s]+)\s*[:=]\s*(?P<value>[^\s:=].*)")  # X, um: 25
+_MOST_TABLES = 100  # of a text
+_LINE = re.compile(r"line (\d+)")
 _STEP = re.compile(r"increment|interval", re.IGNORECASE)
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
@@ -41,14 +45,91 @@ def read(stream: BinaryIO, file: str) -> Contents:
 
 
 def of_text(written: str, file: str) -> Contents:
-    """The channels of a text table with line feeds as line ends; raises as `read`."""
+    """The channels of a text with one table or several, with line feeds as line ends; raises as `read`.
+
+    Another table begins below a blank line or a line of one cell, a title, with headings of its own.
+    """
+    tables_read: list[tuple[str, Contents]] = []
+    title, line = "", 0
+    while True:
+        reader, head, found = _reader(written, file)
+        try:
+            reader.take_all(written)
+            _refuse_other_rows(head[: reader.table.start], reader.under, reader.table, file)
+            _refuse_text_among_numbers(reader, file)
+        except FileError as error:
+            start = reader.sections[-1].last + 1 if reader.sections else 0
+            next_title = _title_of_next_table(written, start, file) if start else None
+            if next_title is None or len(tables_read) == _MOST_TABLES:
+                raise _below(line, error) from None
+            first, written = _cut(written, start)
+            reader, head, found = _reader(first, file)
+            reader.take_all(first)
+            _refuse_text_among_numbers(reader, file)
+            tables_read.append((title, _contents(reader, head, found, line)))
+            title, line = next_title, line + start
+            continue
+        contents = _contents(reader, head, found, line)
+        return _together([*tables_read, (title, contents)]) if tables_read else contents
+
+
+def _cut(written: str, line: int) -> tuple[str, str]:
+    """The text above a line and from it on."""
+    end = 0
+    for _ in range(line):
+        end = written.find("\n", end) + 1 or len(written)
+    return written[:end], written[end:]
+
+
+def _title_of_next_table(written: str, start: int, file: str) -> str | None:
+    """The title of the table that begins on a line, empty without one; None where none begins there."""
+    _, below = _cut(written, start)
+    try:
+        reader, head, found = _reader(below, file)
+    except FileError:
+        return None
+    names = min(found.lines, default=0)
+    above = [line.strip() for line in head[:names]]
+    titles = [line for line in above if line and len(tables.split(line, reader.table.separator)) < 2]
+    values = [cell for cell in reader.table.cells(head[names]) if text.number(cell, reader.table.decimal) is not None]
+    if not found.lines or values or not ("" in above or titles):
+        return None
+    return titles[-1].strip(reader.table.separator) if titles else ""
+
+
+def _below(lines: int, error: FileError) -> FileError:
+    """The error of a table that begins below so many lines."""
+    place = _LINE.sub(lambda match: f"line {int(match[1]) + lines}", error.place)
+    return FileError(error.file, place, error.reason, code=error.code)
+
+
+def _together(tables_read: Sequence[tuple[str, Contents]]) -> Contents:
+    """The tables of a text as one, each with its title or number as the name of its blocks."""
+    titles = [title for title, _ in tables_read]
+    names = [
+        title if title and titles.count(title) == 1 else str(number) for number, title in enumerate(titles, start=1)
+    ]
+    blocks, properties = [], {}
+    for name, (_, contents) in zip(names, tables_read, strict=True):
+        blocks += [replace(block, name=f"{name} {block.name}".strip()) for block in contents.blocks]
+        properties |= {f"{name}.{key}": value for key, value in contents.properties.items()}
+        properties |= {key: value for key, value in contents.properties.items() if key not in properties}
+    warnings = [warning for _, contents in tables_read for warning in contents.warnings]
+    layout = "; ".join(f"{name}: {contents.layout}" for name, (_, contents) in zip(names, tables_read, strict=True))
+    return Contents(tuple(blocks), properties, tuple(dict.fromkeys(warnings)), layout)
+
+
+def _reader(written: str, file: str) -> tuple[RowReader, Sequence[str], Headings]:
+    """A reader of the table of a text, the lines at its start, and the table's headings."""
     head, table = _table(written, file)
     found = headings.find(head, table, file)
-    repeated = frozenset(head[line].strip() for line in found.lines)
-    reader = RowReader(table, repeated, file)
-    reader.take_all(written)
-    _refuse_other_rows(head[: table.start], reader.under, table, file)
-    column_warnings = [*_text_column_warnings(reader, table, found, file), *_overload_warnings(reader, found)]
+    return RowReader(table, frozenset(head[line].strip() for line in found.lines), file), head, found
+
+
+def _contents(reader: RowReader, head: Sequence[str], found: Headings, offset: int) -> Contents:
+    """What a reader has read of a text that begins below so many lines of the file."""
+    table, repeated = reader.table, reader.headings
+    column_warnings = [*_text_column_warnings(reader, found), *_overload_warnings(reader, found, offset)]
     above, *between, under = (
         [line for line in lines if line.strip() not in repeated]
         for lines in (
@@ -65,13 +146,16 @@ def of_text(written: str, file: str) -> Contents:
         name = str(number) if len(reader.sections) > 1 else ""
         texts = _texts(reader, found, slice(first_row, first_row + section.count))
         first_row += section.count
-        channels = _channels(table, found, section)
+        clocks = [clock for column in texts if (clock := seconds_of(column)) is not None]
+        channels = with_distinct_names([*_channels(table, found, section), *clocks])
         rate = _rate(found, table)
         blocks.append(Block(name, channels, rate, group_starts=section.group_starts, texts=texts))
         if name:
             section_properties, _ = _properties(section_lines, table)
             properties |= {f"{name}.{name_in_section}": value for name_in_section, value in section_properties.items()}
-    return Contents(tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, found, reader.sections))
+    return Contents(
+        tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, found, reader.sections, offset)
+    )
 
 
 def _table(written: str, file: str) -> tuple[Sequence[str], Table]:
@@ -102,10 +186,10 @@ def _no_table(lines: Sequence[str]) -> str:
     return f"holds no table, two rows of at least two numbers each: {example}; names go into the CSV template"
 
 
-def _channels(table: Table, found: Headings, section: Section) -> tuple[Channel, ...]:
+def _channels(table: Table, found: Headings, section: Section) -> list[Channel]:
     names = [found.names[column] for column in table.columns]
     columns = section.columns(table)
-    return with_distinct_names([Channel(*name, column) for name, column in zip(names, columns, strict=True)])
+    return [Channel(*name, column) for name, column in zip(names, columns, strict=True)]
 
 
 def _rate(found: Headings, table: Table) -> float | None:
@@ -129,11 +213,16 @@ def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: s
             raise tables.no_row(index, line, table, file)
 
 
-def _text_column_warnings(reader: RowReader, table: Table, found: Headings, file: str) -> Iterator[str]:
-    """Messages on columns of text that are too many; raises FileError where one holds numbers in most rows."""
-    for column, seen in reader.texts.items():
+def _refuse_text_among_numbers(reader: RowReader, file: str) -> None:
+    """Raise FileError where a column of text holds numbers in most rows."""
+    for seen in reader.texts.values():
         if seen.first is not None and seen.count < reader.count / 2:
-            raise tables.no_row(*seen.first, table, file)
+            raise tables.no_row(*seen.first, reader.table, file)
+
+
+def _text_column_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
+    """Messages on columns of too many texts."""
+    for column, seen in reader.texts.items():
         if seen.example and not seen.kept:
             yield text_left_out(found.names[column][0], seen.example)
 
@@ -147,22 +236,23 @@ def _texts(reader: RowReader, found: Headings, rows: slice) -> tuple[TextColumn,
     )
 
 
-def _overload_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
+def _overload_warnings(reader: RowReader, found: Headings, offset: int) -> Iterator[str]:
     """Messages on values that an instrument marked as beyond its range."""
     for column, seen in reader.overloads.items():
         assert seen.first is not None
         cells = f"{seen.count} cells of column {found.names[column][0]!r} hold {seen.example[:_SHOWN]!r}"
-        yield f"{cells}, the first on line {seen.first[0] + 1}: overloads, which are no numbers and are left out"
+        first = f"the first on line {seen.first[0] + 1 + offset}"
+        yield f"{cells}, {first}: overloads, which are no numbers and are left out"
 
 
-def _layout(table: Table, found: Headings, sections: Sequence[Section]) -> str:
-    """How the file was read, in words."""
-    first, last = sections[0].first + 1, sections[-1].last + 1
+def _layout(table: Table, found: Headings, sections: Sequence[Section], offset: int) -> str:
+    """How the file was read, in words; `offset`: the lines above the text."""
+    first, last = sections[0].first + 1 + offset, sections[-1].last + 1 + offset
     numbers = f"rows of {len(table.columns)} numbers from line {first} to {last}"
     written = f"separated by {_SEPARATOR_WORDS[table.separator]}, with decimal {_DECIMAL_WORDS[table.decimal]}"
     if not found.lines:
         return f"{numbers}, {written}; no names above them"
-    names, *units = [line + 1 for line in found.lines]
+    names, *units = [line + 1 + offset for line in found.lines]
     return f"{numbers}, {written}; names from line {names}" + "".join(f", units from line {line}" for line in units)
 
 

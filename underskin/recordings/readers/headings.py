@@ -20,6 +20,7 @@ _LABEL = re.compile(
 )
 _WIDE_BLANKS = re.compile(r"\t|\s{2,}")
 _WITH_UNITS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")  # Load (uN)
+_MARKER = re.compile(r"\[[^\[\]]*\s[^\[\]]*\]")  # [Header end]
 _VALUE = re.compile(r"[-+]?\.?\d[-+\d.,:/ %]*([eE][-+]?\d+)?")
 _NO_UNITS = ("", "-", "–", "1", "%", "°C", "K", "#", "a.u.", "n/a")
 
@@ -71,7 +72,7 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
     candidates = list(_candidates(lines, table))
     units = _units(candidates)
     named = [candidate for candidate in candidates if candidate is not units and _is_full(candidate, table)]
-    names = _names(named, units)
+    names = _names(named, units, lines)
     if names is None and units is not None and _is_full(units, table):  # which also serves as names
         names, units = units, units if all(unit(cell) for cell in units.cells) else None
     if names is None:
@@ -110,11 +111,13 @@ def _units(candidates: Sequence[_Candidate]) -> _Candidate | None:
     return labelled or (nearest if nearest is not None and nearest.is_units() else None)
 
 
-def _names(candidates: Sequence[_Candidate], units: _Candidate | None) -> _Candidate | None:
-    """The line of names among those from the nearest to the farthest; above a line of `units` the nearest to it."""
+def _names(candidates: Sequence[_Candidate], units: _Candidate | None, lines: Sequence[str]) -> _Candidate | None:
+    """The line of names among those from the nearest to the farthest; above a line of `units` that next to it."""
     if units is not None and units.label == "":
         # Lines under the units are no names, which would then lack these units.
-        return next((candidate for candidate in candidates if candidate.line < units.line), None)
+        nearest = next((candidate for candidate in candidates if candidate.line < units.line), None)
+        between = lines[nearest.line + 1 : units.line] if nearest is not None else []
+        return None if any(line.strip() for line in between) else nearest
     words = [candidate for candidate in candidates if not candidate.holds_value()]
     if words and words[0].is_next and not words[0].label:
         return words[0]
@@ -132,6 +135,9 @@ def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
         if not lines[index].strip():
             continue
         bare = uncommented(lines[index]).strip(BLANKS)
+        if _MARKER.fullmatch(bare):
+            is_next = False
+            continue
         label = _LABEL.match(bare)
         kind = "" if label is None else "units" if label["units"] else "names"
         cells = _cells(bare[label.end() :] if label else bare, table)
