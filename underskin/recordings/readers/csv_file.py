@@ -49,28 +49,66 @@ def of_text(written: str, file: str) -> Contents:
 
     Another table begins below a blank line or a line of one cell, a title, with headings of its own.
     """
-    tables_read: list[tuple[str, Contents]] = []
-    title, line = "", 0
-    while True:
-        reader, head, found = _reader(written, file)
+    read = _tables_in(written, file, 0, _MOST_TABLES)
+    return read[0][1] if len(read) == 1 else _together(read)
+
+
+def _tables_in(written: str, file: str, offset: int, most: int) -> list[tuple[str, Contents]]:
+    """The tables of a text, each with its title; `offset`: the lines of the file above it, `most`: the tables that it
+    may have."""
+    reader, head, found = _reader(written, file)
+    start, error = _end_of_table_above(head, found, reader.table, file), None
+    if start is None:
         try:
-            reader.take_all(written)
-            _refuse_other_rows(head[: reader.table.start], reader.under, reader.table, file)
-            _refuse_text_among_numbers(reader, file)
-        except FileError as error:
+            return [_read(reader, written, head, found, file, offset)]
+        except FileError as refused:
+            error = FileError(
+                file, _LINE.sub(lambda line: f"line {int(line[1]) + offset}", refused.place), refused.reason
+            )
             start = reader.sections[-1].last + 1 if reader.sections else 0
-            next_title = _title_of_next_table(written, start, file) if start else None
-            if next_title is None or len(tables_read) == _MOST_TABLES:
-                raise _below(line, error) from None
-            first, written = _cut(written, start)
-            reader, head, found = _reader(first, file)
-            reader.take_all(first)
-            _refuse_text_among_numbers(reader, file)
-            tables_read.append((title, _contents(reader, head, found, line)))
-            title, line = next_title, line + start
-            continue
-        contents = _contents(reader, head, found, line)
-        return _together([*tables_read, (title, contents)]) if tables_read else contents
+    if start and most > 1:
+        first, rest = _cut(written, start)
+        if _begins_table(rest, reader.table, file):
+            above = _tables_in(first, file, offset, most - 1)
+            return [*above, *_tables_in(rest, file, offset + start, most - len(above))]
+    if error is not None:
+        raise error
+    return [_read(reader, written, head, found, file, offset)]
+
+
+def _read(
+    reader: RowReader, written: str, head: Sequence[str], found: Headings, file: str, offset: int
+) -> tuple[str, Contents]:
+    """The only table of a text, and the title nearest above its headings; empty without one."""
+    reader.take_all(written)
+    _refuse_other_rows(head[: reader.table.start], reader.under, reader.table, file)
+    _refuse_text_among_numbers(reader, file)
+    titles = [line.strip() for line in head[: min(found.lines, default=0)] if line.strip()]
+    title = titles[-1].strip(reader.table.separator) if titles and _is_title(titles[-1], reader.table) else ""
+    return title, _contents(reader, head, found, offset)
+
+
+def _is_title(line: str, table: Table) -> bool:
+    """Whether a line is blank, or one cell of words."""
+    return len(tables.split(line, table.separator)) < 2 and text.number(line.strip(), table.decimal) is None
+
+
+def _end_of_table_above(head: Sequence[str], found: Headings, table: Table, file: str) -> int | None:
+    """The line below the rows of a table of numbers alone, under names, above the headings of a table; None without
+    one."""
+    above = head[: min(found.lines, default=table.start)]
+    other = tables.find(above) if len(above) > 2 else None
+    if other is None or other.columns != tuple(range(other.width)):
+        return None
+    names = headings.find(above, other, file).lines
+    if not names or _holds_numbers(above[min(names)], other):
+        return None
+    rows = [index for index in range(other.start, len(above)) if other.row(above[index]) is not None]
+    return rows[-1] + 1
+
+
+def _holds_numbers(line: str, table: Table) -> bool:
+    return any(text.number(cell, table.decimal) is not None for cell in table.cells(line))
 
 
 def _cut(written: str, line: int) -> tuple[str, str]:
@@ -81,26 +119,16 @@ def _cut(written: str, line: int) -> tuple[str, str]:
     return written[:end], written[end:]
 
 
-def _title_of_next_table(written: str, start: int, file: str) -> str | None:
-    """The title of the table that begins on a line, empty without one; None where none begins there."""
-    _, below = _cut(written, start)
+def _begins_table(written: str, table: Table, file: str) -> bool:
+    """Whether a text that follows the rows of a table begins with a blank line or a title, and has a table below
+    names."""
+    if not _is_title(written.partition("\n")[0], table):
+        return False
     try:
-        reader, head, found = _reader(below, file)
+        reader, head, found = _reader(written, file)
     except FileError:
-        return None
-    names = min(found.lines, default=0)
-    above = [line.strip() for line in head[:names]]
-    titles = [line for line in above if line and len(tables.split(line, reader.table.separator)) < 2]
-    values = [cell for cell in reader.table.cells(head[names]) if text.number(cell, reader.table.decimal) is not None]
-    if not found.lines or values or not ("" in above or titles):
-        return None
-    return titles[-1].strip(reader.table.separator) if titles else ""
-
-
-def _below(lines: int, error: FileError) -> FileError:
-    """The error of a table that begins below so many lines."""
-    place = _LINE.sub(lambda match: f"line {int(match[1]) + lines}", error.place)
-    return FileError(error.file, place, error.reason, code=error.code)
+        return False
+    return bool(found.lines) and not _holds_numbers(head[min(found.lines)], reader.table)
 
 
 def _together(tables_read: Sequence[tuple[str, Contents]]) -> Contents:
@@ -109,7 +137,8 @@ def _together(tables_read: Sequence[tuple[str, Contents]]) -> Contents:
     names = [
         title if title and titles.count(title) == 1 else str(number) for number, title in enumerate(titles, start=1)
     ]
-    blocks, properties = [], {}
+    blocks: list[Block] = []
+    properties: dict[str, str | float] = {}
     for name, (_, contents) in zip(names, tables_read, strict=True):
         blocks += [replace(block, name=f"{name} {block.name}".strip()) for block in contents.blocks]
         properties |= {f"{name}.{key}": value for key, value in contents.properties.items()}
