@@ -49,7 +49,10 @@ def _channel(rig: RigDescription, mapping: ChannelMapping) -> str:
     if mapping.deflection is not None:
         how += f", less the deflection {_signal(rig, mapping.deflection)}"
     if mapping.stiffness_n_per_mm is not None:
-        how += f", less the force over {mapping.stiffness_n_per_mm:g} N/mm"
+        stiffness = mapping.stiffness_n_per_mm
+        how += (
+            f", less the force over {_of_file(stiffness) if isinstance(stiffness, Property) else f'{stiffness:g} N/mm'}"
+        )
     return how
 
 

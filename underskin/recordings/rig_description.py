@@ -104,7 +104,7 @@ def _signal(name: str, value: Any, units_checked: bool) -> SignalMapping:
     return field.build(SignalMapping, name, value, units_checked)
 
 
-def _spring_constant(name: str, value: Any, units_checked: bool) -> float | Property:
+def _or_property(name: str, value: Any, units_checked: bool) -> float | Property:
     if isinstance(value, Mapping):
         return field.build(Property, name, value, units_checked)
     return field.positive(name, value, units_checked)
@@ -114,15 +114,16 @@ def _spring_constant(name: str, value: Any, units_checked: bool) -> float | Prop
 class ChannelMapping(SignalMapping):
     """The source of a field's values.
 
-    For `displacement_mm`: `stiffness_n_per_mm` of the instrument (the deflection is force over it), or the channel
+    For `displacement_mm`: `stiffness_n_per_mm` of the instrument (the deflection is force over it), a number or a
+    property of the file, or the channel
     `deflection`; either deflection is subtracted. For `force_n`: `spring_constant_n_per_m`, by which a deflection
     channel is multiplied, or the property of the file that states it. `tare_percent` is the initial part of each curve
     over which the mean of the field is set to 0.
     """
 
-    stiffness_n_per_mm: field.Positive | None = None
+    stiffness_n_per_mm: Annotated[float | Property, _or_property] | None = None
     deflection: Annotated[SignalMapping, _signal] | None = None
-    spring_constant_n_per_m: Annotated[float | Property, _spring_constant] | None = None
+    spring_constant_n_per_m: Annotated[float | Property, _or_property] | None = None
     tare_percent: Annotated[float, _percent] | None = None
 
     @property
@@ -458,15 +459,18 @@ def _require_fitting_field(name: str, channel_mapping: ChannelMapping, fields_gi
         )
         raise conflicting(f"channels.{name}.tare_percent", channel_mapping.tare_percent, fields_with_tare)
     if stiffness is not None and (name != "displacement_mm" or "force_n" not in fields_given):
-        raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, _is_for("displacement_mm"))
+        raise conflicting(f"channels.{name}.stiffness_n_per_mm", _shown(stiffness), _is_for("displacement_mm"))
     if channel_mapping.deflection is not None and name != "displacement_mm":
         raise conflicting(f"channels.{name}.deflection", channel_mapping.deflection.channel, _is_for("displacement_mm"))
     if channel_mapping.deflection is not None and stiffness is not None:
         both = "must not stand beside a deflection, which is subtracted already"
-        raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, both)
+        raise conflicting(f"channels.{name}.stiffness_n_per_mm", _shown(stiffness), both)
     if spring is not None and name != "force_n":
-        value = spring if isinstance(spring, float) else spring.property
-        raise conflicting(f"channels.{name}.spring_constant_n_per_m", value, _is_for("force_n"))
+        raise conflicting(f"channels.{name}.spring_constant_n_per_m", _shown(spring), _is_for("force_n"))
+
+
+def _shown(value: float | Property) -> float | str:
+    return value.property if isinstance(value, Property) else value
 
 
 def _is_for(name: str) -> Requirement:
@@ -476,7 +480,6 @@ def _is_for(name: str) -> Requirement:
 Stated = Mapping[str, str | float]
 TEXTS = ("id", "sensor")  # fields that are texts, whatever a file states
 AXES = ("x_mm", "y_mm")  # of a position
-_STIFFNESS = "force/length"
 
 
 def common_value(name: str, value: Any | Property, stated: Stated, file: str) -> Any:
@@ -512,19 +515,21 @@ def _in_zone(given: str | float) -> str | float:
         return given
 
 
-def spring_constant(value: float | Property, stated: Stated, file: str) -> float:
-    """A spring constant [N/m] from the rig description or a property, in N/m where its name holds no other unit."""
+def spring_constant(value: float | Property, stated: Stated, file: str, own_unit: str = "N/m") -> float:
+    """A stiffness from the rig description or a property, in `own_unit`, which is also that of a property whose name
+    holds no other unit."""
     if not isinstance(value, Property):
         return value
     place, given = f"property {value.property!r}", _property_value(value, stated, file)
     number = _number(given)
     if number is None or not 0 < number < float("inf"):
-        raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a spring constant")
+        raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a stiffness")
     label = labelled_unit(value.property)
-    constant_unit = unit(label or "N/m")
-    if constant_unit is None or constant_unit.dimension != _STIFFNESS:
-        raise FileError(file, place, f"its unit {label!r} is not one of {_STIFFNESS}, such as N/m")
-    return number * constant_unit.to_si
+    stated_unit, own = unit(label or own_unit), unit(own_unit)
+    assert own is not None
+    if stated_unit is None or stated_unit.dimension != own.dimension:
+        raise FileError(file, place, f"its unit {label!r} is not one of {own.dimension}, such as {own_unit}")
+    return number * (stated_unit.to_si / own.to_si)
 
 
 def _number(given: str | float) -> float | None:

@@ -365,9 +365,10 @@ class MappedBlock:
 
     def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
         """The columns, the displacement corrected for the instrument's compliance (force over its stiffness)."""
-        stiffness = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
-        if stiffness is None:
+        given = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
+        if given is None:
             return dict(columns)
+        stiffness = spring_constant(given, self.stated, self.file, "N/mm")
         if len(columns["displacement_mm"]) != len(columns["force_n"]):
             both = (Mention("displacement_mm"), " and ", Mention("force_n"))
             reason = Requirement(*both, " differ in length: no stiffness can be applied")

@@ -33,6 +33,8 @@ def spring_constant(document: Mapping[str, Any]) -> Any:
     channels = document.get("channels", {})
     stated = channels.get("force_n", {}).get(SPRING)
     stiffness = channels.get("displacement_mm", {}).get("stiffness_n_per_mm")
+    if isinstance(stiffness, Mapping):
+        return stiffness
     return stated if stiffness is None else _rounded(1e3 * stiffness)
 
 
@@ -67,6 +69,8 @@ def with_spring(
         displacement[DEFLECTION] = _signal(deflection)
     elif isinstance(constant, float):
         displacement["stiffness_n_per_mm"] = _rounded(1e-3 * constant)
+    elif isinstance(constant, Mapping):
+        displacement["stiffness_n_per_mm"] = constant
     else:
         must = "must be a number where the force is measured, or say which channel is the deflection"
         return channels, [wrong_type(SPRING, constant and str(constant), must)]
