@@ -56,11 +56,14 @@ class Table:
     def row(self, line: str) -> list[float | complex | None] | None:
         """The numbers of a row, one for each of `columns`, NaN for an overload, None for an empty cell of a line with
         all separators; None where the line is no row."""
-        cells = self.cells(line)
+        return self.row_of(self.cells(line), line)
+
+    def row_of(self, cells: Sequence[str], line: str) -> list[float | complex | None] | None:
+        """The same of the cells of a line."""
         if not _LEAST <= len(cells) <= self.width:
             return None
-        ended = self.width - len(cells) if room(line, self.separator) >= self.width else 0
-        cells += [""] * ended
+        if len(cells) < self.width and room(line, self.separator) >= self.width:
+            cells = [*cells, *[""] * (self.width - len(cells))]
         if len(cells) <= max(self.columns):
             return None
         row = [self._number(cells[column], column) for column in self.columns]
@@ -343,7 +346,8 @@ class RowReader:
                 self._take_line(index, line)
 
     def _take_line(self, index: int, line: str) -> None:
-        row = self.table.row(line)
+        cells = self.table.cells(line)
+        row = self.table.row_of(cells, line)
         if row is None:
             self.under.append((index, line))
             return
@@ -355,11 +359,9 @@ class RowReader:
             value = math.nan if number is None else number
             numbers += [value.real, value.imag] if column in self.table.complex_ones else [value.real]
         section.add(index, 1, numbers)
-        if self.texts:
-            cells = [*self.table.cells(line), *[""] * self.table.width]
-            for column, words in self.texts.items():
-                is_number = text.number(cells[column], self.table.decimal) is not None
-                words.add(cells[column], index, line, is_number=is_number)
+        for column, words in self.texts.items():
+            cell = cells[column] if column < len(cells) else ""
+            words.add(cell, index, line, is_number=text.number(cell, self.table.decimal) is not None)
 
     def _check(self, section: Section, index: int, line: str, row: Sequence[float | complex | None]) -> None:
         """Note overloads and the ends of columns; raises FileError where a number follows the end of its column."""
