@@ -22,7 +22,12 @@ def read(stream: BinaryIO, file: str) -> Contents:
     with damage_said(file, "", lambda error: f"is no WAV file that can be read: {error}"):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")  # of chunks that hold no samples
-            rate, samples = wavfile.read(stream)
+            try:
+                rate, samples = wavfile.read(stream)
+            except MemoryError:
+                raise FileError(
+                    file, "", "declares more samples than the file holds, or than there is memory"
+                ) from None
         samples = samples.reshape(len(samples), -1)
     if not len(samples) or rate <= 0:
         raise FileError(file, "", "holds no samples")
