@@ -27,7 +27,8 @@ def template_sentence(fields: Mapping[str, Any]) -> str:
 
 def typed_of(rig: RigDescription) -> list[str]:
     """The values typed for all recordings, as opposed to values read from each file."""
-    return _values({field: value for field, value in rig.recording.items() if not isinstance(value, Property)})
+    read = (Property, SignalMapping)
+    return _values({field: value for field, value in rig.recording.items() if not isinstance(value, read)})
 
 
 def _values(recording: Mapping[str, Any]) -> list[str]:
@@ -48,7 +49,10 @@ def _channel(rig: RigDescription, mapping: ChannelMapping) -> str:
     if mapping.deflection is not None:
         how += f", less the deflection {_signal(rig, mapping.deflection)}"
     if mapping.stiffness_n_per_mm is not None:
-        how += f", less the force over {mapping.stiffness_n_per_mm:g} N/mm"
+        stiffness = mapping.stiffness_n_per_mm
+        how += (
+            f", less the force over {_of_file(stiffness) if isinstance(stiffness, Property) else f'{stiffness:g} N/mm'}"
+        )
     return how
 
 
@@ -69,6 +73,8 @@ def _signal(rig: RigDescription, mapping: SignalMapping) -> str:
 def _value(words: str, unit: str, value: Any) -> str:
     if isinstance(value, Property):
         return f"{words} {_of_file(value)}"
+    if isinstance(value, SignalMapping):
+        return f"{words} from the column {value.channel!r}"
     return f"{words} {value:g} {unit}".rstrip() if isinstance(value, float | int) else f"{words} {value}"
 
 

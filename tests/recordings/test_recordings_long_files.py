@@ -156,8 +156,8 @@ def test_text_far_down_long_table_named_line() -> None:
     assert refused.value.place == "line 751"
 
 
-def test_column_text_long_table_left_out_told() -> None:
-    """A column of text in a long table is left out and told."""
+def test_column_text_long_table() -> None:
+    """A column of text in a long table stands beside its channels, with the rows of each text."""
     lines = table(";", ",")
     noted = [
         lines[0],
@@ -165,7 +165,9 @@ def test_column_text_long_table_left_out_told() -> None:
         *(f"{line};{'end' if n % 100 == 99 else ''}" for n, line in enumerate(lines[2:])),
     ]
     held = contents("\n".join(noted).encode(), "a.csv")
-    assert held.warnings == ("column 'Note' holds text, such as 'end', and is left out",)
+    (note,) = held.blocks[0].texts
+    assert (note.name, note.texts) == ("Note", ("", "end"))
+    assert np.flatnonzero(note.codes).tolist() == list(range(99, len(lines) - 2, 100))
     assert len(held.blocks[0].channels) == 3
 
 

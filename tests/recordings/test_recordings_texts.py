@@ -7,7 +7,8 @@ import pytest
 
 from tests.recordings.contents_of_files import contents
 from underskin.errors import FileError
-from underskin.recordings import read_contents
+from underskin.recordings import read_contents, read_file, rig_description
+from underskin.recordings.campaign import CompressionRecording
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers.sandbox import parse_apart
 from underskin.recordings.rig_description import Property, common_value, spring_constant
@@ -104,7 +105,18 @@ def test_columns_text_left_out_warning(cells: tuple[str, str], place: str) -> No
     ]
     found = contents("\n".join(lines).encode(), "curve.txt")
     the_curve(found, LABELLED)
-    assert found.warnings == (f"column 'Note' holds text, such as {cells[0]!r}, and is left out",)
+    rig = rig_description.from_dict(
+        {
+            "schema": "rig/1",
+            "kind": "indentation",
+            "units_checked": True,
+            "skin": {"poisson_ratio": 0.5},
+            "recording": {"indenter_radius_mm": 1},
+            "channels": {"displacement_mm": {"channel": "Depth"}, "force_n": {"channel": "Force"}},
+        }
+    )
+    warnings = read_file("\n".join(lines).encode(), "curve.txt", rig).warnings
+    assert f"column 'Note' holds text, such as {cells[0]!r}, and is left out" in warnings
 
 
 def test_text_among_columns_numbers_refused_line() -> None:
@@ -179,3 +191,32 @@ def test_large_text_read_apart_says() -> None:
     assert isinstance(apart, Contents)
     assert (apart.layout, apart.warnings) == (here.layout, here.warnings)
     assert apart.blocks[0].group_starts == here.blocks[0].group_starts == (0, len(DEPTH))
+
+
+@pytest.mark.parametrize(
+    ("line", "stiffness"),
+    [("k (N/mm): 50", 50.0), ("k (N/m): 50000", 50.0), ("k: 50", 50.0), ("Rahmensteifigkeit [kN/mm];0,05", 50.0)],
+)
+def test_a_machine_states_its_stiffness(line: str, stiffness: float) -> None:
+    """The force over the stiffness that the file states is taken off the displacement."""
+    rig = rig_description.from_dict(
+        {
+            "schema": "rig/1",
+            "kind": "compression",
+            "skin": {"poisson_ratio": 0.5},
+            "recording": {"sample_height_mm": 10, "sample_diameter_mm": 10},
+            "channels": {
+                "displacement_mm": {
+                    "channel": "Travel",
+                    "stiffness_n_per_mm": {"property": line.replace(";", ":").partition(":")[0]},
+                },
+                "force_n": {"channel": "Force"},
+            },
+        }
+    )
+    text = f"{line}\n\nTravel [mm];Force [N]\n" + "".join(
+        f"{0.1 * row:.1f};{row}\n".replace(".", ",") for row in range(9)
+    )
+    (recording,) = read_file(text.encode(), "block.csv", rig).campaign.recordings
+    assert isinstance(recording, CompressionRecording)
+    assert recording.displacement_mm == pytest.approx(np.arange(9) * (0.1 - 1 / stiffness))

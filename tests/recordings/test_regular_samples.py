@@ -92,6 +92,22 @@ def test_a_clock_with_few_digits(rate: float, digits: int) -> None:
     assert even_rate(lost) is None
 
 
+@given(st.floats(200, 40_000), st.sampled_from(["{:.3g}", "{:.2E}", "{:.4g}", "{:.6g}", "{:.3f}", "{:.4f}"]))
+def test_a_clock_printed_coarser_than_a_step(rate: float, form: str) -> None:
+    """Times of few significant digits, or decimals, repeat: the rate is that of the line through all of them."""
+    even = np.arange(4000) / rate
+    time = np.array([float(form.format(moment)) for moment in even])
+    force = np.sin(2 * np.pi * rate / 40 * even)
+    try:
+        columns, found, note = evenly_sampled({"force_n": force}, time)
+    except ValueError:
+        assert 0.4 < np.diff(time).max() * rate < 2.5  # a tick is about a step: it may hide a lost sample
+        return
+    assert found == pytest.approx(rate, rel=2e-4)
+    assert columns["force_n"].tolist() == force.tolist() or "interpolated" in note
+    assert bool(note) or np.unique(time).size == time.size
+
+
 @given(st.floats(0.01, 0.06), st.integers(0, 2**32))
 def test_a_clock_with_jitter_is_resampled(jitter: float, seed: int) -> None:
     """Samples of a slow signal at times that vary are those of even times."""

@@ -242,3 +242,101 @@ def test_several_tables_in_a_file(lengths: list[int], separator: str, blank: boo
 def test_a_comma_in_the_name_of_a_property(line: str, name: str, value: str) -> None:
     found = contents(f"{line}\n\nDepth [mm],Force [N]\n0,1\n1,2\n2,3\n".encode(), "run.csv")
     assert found.properties[name] == value
+
+
+@given(
+    st.sampled_from([("CH1",), ("CH1", "CH2"), ("Voltage A", "Voltage B", "MATH")]),
+    st.sampled_from([1e-9, 3.90625e-05, 2.5e-3]),
+    st.sampled_from(["Increment", "Increment (ms)"]),
+    st.sampled_from([",", ";", "\t"]),
+    st.booleans(),
+)
+def test_a_time_base_beside_the_names(
+    names: tuple[str, ...], step: float, heading: str, separator: str, trailing: bool
+) -> None:
+    """An oscilloscope that counts its samples states start and increment in columns without numbers under them."""
+    end = separator if trailing else ""
+    lines = [
+        separator.join(["X", *names, "Start", heading]) + end,
+        separator.join(["Sequence", *["Volt"] * len(names), "-1.0e-01", f"{step:.6e}"]) + end,
+        *(
+            separator.join([str(row), *[f"{row / 8 - number}" for number in range(len(names))]]) + end
+            for row in range(9)
+        ),
+    ]
+    found = contents("\n".join(lines).encode(), "scope.csv")
+    (block,) = found.blocks
+    assert block.sample_rate_hz == pytest.approx(1 / (step * (1e-3 if "ms" in heading else 1)))
+    assert found.properties["Start"] == "-1.0e-01"
+    assert [(channel.name, channel.unit) for channel in block.channels[1:]] == [(name, "Volt") for name in names]
+    for number, channel in enumerate(block.channels[1:]):
+        assert channel.values.tolist() == [row / 8 - number for row in range(9)]
+
+
+@given(
+    st.lists(st.tuples(st.integers(2, 4), st.integers(2, 6)), min_size=2, max_size=4),
+    st.sampled_from([(",", "."), (";", ","), ("\t", ".")]),
+    st.booleans(),
+    st.integers(0, 2**32),
+)
+def test_tables_of_different_columns_in_a_file(
+    sizes: list[tuple[int, int]], style: tuple[str, str], titled: bool, seed: int
+) -> None:
+    """Results above the data, or temperatures below: each table has its own names, and its title names it."""
+    separator, decimal = style
+    random = np.random.default_rng(seed)
+    lines: list[str] = []
+    wanted = []
+    for number, (columns, rows) in enumerate(sizes):
+        values = random.normal(size=(rows, columns)).round(3)
+        names = [f"{NAMES[column]} {number} [{UNITS[column]}]" for column in range(columns)]
+        lines += [f"Part {number}"] if titled else [""]
+        lines += [separator.join(names)]
+        lines += [separator.join(f"{value:.3f}".replace(".", decimal) for value in row) for row in values.tolist()]
+        wanted.append((names, values.T.tolist()))
+    found = contents("\n".join(lines).encode(), "run.csv")
+    held = [([channel.name for channel in block.channels], block) for block in found.blocks]
+    assert [(names, [channel.values.tolist() for channel in block.channels]) for names, block in held] == wanted
+    assert [block.name for block in found.blocks][1:] == [
+        f"Part {number}" if titled else str(number + 1) for number in range(1, len(sizes))
+    ]
+
+
+@pytest.mark.parametrize("bad", ["2,x", "2,,3,4", "x,y", "2"])
+def test_a_bad_row_of_a_later_table_is_named_by_its_line(bad: str) -> None:
+    rows = "Raw\nDepth [mm],Force [N]\n0,1\n1,2"
+    text = f"Results\nMax [N],Work [mJ]\n5,6\n5,7\n\n{rows}\n{bad}\n3,4\n4,5\n"
+    with pytest.raises(FileError, match=rf"line 10: must be a row of 2 numbers, as above it; found '{bad}'"):
+        contents(text.encode(), "run.csv")
+
+
+CLOCKS = {
+    "h:m:s": lambda s: f"{s // 3600:02.0f}:{s % 3600 // 60:02.0f}:{s % 60:06.3f}",
+    "decimal comma": lambda s: f"{s // 3600:02.0f}:{s % 3600 // 60:02.0f}:{s % 60:06.3f}".replace(".", ","),
+    "date and time": lambda s: (
+        f"2026-05-{3 + s // 86400:02.0f} {s % 86400 // 3600:02.0f}:{s % 3600 // 60:02.0f}:{s % 60:06.3f}"
+    ),
+    "12 hours": lambda s: (
+        f"{(s % 43200 // 3600) or 12:.0f}:{s % 3600 // 60:02.0f}:{s % 60:06.3f} {'PM' if s % 86400 >= 43200 else 'AM'}"
+    ),
+}
+
+
+@given(
+    st.sampled_from(sorted(CLOCKS)),
+    st.integers(0, 86_399),
+    st.lists(st.integers(1, 4_000_000), min_size=3, max_size=12),
+)
+def test_clock_times_are_seconds(form: str, start: int, steps_ms: list[int]) -> None:
+    """A column of times of day, also over midnight, is a channel of seconds after the first row."""
+    after = np.cumsum([0, *steps_ms]) / 1000
+    if form in ("h:m:s", "decimal comma"):
+        times = [(start + moment) % 86_400 for moment in after.tolist()]
+    else:
+        times = [start + moment for moment in after.tolist()]
+    rows = [f"{CLOCKS[form](round(time, 3))};{row / 8};{row}" for row, time in enumerate(times)]
+    (block,) = contents("\n".join(["Time of day;Depth [mm];Force [N]", *rows]).encode(), "run.csv").blocks
+    clock = block.channel("Time of day")
+    assert clock is not None
+    assert clock.unit == "s"
+    assert clock.values == pytest.approx(after, abs=1.1e-3)

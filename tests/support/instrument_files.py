@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pyuff
 import scipy.io
+import scipy.io.wavfile
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from tests.support.campaign_documents import FRF, document
@@ -128,4 +129,42 @@ def matlab_73(variables: dict[str, Any]) -> bytes:
 def matlab_5(variables: dict[str, Any], compressed: bool = True) -> bytes:
     buffer = io.BytesIO()
     scipy.io.savemat(cast("Any", buffer), variables, do_compression=compressed)
+    return buffer.getvalue()
+
+
+def plain_hdf5(groups: dict[str, Any], units: dict[str, str] | None = None) -> bytes:
+    """Nested groups of datasets, with the attribute `unit` where one is given; numbers and texts are attributes."""
+    buffer = io.BytesIO()
+
+    def write(group: Any, held: dict[str, Any]) -> None:
+        for name, value in held.items():
+            if isinstance(value, dict):
+                write(group.create_group(name), value)
+            elif isinstance(value, str | float | int):
+                group.attrs[name] = value
+            else:
+                group[name] = value
+                if name in (units or {}):
+                    group[name].attrs["unit"] = (units or {})[name]
+
+    with h5py.File(buffer, "w") as target:
+        write(target, groups)
+    return buffer.getvalue()
+
+
+def numpy_file(arrays: Any) -> bytes:
+    """An array as .npy, named ones as .npz."""
+    buffer = io.BytesIO()
+    if isinstance(arrays, dict):
+        np.savez_compressed(buffer, **arrays)
+    else:
+        np.save(buffer, arrays)
+    return buffer.getvalue()
+
+
+def wav(samples: Any, kind: Any, rate: int = 1000) -> bytes:
+    """Samples, as parts of the full scale, as a sound file."""
+    buffer = io.BytesIO()
+    scale = 1.0 if np.issubdtype(kind, np.floating) else 2.0 ** (8 * np.dtype(kind).itemsize - 1)
+    scipy.io.wavfile.write(buffer, rate, np.asarray(np.asarray(samples) * scale).astype(kind))
     return buffer.getvalue()

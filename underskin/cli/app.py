@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.cli import changes, diagnose, mechanism, store, stored, stress, watch
+from underskin.cli import changes, diagnose, mechanism, reading, store, stored, stress, watch
 from underskin.cli.rigs import Contact, ContactOption, EstimatorOption, RigOption
 from underskin.errors import TableError, UnderskinError
 
@@ -305,6 +305,7 @@ def _answer(
             typer.echo(f"The domain is {answer.domain}.")
 
 
+app.command("read", no_args_is_help=True)(reading.read)
 app.command("stress", no_args_is_help=True)(stress.stress)
 app.command("field", no_args_is_help=True)(stress.field)
 app.command("import", no_args_is_help=True)(store.import_files)

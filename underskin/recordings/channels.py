@@ -1,14 +1,14 @@
 """The content of an instrument's file before a rig description maps its channels."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from underskin.recordings.readers.unit_labels import in_brackets, labelled_unit
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 Values = Floats | NDArray[np.complex128]
 FIRST_YEAR = 1970  # LabVIEW writes an unset clock as the beginning of 1904
@@ -34,16 +34,35 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
+class TextColumn:
+    """A column of words: its name, its different `texts`, and for each row the index of its text, (rows,)."""
+
+    name: str
+    texts: tuple[str, ...]
+    codes: Indices
+
+
+def text_left_out(name: str, example: str) -> str:
+    """The message that a column of words is not used."""
+    return f"column {name!r} holds text, such as {example[:_SHOWN]!r}, and is left out"
+
+
+_SHOWN = 30  # letters of a cell in a message
+_Column = TypeVar("_Column", Channel, TextColumn)
+
+
+@dataclass(frozen=True, eq=False)
 class Block:
     """Channels acquired together; `sample_rate_hz` where all are evenly sampled at one rate, `recorded_at` the stated
     start of the acquisition (ISO 8601). `group_starts` are the first samples of groups of rows in a text, separated by
-    blank or comment lines; empty for a single group."""
+    blank or comment lines; empty for a single group. `texts` are its columns of words."""
 
     name: str
     channels: tuple[Channel, ...]
     sample_rate_hz: float | None = None
     recorded_at: str | None = None
     group_starts: tuple[int, ...] = ()
+    texts: tuple[TextColumn, ...] = ()
 
     def channel(self, name: str) -> Channel | None:
         """The channel of that name, or None."""
@@ -51,8 +70,27 @@ class Block:
 
     def headed(self, name: str) -> Channel | None:
         """The channel of that name, or the only one whose heading is it with a unit in brackets: `Piezo [V]`."""
-        named = [channel for channel in self.channels if (in_brackets(channel.name) or ("",))[0] == name]
-        return self.channel(name) or (named[0] if len(named) == 1 else None)
+        return _headed(self.channels, name)
+
+    def words(self, name: str) -> TextColumn | None:
+        """The column of words of that name, as for `headed`."""
+        return _headed(self.texts, name)
+
+    def at(self, rows: slice | Indices, name: str) -> "Block":
+        """These rows as a block of that name; a channel that ends before the others has fewer of them."""
+        channels = tuple(replace(channel, values=_at(channel.values, rows)) for channel in self.channels)
+        texts = tuple(replace(column, codes=_at(column.codes, rows)) for column in self.texts)
+        return Block(name, channels, self.sample_rate_hz, self.recorded_at, texts=texts)
+
+
+def _headed(columns: Sequence[_Column], name: str) -> _Column | None:
+    exact = next((column for column in columns if column.name == name), None)
+    named = [column for column in columns if (in_brackets(column.name) or ("",))[0] == name]
+    return exact or (named[0] if len(named) == 1 else None)
+
+
+def _at(values: Any, rows: slice | Indices) -> Any:
+    return values[rows] if isinstance(rows, slice) else values[rows[rows < len(values)]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +104,11 @@ class Contents:
     layout: str = ""
 
     def described(self) -> str:
-        """The channels and their units, for an error message."""
+        """The columns of words, the channels and their units, for an error message."""
         units = [(channel.name, f"[{channel.unit or '?'}]") for block in self.blocks for channel in block.channels]
         names = [name if name.endswith(unit) else f"{name} {unit}" for name, unit in units]
-        different = list(dict.fromkeys(names))
+        words = [f"{column.name} [words]" for block in self.blocks for column in block.texts]
+        different = list(dict.fromkeys([*words, *names]))
         return ", ".join(different[:20]) + (", …" if len(different) > 20 else "") if different else "no channels"
 
 

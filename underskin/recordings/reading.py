@@ -20,7 +20,7 @@ import numpy as np
 import orjson
 
 from underskin.errors import FileError, conflicting, too_few
-from underskin.recordings import curve_preparation, rig_mapping, validation
+from underskin.recordings import curve_preparation, rig_guess, rig_mapping, validation
 from underskin.recordings.campaign import (
     COLUMNS,
     Campaign,
@@ -31,9 +31,8 @@ from underskin.recordings.campaign import (
 )
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
-from underskin.recordings.readers import formats, template_columns
+from underskin.recordings.readers import formats
 from underskin.recordings.readers.sandbox import call_apart, parse_apart
-from underskin.recordings.readers.template_columns import MAGNITUDE, PARTS
 from underskin.recordings.rig_description import RigDescription
 from underskin.recordings.validation import LONGEST_NAME
 from underskin.units import Floats
@@ -86,6 +85,7 @@ def _agree_by_chance(measured: Iterable[Floats]) -> bool:
 
 _SHEET_TEXT = "underskin.recordings.readers.xlsx_file:sheet_text"
 LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
+_DRAFT = "`underskin read FILE --draft rig.yaml` writes one to complete"
 _TEMPLATE = "; below lines about the skin, the first of them schema,campaign/1, it would be the CSV template"
 
 
@@ -137,17 +137,10 @@ def understood(contents: Contents | Document, name: str, rig: RigDescription | N
         return Reading(*from_dict(contents.campaign), list(contents.warnings))
     if rig is None:
         layout = f" ({contents.layout})" if contents.layout else ""
-        reason = f"a rig description must say what its channels are; it has {contents.described()}{layout}"
-        raise FileError(name, "", f"{reason}{_TEMPLATE}" if _holds_frfs(contents) else reason)
+        reason = f"a rig description must say what its channels are ({_DRAFT}); it has {contents.described()}{layout}"
+        raise FileError(name, "", f"{reason}{_TEMPLATE}" if rig_guess.holds_frfs(contents) else reason)
     mapped = rig_mapping.apply(rig, contents, name)
     return Reading(*from_dict(mapped.document), mapped.warnings, mapped.taken)
-
-
-def _holds_frfs(contents: Contents) -> bool:
-    """Whether a channel is headed as the FRF of the CSV template is."""
-    names = {channel.name for block in contents.blocks for channel in block.channels}
-    meant = [template_columns.field_of(name, PARTS) for name in names]
-    return any(meaning is not None and meaning[0] in (MAGNITUDE, *PARTS) for meaning in meant)
 
 
 def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:

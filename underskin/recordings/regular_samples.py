@@ -118,6 +118,16 @@ Columns = Mapping[str, Floats]
 
 _JITTER = 0.01  # of a step: less has no effect on a spectrum
 _FINE = 0.2  # of a step: a clock's last digit that still tells a lost sample from rounding
+_COARSE = (
+    "the last digit of the clock is up to {:.2g} steps: the rate is that of the line through all times, and a lost "
+    "sample would not show"
+)
+_REPEATED = (
+    2  # steps of a last digit from which on times repeat; below, down to half, rounding looks like a lost sample
+)
+_KNOWN_RATE = 1e-3  # relative: less has no effect on a spectrum
+_FEWEST_DIGITS, _MOST_DIGITS = 3, 9  # significant ones that instruments print; double precision has 16
+_ROUNDING = 1e-9  # of a decade
 _RESAMPLED = 0.1  # rms, of a step: more is no clock with jitter
 _HALF = 0.5  # of a step, between neighbours; of a series, the part that must be complete
 
@@ -135,33 +145,74 @@ def even_rate(time: Floats) -> float | None:
         jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
     if step > 0 and jitter <= _JITTER * step:
         return 1 / step
-    start, step = _regression(time)
-    if not 0 < step < np.inf:
-        return None
-    digit = _last_digit(time, step)
-    off = np.abs(time - (start + step * np.arange(len(time)))).max()
-    is_rounded = digit <= _FINE * step and off <= digit and np.abs(np.diff(time) - step).max() <= 2 * digit
-    return 1 / step if is_rounded else None
+    rounded = _rounded_clock(time)
+    return None if rounded is None else 1 / rounded[0]
 
 
-def _regression(time: Floats) -> tuple[float, float]:
-    """Start and step of the line through the times of all samples; step 0 where there is none."""
-    index = np.arange(len(time)) - (len(time) - 1) / 2
+def _rounded_clock(time: Floats) -> tuple[float, float] | None:
+    """The step between even samples whose printed times are `time`, and the coarsest last digit; None where no even
+    clock has these times, or where they leave its rate open.
+
+    The times have one number of decimals, or of significant digits. Step and start are those of the line through them,
+    weighted by their digits; each time is within its last digit of the line.
+    """
+    for digit in (_last_decimal(time), _last_significant(time)):
+        if digit is None:
+            continue
+        digits = np.broadcast_to(digit, time.shape)
+        start, step, spread = _line_through(time, (digits.min() / digits) ** 2)
+        coarsest, uncertainty = float(digits.max()), float(digits.min()) / math.sqrt(12 * spread)  # of rounded numbers
+        with np.errstate(all="ignore"):
+            off = np.abs(time - start - step * np.arange(len(time)))
+            jumps = np.abs(np.diff(time) - step) / np.maximum(digits[1:], digits[:-1])
+        hides_gaps = _HALF * step < coarsest < _REPEATED * step
+        fits = step > 0 and (off <= digits).all() and (jumps <= 1 + _JITTER).all()
+        if fits and not hides_gaps and uncertainty <= _KNOWN_RATE * step:
+            return step, coarsest
+    return None
+
+
+def _line_through(time: Floats, weights: Floats) -> tuple[float, float, float]:
+    """Start and step of the line through the weighted times of all samples, and the weighted square spread of their
+    numbers; step 0 where there is none."""
     with np.errstate(all="ignore"):
-        step = float(index @ time / max(float(index @ index), 1.0))
-        start = float(time.mean()) + step * float(index[0])
-    return (start, step) if np.isfinite(step) and np.isfinite(start) else (0.0, 0.0)
+        total = float(weights.sum())
+        centred = np.arange(len(time)) - float(weights @ np.arange(len(time))) / total
+        spread = max(float(weights @ centred**2), 1.0)
+        step = float((weights * centred) @ time) / spread
+        start = float(weights @ time) / total + step * float(centred[0])
+    return (start, step, spread) if np.isfinite(step) and np.isfinite(start) else (0.0, 0.0, spread)
 
 
-def _last_digit(time: Floats, step: float) -> float:
-    """The power of ten that all times are multiples of, within what doubles resolve; 0 where there is none near the
-    step."""
-    exponent = math.ceil(math.log10(step))
-    for digit in (10.0**power for power in range(exponent, exponent - 6, -1)):
+def _last_decimal(time: Floats) -> float | None:
+    """The power of ten that all times are multiples of, within what doubles resolve; None where there is none."""
+    with np.errstate(all="ignore"):
+        span = float(np.ptp(time))
+    if not 0 < span < np.inf:
+        return None
+    exponent = math.floor(math.log10(span))
+    digits = (10.0**power for power in range(exponent, exponent - _MOST_DIGITS, -1))
+    return next((digit for digit in digits if _are_multiples(time, digit)), None)
+
+
+def _last_significant(time: Floats) -> Floats | None:
+    """The last digit of each time (samples,) where all have the same number of significant digits; None where they have
+    not. That of 0 is the finest."""
+    size = np.abs(time)
+    if not np.isfinite(size).all() or not size.any():
+        return None
+    decades = np.floor(np.log10(np.where(size > 0, size, size[size > 0].min())) + _ROUNDING)
+    for digits in range(_FEWEST_DIGITS, _MOST_DIGITS):
+        last = 10.0 ** (decades - digits + 1)
+        if _are_multiples(time, last):
+            return np.asarray(last)
+    return None
+
+
+def _are_multiples(time: Floats, digit: Floats | float) -> bool:
+    with np.errstate(all="ignore"):
         counts = time / digit
-        if np.abs(counts - np.rint(counts)).max() < _JITTER:
-            return digit
-    return 0.0
+        return bool(np.abs(counts - np.rint(counts)).max() < _JITTER)
 
 
 def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], float, str]:
@@ -172,8 +223,10 @@ def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], f
     """
     rate = even_rate(time)
     if rate is not None:
-        return dict(columns), rate, ""
-    start, step = _regression(time)
+        rounded = _rounded_clock(time)
+        coarse = rounded is not None and rounded[1] > _FINE * rounded[0]
+        return dict(columns), rate, _COARSE.format(rounded[1] * rate) if rounded and coarse else ""
+    start, step, _ = _line_through(time, np.ones(len(time)))
     with np.errstate(all="ignore"):
         off = time - (start + step * np.arange(len(time)))
         is_clock = step > 0 and np.abs(np.diff(time) - step).max() < _HALF * step and off.std() <= _RESAMPLED * step

@@ -9,7 +9,8 @@
       force_n: {channel: Corrected_Force(N), sign: -1}
 
 `skin` and `recording` hold campaign fields common to all files; `{property: ...}` takes one from the properties that
-the file or the block states. `channels` maps each campaign field to a channel and its conversion; a list of channels is
+the file or the block states, `{channel: ...}` one of the recording from a column: rows with the same values in all such
+columns are one recording. `channels` maps each campaign field to a channel and its conversion; a list of channels is
 one, one after the other. `recordings` lists the fields and channels of several recordings in the same rows (a column a
 sensor). `curves` says how the curves of a file are separated, `estimator` how FRFs are estimated from time series (H1,
 H2 or Hv), `derived` defines channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each
@@ -20,7 +21,7 @@ Also here: the values of properties, converted to the unit of their campaign fie
 
 import dataclasses
 import tempfile
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
 from typing import Annotated, Any, Literal, TypeVar
@@ -103,7 +104,7 @@ def _signal(name: str, value: Any, units_checked: bool) -> SignalMapping:
     return field.build(SignalMapping, name, value, units_checked)
 
 
-def _spring_constant(name: str, value: Any, units_checked: bool) -> float | Property:
+def _or_property(name: str, value: Any, units_checked: bool) -> float | Property:
     if isinstance(value, Mapping):
         return field.build(Property, name, value, units_checked)
     return field.positive(name, value, units_checked)
@@ -113,15 +114,16 @@ def _spring_constant(name: str, value: Any, units_checked: bool) -> float | Prop
 class ChannelMapping(SignalMapping):
     """The source of a field's values.
 
-    For `displacement_mm`: `stiffness_n_per_mm` of the instrument (the deflection is force over it), or the channel
+    For `displacement_mm`: `stiffness_n_per_mm` of the instrument (the deflection is force over it), a number or a
+    property of the file, or the channel
     `deflection`; either deflection is subtracted. For `force_n`: `spring_constant_n_per_m`, by which a deflection
     channel is multiplied, or the property of the file that states it. `tare_percent` is the initial part of each curve
     over which the mean of the field is set to 0.
     """
 
-    stiffness_n_per_mm: field.Positive | None = None
+    stiffness_n_per_mm: Annotated[float | Property, _or_property] | None = None
     deflection: Annotated[SignalMapping, _signal] | None = None
-    spring_constant_n_per_m: Annotated[float | Property, _spring_constant] | None = None
+    spring_constant_n_per_m: Annotated[float | Property, _or_property] | None = None
     tare_percent: Annotated[float, _percent] | None = None
 
     @property
@@ -137,6 +139,7 @@ BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, 
 _MOST_UNKNOWN = 20  # unknown fields of one object that are listed
 _TARED = ("force_n", "charge_pc", "displacement_mm")
 _OF_CURVES = ("displacement_mm", "force_n")
+_OF_PARTS = ("position_mm", "conditions")  # fields of the recording with several values
 CURVE_EXTENTS = ("file", "groups")  # what may make one curve, besides values of a channel
 _FIELDS = (
     *("schema", "name", "kind", "units_checked", "skin", "recording", "recordings"),
@@ -187,7 +190,7 @@ class RigDescription:
 
     kind: str
     skin: Mapping[str, Any]
-    recording: Mapping[str, Any | Property]
+    recording: Mapping[str, Any | Property | SignalMapping]
     channels: Mapping[str, ChannelMapping]
     units_checked: bool
     document: Mapping[str, Any]
@@ -197,6 +200,13 @@ class RigDescription:
     trim: Trim | None = None
     joined: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
     entries: "tuple[RigDescription, ...]" = ()
+
+    @property
+    def row_fields(self) -> Iterator[SignalMapping]:
+        """The columns that hold fields of the recording, each value once for all rows of one."""
+        for value in self.recording.values():
+            parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else [value]
+            yield from (part for part in parts if isinstance(part, SignalMapping))
 
     def with_recording(self, values: Mapping[str, Any]) -> "RigDescription":
         """The rig description with some fields of the recordings set for one file; `document` is unchanged."""
@@ -235,7 +245,7 @@ def from_dict(document: Any) -> RigDescription:
         "name": lambda: field.name("name", get("name", SCHEMA), False),
         "skin": lambda: _stated_by_file("skin", _require_known_fields("skin", get("skin"), of_skin)),
         "recording": lambda: _stated_by_file(
-            "recording", _require_known_fields("recording", get("recording", {}), of_recording)
+            "recording", _require_known_fields("recording", get("recording", {}), of_recording), in_columns=True
         ),
         "channels": lambda: _channels(_require_known_fields("channels", given_channels, channel_fields(kind))),
         "units_checked": lambda: field.flag("units_checked", get("units_checked", False), False),
@@ -323,14 +333,32 @@ def _joined(channels: Any, kind: str) -> tuple[Any, dict[str, tuple[str, ...]]]:
     return named_once(channels, "channels"), joined
 
 
-def _stated_by_file(prefix: str, given: Mapping[str, Any]) -> Mapping[str, Any | Property]:
-    """The fields, with a Property for each whose value the file states."""
-    stated = {
-        name: partial(_built, Property, f"{prefix}.{name}", value)
-        for name, value in given.items()
-        if isinstance(value, Mapping) and name != "tolerances"
-    }
-    return {**given, **all_of(stated)}
+def _stated_by_file(prefix: str, given: Mapping[str, Any], *, in_columns: bool = False) -> Mapping[str, Any]:
+    """The fields, with a Property for each whose value the file states, and a SignalMapping for each in a column."""
+    return all_of(
+        {
+            name: partial(_source, f"{prefix}.{name}", value, in_columns, name in _OF_PARTS)
+            for name, value in given.items()
+            if name != "tolerances"
+        }
+    ) | {name: value for name, value in given.items() if name == "tolerances"}
+
+
+def _source(place: str, value: Any, in_columns: bool, has_parts: bool = False) -> Any:
+    """A value, or where it is found."""
+    if has_parts and isinstance(value, list):
+        return [_source(f"{place}[{index}]", part, in_columns) for index, part in enumerate(value)]
+    if has_parts and isinstance(value, Mapping):
+        return {key: _source(f"{place}.{key}", part, in_columns) for key, part in value.items()}
+    if not isinstance(value, Mapping):
+        return value
+    if not in_columns or "channel" not in value:
+        return _built(Property, place, value)
+    signal = _built(SignalMapping, place, value)
+    _require_complete(place, signal)
+    if signal.sign == AUTOMATIC:
+        raise conflicting(f"{place}.sign", AUTOMATIC, "is told from curves: must be 1 or -1 here")
+    return signal
 
 
 def _curves(document: Any) -> str | CurveChannel | None:
@@ -431,15 +459,18 @@ def _require_fitting_field(name: str, channel_mapping: ChannelMapping, fields_gi
         )
         raise conflicting(f"channels.{name}.tare_percent", channel_mapping.tare_percent, fields_with_tare)
     if stiffness is not None and (name != "displacement_mm" or "force_n" not in fields_given):
-        raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, _is_for("displacement_mm"))
+        raise conflicting(f"channels.{name}.stiffness_n_per_mm", _shown(stiffness), _is_for("displacement_mm"))
     if channel_mapping.deflection is not None and name != "displacement_mm":
         raise conflicting(f"channels.{name}.deflection", channel_mapping.deflection.channel, _is_for("displacement_mm"))
     if channel_mapping.deflection is not None and stiffness is not None:
         both = "must not stand beside a deflection, which is subtracted already"
-        raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, both)
+        raise conflicting(f"channels.{name}.stiffness_n_per_mm", _shown(stiffness), both)
     if spring is not None and name != "force_n":
-        value = spring if isinstance(spring, float) else spring.property
-        raise conflicting(f"channels.{name}.spring_constant_n_per_m", value, _is_for("force_n"))
+        raise conflicting(f"channels.{name}.spring_constant_n_per_m", _shown(spring), _is_for("force_n"))
+
+
+def _shown(value: float | Property) -> float | str:
+    return value.property if isinstance(value, Property) else value
 
 
 def _is_for(name: str) -> Requirement:
@@ -447,24 +478,32 @@ def _is_for(name: str) -> Requirement:
 
 
 Stated = Mapping[str, str | float]
-_TEXTS = ("id", "sensor")
-_STIFFNESS = "force/length"
+TEXTS = ("id", "sensor")  # fields that are texts, whatever a file states
+AXES = ("x_mm", "y_mm")  # of a position
 
 
 def common_value(name: str, value: Any | Property, stated: Stated, file: str) -> Any:
     """The value of a field from the rig description, or from the property that it names, in the field's unit."""
+    if isinstance(value, list) and name in _OF_PARTS:
+        return [common_value(axis, part, stated, file) for axis, part in zip(AXES, value, strict=False)]
+    if isinstance(value, Mapping) and name in _OF_PARTS:
+        return {key: common_value(key, part, stated, file) for key, part in value.items()}
     if not isinstance(value, Property):
         return value
     given = _property_value(value, stated, file)
-    if name == "recorded_at":
-        return _in_zone(given)
+    converted = text_value(name, given) if isinstance(given, str) else given
     number = _number(given)
-    if number is None or name in _TEXTS:
-        return given
+    if number is None or name in TEXTS:
+        return converted
     if name not in LAB:
         return number
     label = labelled_unit(value.property)
     return number * factor(label, name, file, f"property {value.property!r}") if label else number
+
+
+def text_value(name: str, given: str) -> str | float:
+    """The value of a field that a file states as a text."""
+    return _in_zone(given) if name == "recorded_at" else given
 
 
 def _in_zone(given: str | float) -> str | float:
@@ -476,19 +515,21 @@ def _in_zone(given: str | float) -> str | float:
         return given
 
 
-def spring_constant(value: float | Property, stated: Stated, file: str) -> float:
-    """A spring constant [N/m] from the rig description or a property, in N/m where its name holds no other unit."""
+def spring_constant(value: float | Property, stated: Stated, file: str, own_unit: str = "N/m") -> float:
+    """A stiffness from the rig description or a property, in `own_unit`, which is also that of a property whose name
+    holds no other unit."""
     if not isinstance(value, Property):
         return value
     place, given = f"property {value.property!r}", _property_value(value, stated, file)
     number = _number(given)
     if number is None or not 0 < number < float("inf"):
-        raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a spring constant")
+        raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a stiffness")
     label = labelled_unit(value.property)
-    constant_unit = unit(label or "N/m")
-    if constant_unit is None or constant_unit.dimension != _STIFFNESS:
-        raise FileError(file, place, f"its unit {label!r} is not one of {_STIFFNESS}, such as N/m")
-    return number * constant_unit.to_si
+    stated_unit, own = unit(label or own_unit), unit(own_unit)
+    assert own is not None
+    if stated_unit is None or stated_unit.dimension != own.dimension:
+        raise FileError(file, place, f"its unit {label!r} is not one of {own.dimension}, such as {own_unit}")
+    return number * (stated_unit.to_si / own.to_si)
 
 
 def _number(given: str | float) -> float | None:

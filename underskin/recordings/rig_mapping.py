@@ -15,7 +15,7 @@ import numpy as np
 
 from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import KINDS, SCHEMA
-from underskin.recordings.channels import Block, Channel, Contents, Values
+from underskin.recordings.channels import Block, Channel, Contents, Values, text_left_out
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.damaged_readings import marks, spikes
 from underskin.recordings.readers import channel_arithmetic
@@ -41,10 +41,12 @@ from underskin.recordings.regular_samples import (
 )
 from underskin.recordings.rig_description import (
     AUTOMATIC,
+    AXES,
     BLOCK_NAME,
     COMPLEX_FRF,
     MAGNITUDE,
     PHASE,
+    TEXTS,
     ChannelMapping,
     CurveChannel,
     RigDescription,
@@ -54,9 +56,10 @@ from underskin.recordings.rig_description import (
     common_value,
     factor,
     spring_constant,
+    text_value,
 )
 from underskin.recordings.validation import LONGEST_NAME, shown
-from underskin.units import LAB, Floats, readable_unit
+from underskin.units import LAB, Floats, Indices, readable_unit
 
 _SCALED = ("force_n", "displacement_mm")  # which are small under a small sphere
 
@@ -187,6 +190,29 @@ class MappedBlock:
             stated_unit = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
             if stated_unit is not None and stated_unit.dimension == DECIBEL:
                 raise self._error(f"property {name!r}", f"is {value!r}: {_NO_DECIBELS}")
+
+    def row_value(self, field: str, value: Any) -> Any:
+        """The value of a field that a column holds in all rows of this recording, in the field's unit; of lists and
+        mappings of each part; others as they are."""
+        if isinstance(value, list):
+            return [self.row_value(axis, part) for axis, part in zip(AXES, value, strict=False)]
+        if isinstance(value, Mapping):
+            return {name: self.row_value(name, part) for name, part in value.items()}
+        if not isinstance(value, SignalMapping):
+            return value
+        words = self.block.words(value.channel)
+        if words is not None:
+            text = words.texts[words.codes[0]]
+            self.taken.setdefault(field, repr(words.name))
+            return text_value(field, text)
+        if field in LAB:
+            values, self.taken[field] = self._signal(field, value)
+            return float(values[0].real)
+        channel = self.block.headed(value.channel)
+        assert channel is not None
+        self.taken[field] = repr(channel.name)
+        number = float(channel.values[0].real)
+        return f"{number:g}" if field in TEXTS else number
 
     def spring(self) -> dict[str, float]:
         """The stiffness of the spring whose deflection was subtracted, where the recording has a field for it."""
@@ -339,9 +365,10 @@ class MappedBlock:
 
     def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
         """The columns, the displacement corrected for the instrument's compliance (force over its stiffness)."""
-        stiffness = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
-        if stiffness is None:
+        given = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
+        if given is None:
             return dict(columns)
+        stiffness = spring_constant(given, self.stated, self.file, "N/mm")
         if len(columns["displacement_mm"]) != len(columns["force_n"]):
             both = (Mention("displacement_mm"), " and ", Mention("force_n"))
             reason = Requirement(*both, " differ in length: no stiffness can be applied")
@@ -524,8 +551,49 @@ def _cut(block: Block, starts: Sequence[int], names: Sequence[str]) -> Iterator[
         end = starts[index + 1] if index + 1 < len(starts) else None
         suffix = names[index] if names else str(index + 1)
         name = f"{block.name} {suffix}".strip() if len(starts) > 1 else block.name
-        channels = tuple(replace(channel, values=channel.values[start:end]) for channel in block.channels)
-        yield Block(name, channels, block.sample_rate_hz, block.recorded_at)
+        yield block.at(slice(start, end), name)
+
+
+def _rows_of_recordings(rig: RigDescription, block: Block, file: str) -> list[Block]:
+    """The rows of each recording, in the order of their first rows: those with the same values in all columns that hold
+    fields of the recording.
+
+    Raises FileError where a column has too many values to tell recordings apart.
+    """
+    columns = {signal.channel: _codes(block, signal.channel) for signal in rig.row_fields}
+    if not columns:
+        return [block]
+    rows = min(map(len, columns.values()))
+    if rows == 0:
+        raise FileError(file, ", ".join(map(repr, columns)), "holds no values")
+    codes = np.stack([column[:rows] for column in columns.values()])
+    _, first, index = np.unique(codes, axis=1, return_index=True, return_inverse=True)
+    if len(first) > max(1, rows / _LEAST_OF_CURVE):
+        without = [np.delete(codes, row, axis=0) for row in range(len(codes) if len(codes) > 1 else 0)]
+        fewest = np.argmin([np.unique(others, axis=1).shape[1] for others in without]) if without else 0
+        most = list(columns)[int(fewest)]
+        values = len(np.unique(columns[most]))
+        reason = f"has {values} values in {rows} rows, which makes {len(first)} recordings of them"
+        raise FileError(file, f"column {most!r}", f"{reason}: a field of the recording has one value for all its rows")
+    order = np.argsort(first)
+    named = rig.recording.get("sensor")
+    sensors = block.words(named.channel) if isinstance(named, SignalMapping) else None
+    parts = np.split(np.argsort(index.ravel(), kind="stable"), np.cumsum(np.bincount(index.ravel()))[:-1])
+    return [
+        block.at(parts[group], f"{sensors.texts[sensors.codes[first[group]]] if sensors else ''} {number}".strip())
+        for number, group in enumerate(order.tolist(), start=1)
+    ]
+
+
+def _codes(block: Block, name: str) -> Indices:
+    """The rows of a column, (rows,), as the indices of their different values; an empty cell repeats the one above."""
+    words, channel = block.words(name), block.headed(name)
+    if words is not None:
+        filled = np.array([bool(text) for text in words.texts])[words.codes]
+        above = np.maximum.accumulate(np.where(filled, np.arange(len(filled)), 0))
+        return words.codes[above]
+    assert channel is not None
+    return np.unique(channel.values, return_inverse=True)[1]
 
 
 def _joined(blocks: Sequence[Block]) -> Block:
@@ -539,6 +607,18 @@ def _joined(blocks: Sequence[Block]) -> Block:
             values = np.concatenate([namesake.values for namesake in same_unit])
             channels.append(replace(channel, values=values))
     return Block(first.name, tuple(channels), first.sample_rate_hz, first.recorded_at)
+
+
+def _text_left_out(rig: RigDescription, blocks: Sequence[Block]) -> list[str]:
+    """Messages on the columns of words that the rig does not use."""
+    used = {signal.channel for signal in rig.row_fields}
+    columns = [
+        column
+        for block in blocks
+        for column in block.texts
+        if not block.channel(column.name) and not any(column is block.words(name) for name in used)
+    ]
+    return [text_left_out(column.name, next(filter(None, column.texts))) for column in columns]
 
 
 def doubts(contents: Contents, curves: str | CurveChannel | None) -> list[str]:
@@ -593,17 +673,25 @@ def _applied(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     recordings = []
     skins: list[dict[str, Any]] = []
     taken: dict[str, str] = {"": contents.layout} if contents.layout else {}
-    curves = curve_parts(blocks, rig.curves, file)
+    warnings += _text_left_out(rig, blocks)
+    curves = [
+        (recording, block_name)
+        for part, block_name in curve_parts(blocks, rig.curves, file)
+        for recording in _rows_of_recordings(rig, part, file)
+    ]
     parts = [(_trimmed(block, rig.trim, file), block_name) for block, block_name in curves]
     if rig.trim is not None:
         warnings.append(_used(rig.trim, [_samples(block) for block, _ in curves]))
     for number, (block, block_name) in enumerate(parts, start=1):
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
         stated = _stated(contents, block, block_name)
-        common = {name: common_value(name, value, stated, file) for name, value in rig.recording.items()}
+        mapped = _BLOCKS[rig.kind](rig, block, stated, file)
+        common = {
+            name: common_value(name, mapped.row_value(name, value), stated, file)
+            for name, value in rig.recording.items()
+        }
         skins.append({name: common_value(name, value, stated, file) for name, value in rig.skin.items()})
         recorded_at = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
-        mapped = _BLOCKS[rig.kind](rig, block, stated, file)
         estimated = {} if rig.estimator is None else {"estimator": rig.estimator}
         identity = {"id": label, "kind": rig.kind, **recorded_at, **estimated}
         recordings.append({**identity, **mapped.spring(), **common, **mapped.fields()})
@@ -634,13 +722,12 @@ def _with_derived(rig: RigDescription, contents: Contents, file: str) -> Content
 
 def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[Block]:
     """The blocks that hold every channel that the rig names."""
-    names = _channel_names(rig)
-    blocks = [block for block in contents.blocks if all(block.headed(name) for name in names)]
+    blocks = [block for block in contents.blocks if not _lacking(rig, block)]
     if blocks:
         return blocks
-    nearest = max(contents.blocks, key=lambda block: sum(map(bool, map(block.headed, names))), default=Block("", ()))
-    missing = ", ".join(name for name in names if not nearest.headed(name))
-    lacks = f"no part holds all channels that the rig description names: it lacks {missing}"
+    lacking = [_lacking(rig, block) for block in contents.blocks or (Block("", ()),)]
+    missing = min(lacking, key=len)
+    lacks = f"no part holds all channels that the rig description names: it lacks {', '.join(missing)}"
     raise FileError(file, "", f"{lacks}; it has {contents.described()}")
 
 
@@ -649,11 +736,10 @@ def _trimmed(block: Block, trim: Trim | None, file: str) -> Block:
     if trim is None:
         return block
     start = (trim.first_sample or 1) - 1
-    channels = tuple(replace(channel, values=channel.values[start : trim.last_sample]) for channel in block.channels)
     if _samples(block) <= start:
         reason = f"is {start + 1}; {block.name or 'the curve'} has {_samples(block)} samples"
         raise FileError(file, "trim.first_sample", reason)
-    return replace(block, channels=channels, group_starts=())
+    return block.at(slice(start, trim.last_sample), block.name)
 
 
 def _used(trim: Trim, samples: Sequence[int]) -> str:
@@ -673,6 +759,13 @@ def _used(trim: Trim, samples: Sequence[int]) -> str:
 
 def _samples(block: Block) -> int:
     return max((len(channel.values) for channel in block.channels), default=0)
+
+
+def _lacking(rig: RigDescription, block: Block) -> list[str]:
+    """The channels and columns that the rig names and a block does not have."""
+    missing = [name for name in _channel_names(rig) if not block.headed(name)]
+    columns = dict.fromkeys(signal.channel for signal in rig.row_fields)
+    return [*missing, *(name for name in columns if not (block.words(name) or block.headed(name)))]
 
 
 def _channel_names(rig: RigDescription) -> Sequence[str]:

@@ -73,6 +73,7 @@ class FileSummary:
     rate_from: str | None = None  # the channel of times that the sample rate follows from; None where it is stated
     began: str | None = None  # when, as the first part says itself
     channels: Sequence[ChannelSummary] = ()
+    texts: Sequence[str] = ()  # columns of words
     properties: Mapping[str, str | float] = field(default_factory=dict)
     taken: Mapping[str, str] = field(default_factory=dict)  # by field, in words; under none how a text was read
 
@@ -149,6 +150,9 @@ def _about(contents: Contents) -> dict[str, Any]:
         **_rate(contents),
         "began": contents.blocks[0].recorded_at if contents.blocks else None,
         "channels": [_channel(parts) for parts in by_name.values()],
+        "texts": list(dict.fromkeys(column.name for block in contents.blocks for column in block.texts))[
+            :_MOST_CHANNELS
+        ],
         "properties": _properties(contents),
     }
 

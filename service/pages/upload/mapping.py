@@ -11,70 +11,29 @@ from service.pages.upload import recorded_time, spring_mapping, typed_values, wo
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
-from underskin.recordings.readers.unit_labels import lab_field, unit
-from underskin.recordings.rig_description import MAGNITUDE, PHASE, SCHEMA, RigDescription, channel_fields
+from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.rig_description import SCHEMA, RigDescription
+from underskin.recordings.rig_guess import guessed, likely
 from underskin.recordings.rig_mapping import MappedFile
 
 CHOICES = {**CHANNELS, spring_mapping.DEFLECTION: "deflection of the spring"}  # of the form
 RATE = "sample_rate_hz"
-_RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
+COLUMN = "column:"  # before the name of a column that holds a field of the recording, in the form
 _TEXTS = ("sensor", recorded_time.FIELD)
 _SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
 _PARTS = 3  # of it: name, x, y
-_BY_DIMENSION = {
-    "frf": {
-        "force": "force_n",
-        "charge": "charge_pc",
-        "frequency": "frequency_hz",
-        "charge/force": "frf_re_pc_per_n",
-        "time": "time_s",
-    },
-    "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
-    "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
-}
-_MAGNITUDES = ("magnitude", "modulus", "|")  # as analysers call the absolute value of an FRF
-_OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
-_BY_WORD = {
-    "force": "force_n",
-    "load": "force_n",
-    "charge": "charge_pc",
-    "amplifier": "charge_pc",
-    "coherence": "coherence",
-    "frequency": "frequency_hz",
-    "phase": PHASE,
-    "displacement": "displacement_mm",
-    "depth": "displacement_mm",
-    "time": "time_s",
-}
-_OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
 
 
-def guessed(
-    channels: Sequence[ChannelSummary], properties: Mapping[str, Any], skin: Mapping[str, Any], *, dated: bool = False
-) -> dict[str, Any]:
-    """A first rig description from units and names of channels and properties; `skin`: its known values; `dated`:
-    whether each part of the file has its own time of recording."""
-    kind, fields = _likely(channels)
-    channels_by_field: dict[str, Any] = {}
-    for channel, field in zip(channels, fields, strict=True):
-        if field and field not in channels_by_field:
-            channels_by_field[field] = {"channel": channel.name}
-    skin_values = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
-    return {
-        "schema": SCHEMA,
-        "kind": kind,
-        "skin": {"poisson_ratio": 0.5, **skin_values},
-        "recording": _stated(properties, kind, dated=dated),
-        "channels": spring_mapping.guessed(channels_by_field, channels, properties)
-        if kind == "indentation"
-        else channels_by_field,
-    }
+def columns_of(file: FileSummary, document: Mapping[str, Any], chosen: str) -> list[str]:
+    """The columns that may hold a field of the recording: words, channels, derived ones, and the chosen one."""
+    names = [*file.texts, *(channel.name for channel in file.channels), *document.get("derived", {}), chosen]
+    return [name for name in dict.fromkeys(names) if name]
 
 
 def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any]) -> list[str]:
     """In words, which channels a guessed rig description does not use, and what they could replace."""
     by_field: dict[str, list[str]] = {}
-    for channel, field in zip(channels, _likely(channels)[1], strict=True):
+    for channel, field in zip(channels, likely(channels)[1], strict=True):
         if spring_mapping.shown_as(document, channel.name)[0] in ("", field):
             by_field.setdefault(field, []).append(channel.name)
     return [
@@ -83,44 +42,6 @@ def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any])
         for field, names in by_field.items()
         if field and len(names) > 1
     ]
-
-
-def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
-    """The kind of recording, and the likely field of each channel; empty if there is no indication."""
-    dimensions = [channel_unit.dimension if (channel_unit := unit(channel.unit)) else "" for channel in channels]
-    kind = "frf"
-    charged = "charge" in dimensions or any("charge" in channel.name.lower() for channel in channels)
-    if "length" in dimensions and not charged:
-        named = any(words in channel.name.lower() for channel in channels for words in _OF_COMPRESSION)
-        kind = "compression" if named else "indentation"
-    elif not charged and any(word in channel.name.lower() for channel in channels for word in _OF_SPRINGS):
-        kind = "indentation"
-    phases = any("phase" in channel.name.lower() for channel in channels)
-    fields = []
-    for channel, dimension in zip(channels, dimensions, strict=True):
-        word = next((field for word, field in _BY_WORD.items() if word in channel.name.lower()), "")
-        field = "frf_pc_per_n" if channel.is_complex else _BY_DIMENSION[kind].get(dimension) or word
-        if field == "frf_re_pc_per_n" and "imag" in channel.name.lower():
-            field = "frf_im_pc_per_n"
-        if field == "frf_re_pc_per_n" and (phases or any(part in channel.name.lower() for part in _MAGNITUDES)):
-            field = MAGNITUDE
-        fields.append(field if field in channel_fields(kind) else "")
-    return kind, fields
-
-
-def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
-    """The recording's fields that the file itself states under their own names."""
-    wanted = [name for name, _, _, kinds in RECORDING if kind in kinds]
-    named = {
-        field: stated_name for stated_name in properties for field in (stated_name, *(lab_field(stated_name) or ())[:1])
-    }
-    rate = next((stated_name for stated_name in properties if stated_name.lower().replace(" ", "_") in _RATES), None)
-    if rate is not None:
-        named[RATE] = rate
-    when = None if dated else recorded_time.stated(properties)
-    named = {name: file_name for name, file_name in named.items() if name != recorded_time.FIELD}
-    named |= {} if when is None else {recorded_time.FIELD: when}
-    return {name: {"property": named[name]} for name in wanted if name in named}
 
 
 def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
@@ -134,7 +55,10 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document: dict[str, Any] = {"schema": SCHEMA, **deepcopy(dict(base)), "kind": kind}
     document["skin"] = _replaced(base.get("skin", {}), {name: number_or_text(form.get(name, "")) for name, *_ in SKIN})
     document["skin"] = _replaced(document["skin"], {"sensors": sensors})
-    values = {name: _typed_value(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
+    before = base.get("recording", {})
+    values = {
+        name: _typed_value(form, name, before.get(name)) if kind in kinds else None for name, _, _, kinds in RECORDING
+    }
     mistimed = _in_zone(values)
     document["recording"] = _replaced(base.get("recording", {}), values)
     travel = {"travel": ""} if "travel" in form and "displacement_mm" in workbench.derived_fields(form) else {}
@@ -171,11 +95,16 @@ def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, A
     return remaining | {name: value for name, value in values.items() if value is not None}
 
 
-def _typed_value(form: Mapping[str, str], name: str) -> Any:
-    """A typed value, or else the property of the file that holds it."""
+def _typed_value(form: Mapping[str, str], name: str, before: Any = None) -> Any:
+    """A typed value, or else the property or the column of the file that holds it; a column's other settings are those
+    that it had `before`."""
     text = form.get(name, "").strip()
-    if not text and form.get(f"{name}-from"):
-        return {"property": form[f"{name}-from"]}
+    source = form.get(f"{name}-from", "")
+    if not text and source.startswith(COLUMN):
+        column = source.removeprefix(COLUMN)
+        return before if isinstance(before, Mapping) and before.get("channel") == column else {"channel": column}
+    if not text and source:
+        return {"property": source}
     return (text or None) if name in _TEXTS else number_or_text(text)
 
 
@@ -249,7 +178,8 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
 def rig_of(summary: FileSummary, rig: RigDescription | None) -> RigDescription | None:
     """The rig description in use or, without one, the guessed one; None if it is invalid."""
     try:
-        guess = guessed(summary.channels, summary.properties, {}, dated=summary.began is not None)
+        dated = summary.began is not None
+        guess = guessed(summary.channels, summary.properties, {}, summary.texts, dated=dated)
         return rig or rig_description.from_dict(guess)
     except InvalidInput:
         return None

@@ -40,6 +40,7 @@ from service.usecases import d33_cache
 from underskin import InvalidInput
 from underskin.recordings import rig_description
 from underskin.recordings.frf.estimators import checked_estimator
+from underskin.recordings.rig_guess import guessed
 
 router = APIRouter(prefix="/upload")
 
@@ -151,7 +152,7 @@ def _understood(
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
     seen = pending.seen[file]
     good = sum(summary.recordings for summary in pending.seen)
-    document = stated or mappings.guessed(channels, seen.properties, about, dated=seen.began is not None)
+    document = stated or guessed(channels, seen.properties, about, seen.texts, dated=seen.began is not None)
     return page(
         request,
         "understood.html",
@@ -215,7 +216,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
     document, wrong = mappings.document_of(sent, base)
-    guess = mappings.guessed(channels_of(pending), pending.seen[0].properties, {})
+    guess = guessed(channels_of(pending), pending.seen[0].properties, {}, pending.seen[0].texts)
     pending.draft = workbench.with_guesses(document, base, guess)
     of_files = single_files.typed(sent, pending.files)
     units_checked = bool(document.get("units_checked"))

@@ -1,17 +1,12 @@
 """Times of recordings in the form of an upload: in the lab's time zone, unless a zone is typed."""
 
-from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from underskin.errors import InvalidInput, wrong_type
+from underskin.errors import wrong_type
 from underskin.recordings.readers.text import in_lab, time_zone, with_zone
 
 FIELD = "recorded_at"
-_NAMES = (
-    *("recorded at", "recorded", "measured at", "acquired at", "date and time", "date/time", "datetime"),
-    *("timestamp", "start time", "date"),
-)  # of a file's properties, in lower case, the surest first
 
 
 def zone() -> str:
@@ -37,20 +32,3 @@ def shown(value: Any) -> str:
         return str(value)
     moment = in_lab(moment).replace(tzinfo=None)
     return moment.isoformat(" ", "minutes" if moment.second == moment.microsecond == 0 else "auto")
-
-
-def stated(properties: Mapping[str, Any]) -> str | None:
-    """The property of a file with its time of recording; None if no usable one exists."""
-    by_name = {name.lower().replace("_", " ").strip(): name for name in properties}
-    for name in _NAMES:
-        if name in by_name and _is_time(properties[by_name[name]]):
-            return by_name[name]
-    return None
-
-
-def _is_time(value: Any) -> bool:
-    try:
-        said(str(value))
-    except InvalidInput:
-        return False
-    return True

@@ -1,11 +1,9 @@
 """The part of a mapping form on springs: deflection, spring constant, and the definition of a curve in a file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from service.pages.upload.file_summary import ChannelSummary
 from underskin.errors import InvalidInput, wrong_type
-from underskin.recordings.readers.unit_labels import labelled_unit, unit
 
 DEFLECTION = "deflection"  # roles of a channel in the form besides a campaign's fields
 SPRING = "spring_constant_n_per_m"
@@ -16,35 +14,8 @@ CURVES = {
     "channel": "the rows with one value in a channel:",
     "segments": "the rows until a channel of segments falls:",
 }
-_OF_SPRING = ("deflection", "cantilever", "durchbiegung")
 _SIGNAL = ("channel", "unit", "labelled", "sign", "sensitivity", "sensitivity_unit")
 _DIGITS = 12  # that the conversion between N/m and N/mm leaves
-
-
-def guessed(
-    fields: dict[str, Any], channels: Sequence[ChannelSummary], properties: Mapping[str, Any]
-) -> dict[str, Any]:
-    """The channels by field, with a deflection if no channel is a force.
-
-    Deflection gives the force, and the stage's travel the depth; the constant is a property of the file in N/m, if
-    there is one.
-    """
-    lengths = [
-        channel for channel in channels if (channel_unit := unit(channel.unit)) and channel_unit.dimension == "length"
-    ]
-    springs = [channel.name for channel in lengths if any(word in channel.name.lower() for word in _OF_SPRING)]
-    travel = next((channel.name for channel in lengths if channel.name not in springs), None)
-    if "force_n" in fields or not springs or travel is None:
-        return fields
-    deflection = {"channel": springs[0]}
-    constant = next((name for name in properties if _is_stiffness(labelled_unit(name))), None)
-    force = {} if constant is None else {"force_n": {**deflection, SPRING: {"property": constant}}}
-    return {**fields, "displacement_mm": {"channel": travel, DEFLECTION: deflection}, **force}
-
-
-def _is_stiffness(label: str) -> bool:
-    parsed = unit(label)
-    return parsed is not None and parsed.dimension == "force/length"
 
 
 def shown_as(document: Mapping[str, Any], name: str) -> tuple[str, Mapping[str, Any]]:
@@ -62,6 +33,8 @@ def spring_constant(document: Mapping[str, Any]) -> Any:
     channels = document.get("channels", {})
     stated = channels.get("force_n", {}).get(SPRING)
     stiffness = channels.get("displacement_mm", {}).get("stiffness_n_per_mm")
+    if isinstance(stiffness, Mapping):
+        return stiffness
     return stated if stiffness is None else _rounded(1e3 * stiffness)
 
 
@@ -96,6 +69,8 @@ def with_spring(
         displacement[DEFLECTION] = _signal(deflection)
     elif isinstance(constant, float):
         displacement["stiffness_n_per_mm"] = _rounded(1e-3 * constant)
+    elif isinstance(constant, Mapping):
+        displacement["stiffness_n_per_mm"] = constant
     else:
         must = "must be a number where the force is measured, or say which channel is the deflection"
         return channels, [wrong_type(SPRING, constant and str(constant), must)]

@@ -198,3 +198,28 @@ def test_hostile_names_in_files_stay_text(visitor: Visit) -> None:
     assert page.locator("img[src=x]").count() == 0
     assert "<script>" in page.get_by_role("heading", level=1).inner_text()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")
+
+
+LONG = "Sensor;Sphere diameter [mm];Preload [N];Dynamic force [N];Frequency [Hz];|H| [pC/N];Phase [deg]\n" + "\n".join(
+    f"{sensor};8,0;{preload};0,05;{hz},0;7,{hz};-1,0"
+    for sensor in ("s01", "s02")
+    for preload in ("0,5", "1,0")
+    for hz in (10, 20, 40)
+)
+
+
+def test_a_table_with_a_row_a_line_is_mapped_by_its_headings(visitor: Visit) -> None:
+    """Sensor, sphere, preload and force are taken from their columns; the skin is typed, and one click reads it."""
+    look_at(visitor, [file("glove.csv", LONG)])
+    page = visitor.page
+    assert page.get_by_label("sensor that was pressed: where it is").input_value() == "column:Sensor"
+    assert page.get_by_label("preload F: where it is").input_value() == "column:Preload [N]"
+    for label, value in (("thickness h", "2.5"), ("Young's modulus E", "16"), ("sensor radius rT", "1.5")):
+        page.get_by_label(label).first.fill(value)
+    page.get_by_label("Layout").fill("s01, 0, 0\ns02, 8, 0")
+    page.get_by_role("button", name="Read it with these settings").click()
+    page.get_by_role("button", name="Keep").first.wait_for()
+    assert "4 recordings" in page.locator("main").inner_text()
+    page.get_by_text("What the channels are").click()
+    assert page.get_by_label("preload F: where it is").input_value() == "column:Preload [N]"
+    visitor.require_accessible()

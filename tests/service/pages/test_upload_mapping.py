@@ -11,16 +11,12 @@ from service.ingest.field_words import CHANNELS, KINDS
 from service.pages.upload import recorded_time
 from service.pages.upload.error_words import field_of, field_words, what_came, what_to_do
 from service.pages.upload.file_summary import ChannelSummary
-from service.pages.upload.mapping import (
-    document_of,
-    guessed,
-    passed_over,
-    sensors_text,
-)
+from service.pages.upload.mapping import document_of, passed_over, sensors_text
 from tests.support.repository import ROOT
 from underskin import InvalidInput
 from underskin.errors import Mention, Requirement
 from underskin.recordings import rig_description
+from underskin.recordings.rig_guess import guessed
 from underskin.units import checked
 
 RIGS = sorted((ROOT / "examples" / "formats" / "rigs").glob("*.yaml"))
@@ -35,7 +31,10 @@ def form_of(document: dict[str, Any]) -> dict[str, str]:
     form = {"kind": document.get("kind", "frf"), "sensors": sensors_text(document)}
     form |= {name: f"{value:g}" for name, value in document["skin"].items() if isinstance(value, float | int)}
     for name, value in document.get("recording", {}).items():
-        form |= {f"{name}-from": value["property"]} if isinstance(value, dict) else {name: str(value)}
+        if isinstance(value, dict):
+            form[f"{name}-from"] = value.get("property") or f"column:{value['channel']}"
+        else:
+            form[name] = str(value)
     for number, (field, how) in enumerate(document["channels"].items()):
         label = how.get("labelled", "")
         told = {"channel": how["channel"], "is": field, "unit": how.get("unit", ""), "label": label}
@@ -52,6 +51,32 @@ def test_form_nobody_changed_says(file: Path) -> None:
     rig_description.from_dict(found)
     assert wrong == []
     assert found == document | {"recording": document.get("recording", {})}
+
+
+def test_columns_of_a_long_table() -> None:
+    """A table with a row a line is guessed whole, and a form that nobody changed says the same of its columns."""
+    columns = [
+        channel("Sphere diameter [mm]", "mm"),
+        channel("Preload [N]", "N"),
+        channel("Dynamic force [N]", "N"),
+        channel("f [Hz]", "Hz"),
+        channel("|H| [pC/N]", "pC/N"),
+        channel("Phase [deg]", "deg"),
+    ]
+    found = guessed(columns, {}, {}, ["Sensor", "Time"])
+    assert found["recording"] == {
+        "sensor": {"channel": "Sensor"},
+        "recorded_at": {"channel": "Time"},
+        "indenter_radius_mm": {"channel": "radius"},
+        "preload_n": {"channel": "Preload [N]"},
+        "dynamic_force_n": {"channel": "Dynamic force [N]"},
+    }
+    assert found["derived"] == {"radius": "'Sphere diameter [mm]' / 2"}
+    assert set(found["channels"]) == {"frequency_hz", "frf_magnitude_pc_per_n", "frf_phase_deg"}
+    found["recording"]["preload_n"]["unit"] = "N"
+    said, wrong = document_of(form_of(found), found)
+    assert (said["recording"], wrong) == (found["recording"], [])
+    rig_description.from_dict(said)
 
 
 def test_every_channel_every_kind_chosen() -> None:

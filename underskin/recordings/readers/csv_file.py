@@ -2,24 +2,33 @@
 
 Rows are found by table.py, names and units by headings.py. Columns of text are left out with a warning. Lines above the
 headings and under the numbers with a name and a value become properties, unless the name has two values. Where the
-headings are repeated, a new block starts. See Also csv_template.py, the template of this package.
+headings are repeated, a new block starts. Cells beside the units that hold values, as oscilloscopes write their time
+base, are properties, and an increment there is the step of the samples. See Also csv_template.py, the template of this
+package.
 """
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import BinaryIO
 
+import numpy as np
+
 from underskin.errors import FileError
-from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
+from underskin.recordings.channels import Block, Channel, Contents, TextColumn, text_left_out, with_distinct_names
 from underskin.recordings.readers import headings, text
 from underskin.recordings.readers import table as tables
+from underskin.recordings.readers.clock_column import seconds_of
 from underskin.recordings.readers.headings import Headings
 from underskin.recordings.readers.table import BLANKS, Lines, RowReader, Section, Table
-from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.readers.unit_labels import labelled_unit, unit
 
 _STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*)")
 _WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s\d].*)")
 _NAME_AND_UNIT = re.compile(r"(?P<name>[^,:=]+),\s*(?P<unit>[^,:=\s]+)\s*[:=]\s*(?P<value>[^\s:=].*)")  # X, um: 25
+_MOST_TABLES = 100  # of a text
+_LINE = re.compile(r"line (\d+)")
+_STEP = re.compile(r"increment|interval", re.IGNORECASE)
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
 _SHOWN = 30  # letters of a cell in a message
@@ -36,14 +45,120 @@ def read(stream: BinaryIO, file: str) -> Contents:
 
 
 def of_text(written: str, file: str) -> Contents:
-    """The channels of a text table with line feeds as line ends; raises as `read`."""
+    """The channels of a text with one table or several, with line feeds as line ends; raises as `read`.
+
+    Another table begins below a blank line or a line of one cell, a title, with headings of its own.
+    """
+    read = _tables_in(written, file, 0, _MOST_TABLES)
+    return read[0][1] if len(read) == 1 else _together(read)
+
+
+def _tables_in(written: str, file: str, offset: int, most: int) -> list[tuple[str, Contents]]:
+    """The tables of a text, each with its title; `offset`: the lines of the file above it, `most`: the tables that it
+    may have."""
+    reader, head, found = _reader(written, file)
+    start, error = _end_of_table_above(head, found, reader.table, file), None
+    if start is None:
+        try:
+            return [_read(reader, written, head, found, file, offset)]
+        except FileError as refused:
+            error = FileError(
+                file, _LINE.sub(lambda line: f"line {int(line[1]) + offset}", refused.place), refused.reason
+            )
+            start = reader.sections[-1].last + 1 if reader.sections else 0
+    if start and most > 1:
+        first, rest = _cut(written, start)
+        if _begins_table(rest, reader.table, file):
+            above = _tables_in(first, file, offset, most - 1)
+            return [*above, *_tables_in(rest, file, offset + start, most - len(above))]
+    if error is not None:
+        raise error
+    return [_read(reader, written, head, found, file, offset)]
+
+
+def _read(
+    reader: RowReader, written: str, head: Sequence[str], found: Headings, file: str, offset: int
+) -> tuple[str, Contents]:
+    """The only table of a text, and the title nearest above its headings; empty without one."""
+    reader.take_all(written)
+    _refuse_other_rows(head[: reader.table.start], reader.under, reader.table, file)
+    _refuse_text_among_numbers(reader, file)
+    titles = [line.strip() for line in head[: min(found.lines, default=0)] if line.strip()]
+    title = titles[-1].strip(reader.table.separator) if titles and _is_title(titles[-1], reader.table) else ""
+    return title, _contents(reader, head, found, offset)
+
+
+def _is_title(line: str, table: Table) -> bool:
+    """Whether a line is blank, or one cell of words."""
+    return len(tables.split(line, table.separator)) < 2 and text.number(line.strip(), table.decimal) is None
+
+
+def _end_of_table_above(head: Sequence[str], found: Headings, table: Table, file: str) -> int | None:
+    """The line below the rows of a table of numbers alone, under names, above the headings of a table; None without
+    one."""
+    above = head[: min(found.lines, default=table.start)]
+    other = tables.find(above) if len(above) > 2 else None
+    if other is None or other.columns != tuple(range(other.width)):
+        return None
+    names = headings.find(above, other, file).lines
+    if not names or _holds_numbers(above[min(names)], other):
+        return None
+    rows = [index for index in range(other.start, len(above)) if other.row(above[index]) is not None]
+    return rows[-1] + 1
+
+
+def _holds_numbers(line: str, table: Table) -> bool:
+    return any(text.number(cell, table.decimal) is not None for cell in table.cells(line))
+
+
+def _cut(written: str, line: int) -> tuple[str, str]:
+    """The text above a line and from it on."""
+    end = 0
+    for _ in range(line):
+        end = written.find("\n", end) + 1 or len(written)
+    return written[:end], written[end:]
+
+
+def _begins_table(written: str, table: Table, file: str) -> bool:
+    """Whether a text that follows the rows of a table begins with a blank line or a title, and has a table below
+    names."""
+    if not _is_title(written.partition("\n")[0], table):
+        return False
+    try:
+        reader, head, found = _reader(written, file)
+    except FileError:
+        return False
+    return bool(found.lines) and not _holds_numbers(head[min(found.lines)], reader.table)
+
+
+def _together(tables_read: Sequence[tuple[str, Contents]]) -> Contents:
+    """The tables of a text as one, each with its title or number as the name of its blocks."""
+    titles = [title for title, _ in tables_read]
+    names = [
+        title if title and titles.count(title) == 1 else str(number) for number, title in enumerate(titles, start=1)
+    ]
+    blocks: list[Block] = []
+    properties: dict[str, str | float] = {}
+    for name, (_, contents) in zip(names, tables_read, strict=True):
+        blocks += [replace(block, name=f"{name} {block.name}".strip()) for block in contents.blocks]
+        properties |= {f"{name}.{key}": value for key, value in contents.properties.items()}
+        properties |= {key: value for key, value in contents.properties.items() if key not in properties}
+    warnings = [warning for _, contents in tables_read for warning in contents.warnings]
+    layout = "; ".join(f"{name}: {contents.layout}" for name, (_, contents) in zip(names, tables_read, strict=True))
+    return Contents(tuple(blocks), properties, tuple(dict.fromkeys(warnings)), layout)
+
+
+def _reader(written: str, file: str) -> tuple[RowReader, Sequence[str], Headings]:
+    """A reader of the table of a text, the lines at its start, and the table's headings."""
     head, table = _table(written, file)
     found = headings.find(head, table, file)
-    repeated = frozenset(head[line].strip() for line in found.lines)
-    reader = RowReader(table, repeated, file)
-    reader.take_all(written)
-    _refuse_other_rows(head[: table.start], reader.under, table, file)
-    column_warnings = [*_text_column_warnings(reader, table, found, file), *_overload_warnings(reader, found)]
+    return RowReader(table, frozenset(head[line].strip() for line in found.lines), file), head, found
+
+
+def _contents(reader: RowReader, head: Sequence[str], found: Headings, offset: int) -> Contents:
+    """What a reader has read of a text that begins below so many lines of the file."""
+    table, repeated = reader.table, reader.headings
+    column_warnings = [*_text_column_warnings(reader, found), *_overload_warnings(reader, found, offset)]
     above, *between, under = (
         [line for line in lines if line.strip() not in repeated]
         for lines in (
@@ -53,14 +168,23 @@ def of_text(written: str, file: str) -> Contents:
         )
     )
     properties, warnings = _properties([*above, *under], table)
+    properties |= found.beside
     blocks = []
+    first_row = 0
     for number, (section, section_lines) in enumerate(zip(reader.sections, [above, *between], strict=True), start=1):
         name = str(number) if len(reader.sections) > 1 else ""
-        blocks.append(Block(name, _channels(table, found, section), group_starts=section.group_starts))
+        texts = _texts(reader, found, slice(first_row, first_row + section.count))
+        first_row += section.count
+        clocks = [clock for column in texts if (clock := seconds_of(column)) is not None]
+        channels = with_distinct_names([*_channels(table, found, section), *clocks])
+        rate = _rate(found, table)
+        blocks.append(Block(name, channels, rate, group_starts=section.group_starts, texts=texts))
         if name:
             section_properties, _ = _properties(section_lines, table)
             properties |= {f"{name}.{name_in_section}": value for name_in_section, value in section_properties.items()}
-    return Contents(tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, found, reader.sections))
+    return Contents(
+        tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, found, reader.sections, offset)
+    )
 
 
 def _table(written: str, file: str) -> tuple[Sequence[str], Table]:
@@ -91,10 +215,19 @@ def _no_table(lines: Sequence[str]) -> str:
     return f"holds no table, two rows of at least two numbers each: {example}; names go into the CSV template"
 
 
-def _channels(table: Table, found: Headings, section: Section) -> tuple[Channel, ...]:
+def _channels(table: Table, found: Headings, section: Section) -> list[Channel]:
     names = [found.names[column] for column in table.columns]
     columns = section.columns(table)
-    return with_distinct_names([Channel(*name, column) for name, column in zip(names, columns, strict=True)])
+    return [Channel(*name, column) for name, column in zip(names, columns, strict=True)]
+
+
+def _rate(found: Headings, table: Table) -> float | None:
+    """Samples a second by the increment that is stated beside the names."""
+    for name, value in found.beside.items():
+        step, label = text.number(value, table.decimal), unit(labelled_unit(name) or "s")
+        if _STEP.search(name) and step and step > 0 and label is not None and label.dimension == "time":
+            return 1 / (step * label.to_si)
+    return None
 
 
 def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: str) -> None:
@@ -109,32 +242,46 @@ def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: s
             raise tables.no_row(index, line, table, file)
 
 
-def _text_column_warnings(reader: RowReader, table: Table, found: Headings, file: str) -> Iterator[str]:
-    """Messages on columns of text; raises FileError where one holds numbers in most rows."""
-    for column, seen in reader.texts.items():
+def _refuse_text_among_numbers(reader: RowReader, file: str) -> None:
+    """Raise FileError where a column of text holds numbers in most rows."""
+    for seen in reader.texts.values():
         if seen.first is not None and seen.count < reader.count / 2:
-            raise tables.no_row(*seen.first, table, file)
-        if seen.example:
-            name = found.names[column][0]
-            yield f"column {name!r} holds text, such as {seen.example[:_SHOWN]!r}, and is left out"
+            raise tables.no_row(*seen.first, reader.table, file)
 
 
-def _overload_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
+def _text_column_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
+    """Messages on columns of too many texts."""
+    for column, seen in reader.texts.items():
+        if seen.example and not seen.kept:
+            yield text_left_out(found.names[column][0], seen.example)
+
+
+def _texts(reader: RowReader, found: Headings, rows: slice) -> tuple[TextColumn, ...]:
+    """The columns of words in these of all rows."""
+    return tuple(
+        TextColumn(found.names[column][0], tuple(words.texts), np.array(words.codes[rows], dtype=np.intp))
+        for column, words in reader.texts.items()
+        if words.kept and words.example
+    )
+
+
+def _overload_warnings(reader: RowReader, found: Headings, offset: int) -> Iterator[str]:
     """Messages on values that an instrument marked as beyond its range."""
     for column, seen in reader.overloads.items():
         assert seen.first is not None
         cells = f"{seen.count} cells of column {found.names[column][0]!r} hold {seen.example[:_SHOWN]!r}"
-        yield f"{cells}, the first on line {seen.first[0] + 1}: overloads, which are no numbers and are left out"
+        first = f"the first on line {seen.first[0] + 1 + offset}"
+        yield f"{cells}, {first}: overloads, which are no numbers and are left out"
 
 
-def _layout(table: Table, found: Headings, sections: Sequence[Section]) -> str:
-    """How the file was read, in words."""
-    first, last = sections[0].first + 1, sections[-1].last + 1
+def _layout(table: Table, found: Headings, sections: Sequence[Section], offset: int) -> str:
+    """How the file was read, in words; `offset`: the lines above the text."""
+    first, last = sections[0].first + 1 + offset, sections[-1].last + 1 + offset
     numbers = f"rows of {len(table.columns)} numbers from line {first} to {last}"
     written = f"separated by {_SEPARATOR_WORDS[table.separator]}, with decimal {_DECIMAL_WORDS[table.decimal]}"
     if not found.lines:
         return f"{numbers}, {written}; no names above them"
-    names, *units = [line + 1 for line in found.lines]
+    names, *units = [line + 1 + offset for line in found.lines]
     return f"{numbers}, {written}; names from line {names}" + "".join(f", units from line {line}" for line in units)
 
 

@@ -26,21 +26,43 @@ MODULES = {
     "MATLAB": "mat_file",
     "HDF5": "hdf5_file",
     "XLSX": "xlsx_file",
+    "NumPy": "numpy_file",
+    "WAV": "wav_file",
 }
 _TABLES = ("CSV template", "CSV", "LVM")
-BINARY = ("TDMS", "UFF", "MATLAB", "HDF5", "XLSX")
+BINARY = ("TDMS", "UFF", "MATLAB", "HDF5", "XLSX", "NumPy", "WAV")
 GROUP = "underskin.readers"
 _SUFFIXES = (  # of the formats of MODULES
-    *(".json", ".csv", ".tdms", ".lvm", ".uff", ".unv", ".mat", ".h5", ".hdf5", ".xlsx", ".xlsm"),
+    *(
+        ".json",
+        ".csv",
+        ".tdms",
+        ".lvm",
+        ".uff",
+        ".unv",
+        ".mat",
+        ".h5",
+        ".hdf5",
+        ".xlsx",
+        ".xlsm",
+        ".npy",
+        ".npz",
+        ".wav",
+    ),
 )
 _HEAD_BYTES = 4096
 _JSON_LIST = re.compile(r"\[(?!\s*[A-Za-z])")  # not [Header], which begins some instruments' texts
+_NANOSCOPE = "a NanoScope file: in its software, export the force curves as text (.txt)"
 _FOREIGN = {
     b"TDSh": "a TDMS index: send the .tdms file itself",
     b"\x1f\x8b": "a gzip archive: send the file in it",
     b"\xd0\xcf\x11\xe0": "an old Office document, or one with a password: save the table as .xlsx or CSV",
     b"%PDF": "a PDF",
+    b"\\*Force file list": _NANOSCOPE,
+    b"\\*File list": _NANOSCOPE,
+    b"[DataSet]": "a Nanosurf file (.nid): in its software, export the curves as text (.txt or .csv)",
 }
+_IGOR = (".ibw", ".pxp")  # which have no mark of their own
 ZIP = b"PK\x03\x04"
 _STARTS = {
     b"TDSm": "TDMS",
@@ -48,7 +70,9 @@ _STARTS = {
     b"MATLAB 7.3 MAT-file": "MATLAB",
     b"\x89HDF\r\n\x1a\n": "HDF5",
     ZIP: "XLSX",  # or another ZIP archive, which its reader names
+    b"\x93NUMPY": "NumPy",
 }
+_ZIP_NAME = slice(30, 4096)  # where the name of the first part of an archive begins
 
 
 @dataclass(frozen=True)
@@ -121,6 +145,10 @@ def detect(stream: BinaryIO, file: str) -> str:
     for start, what in _FOREIGN.items():
         if head.startswith(start):
             raise FileError(file, "byte 0", f"is {what}")
+    if head.startswith(ZIP) and head[_ZIP_NAME][: int.from_bytes(head[26:28], "little")].endswith(b".npy"):
+        return "NumPy"
+    if head.startswith(b"RIFF") and head[8:12] == b"WAVE":
+        return "WAV"
     for start, name in _STARTS.items():
         if head.startswith(start):
             return name
@@ -136,7 +164,10 @@ def _text_format(head: bytes, file: str) -> str:
     try:
         start = text.decode(head[: len(head) // 2 * 2 or 1], file).lstrip()
     except FileError as error:
-        supported = "campaign JSON and HDF5, CSV, XLSX, TDMS, LVM, UFF58 and MATLAB files"
+        if file.lower().endswith(_IGOR):
+            how = "in Igor or the microscope's software, export the waves as text (.txt)"
+            raise FileError(file, error.place, f"is an Igor binary wave: {how}") from None
+        supported = "campaign JSON, CSV, XLSX, TDMS, LVM, UFF58, MATLAB, HDF5, NumPy and WAV files"
         raise FileError(file, error.place, f"is of no format that is read here: {supported}") from None
     if start[:1] == "{" or _JSON_LIST.match(start):
         return "JSON"

@@ -5,6 +5,9 @@
 /skin/sensors            datasets id, x_mm, y_mm
 /recordings/<number>     attributes for single values, a dataset for each column
 
+Any other file holds channels: datasets as variables.py describes, with the unit of their attribute `unit` or `units`; a
+group is a structure, and its other attributes, and those of datasets, are properties.
+
 Files from outside may not hold links out of the file, cycles, or datasets that declare data never written.
 """
 
@@ -19,6 +22,8 @@ import numpy as np
 
 from underskin.errors import ErrorCode, FileError, damage_said
 from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
+from underskin.recordings.channels import Contents
+from underskin.recordings.readers import variables
 
 _CUT = re.compile(r"truncated file: eof = (\d+),.*stored_eof = (\d+)")
 _DEEPEST = 8
@@ -86,6 +91,8 @@ def _refuse_dataset(item: Any, here: str, file: str) -> None:
 
 _TOLERANCES = "tolerances"
 MAGIC = b"\x89HDF\r\n\x1a\n"
+_UNITS = ("unit", "units", "Unit", "Units")
+_OURS = ("campaign/", "skin-export/")
 
 
 def write(campaign: Campaign, stream: BinaryIO) -> None:
@@ -118,10 +125,50 @@ def _write_attributes(group: Any, values: dict[str, Any]) -> None:
             group.attrs[name] = value
 
 
-def read(stream: BinaryIO, file: str) -> dict[str, Any]:
-    """The campaign document of an HDF5 file; raises FileError that names the object."""
+def read(stream: BinaryIO, file: str) -> dict[str, Any] | Contents:
+    """The campaign document of an HDF5 file, or its channels; raises FileError that names the object."""
     with opened(stream, file, "the HDF5 file") as source:
-        return _document(source, file)
+        schema = source.attrs.get("schema")
+        is_ours = isinstance(schema, str | bytes) and _plain(schema).startswith(_OURS)
+        if is_ours or ("skin" in source and "recordings" in source):
+            return _document(source, file)
+        found = variables.contents(_variables(source), file)
+        if not found.blocks:
+            needed = f"a campaign has the attribute schema = {SCHEMA}, /skin and /recordings"
+            raise FileError(file, "/", f"holds no numbers of one or two axes; {needed}")
+        return found
+
+
+def _variables(group: Any) -> dict[str, Any]:
+    """The datasets, groups and attributes of a group by their names."""
+    held: dict[str, Any] = {}
+    for name, item in group.items():
+        if isinstance(item, h5py.Group):
+            held[name] = _variables(item)
+            continue
+        attributes = _single(item)
+        label = next((str(attributes.pop(key)) for key in _UNITS if key in attributes), "")
+        held |= {f"{name}.{key}": value for key, value in attributes.items()}
+        if isinstance(item, h5py.Dataset) and item.shape is not None:
+            is_text = h5py.check_string_dtype(item.dtype) is not None
+            stored = item.asstr()[()] if is_text else item[()]
+            held[name] = stored if is_text or not item.shape else variables.Labelled(stored, label)
+    return {**_single(group), **held}
+
+
+def _single(item: Any) -> dict[str, str | float]:
+    """The attributes that are a number or a text."""
+    plain = {name: value for name in item.attrs if (value := _attribute(item, name)) is not None}
+    return {name: value for name, value in plain.items() if isinstance(value, str | int | float)}
+
+
+def _attribute(item: Any, name: str) -> Any:
+    """An attribute; None where h5py has no type for it."""
+    try:
+        value = np.asarray(item.attrs[name]).squeeze()
+    except (TypeError, ValueError, OSError):
+        return None
+    return _plain(value.item()) if value.ndim == 0 and value.dtype.kind in "iufSUO" else None
 
 
 def _document(source: Any, file: str) -> dict[str, Any]:
@@ -132,7 +179,7 @@ def _document(source: Any, file: str) -> dict[str, Any]:
         raise FileError(file, "/", f"is a whole skin as `underskin export` writes it: {how}", code=ErrorCode.WHOLE_SKIN)
     if schema != SCHEMA or "skin" not in source or "recordings" not in source:
         needed = f"it needs the attribute schema = {SCHEMA}, /skin and /recordings"
-        raise FileError(file, "/", f"is HDF5, but no campaign: {needed}; other HDF5 is read from MATLAB 7.3 only")
+        raise FileError(file, "/", f"is HDF5, but no campaign: {needed}")
     skin = _attributes(source["skin"])
     tolerances = {name: value for name, value in skin.items() if name.startswith(f"{_TOLERANCES}.")}
     skin = {name: value for name, value in skin.items() if name not in tolerances}

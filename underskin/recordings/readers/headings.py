@@ -6,8 +6,8 @@ may stand between names and numbers.
 """
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from underskin.errors import FileError
 from underskin.recordings.readers import text
@@ -20,16 +20,19 @@ _LABEL = re.compile(
 )
 _WIDE_BLANKS = re.compile(r"\t|\s{2,}")
 _WITH_UNITS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")  # Load (uN)
+_MARKER = re.compile(r"\[[^\[\]]*\s[^\[\]]*\]")  # [Header end]
 _VALUE = re.compile(r"[-+]?\.?\d[-+\d.,:/ %]*([eE][-+]?\d+)?")
 _NO_UNITS = ("", "-", "–", "1", "%", "°C", "K", "#", "a.u.", "n/a")
 
 
 @dataclass(frozen=True)
 class Headings:
-    """Name and unit of each column; `lines`: the indices of the lines that state them, from 0."""
+    """Name and unit of each column; `lines`: the indices of the lines that state them, from 0; `beside`: values that
+    stand under names of their own to the right of the table's."""
 
     names: Sequence[tuple[str, str]]
     lines: tuple[int, ...] = ()
+    beside: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -65,10 +68,11 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
     Raises FileError where the line above the numbers has quotes that do not close.
     """
     _require_closed_quotes(lines, table, file)
+    lines, beside = _without_values_beside(lines, table)
     candidates = list(_candidates(lines, table))
     units = _units(candidates)
     named = [candidate for candidate in candidates if candidate is not units and _is_full(candidate, table)]
-    names = _names(named, units)
+    names = _names(named, units, lines)
     if names is None and units is not None and _is_full(units, table):  # which also serves as names
         names, units = units, units if all(unit(cell) for cell in units.cells) else None
     if names is None:
@@ -80,8 +84,24 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
         for number, name, by_row in zip(range(1, table.width + 1), [*names.cells, *padding], stated_units, strict=False)
     ]
     return Headings(
-        headings, tuple(dict.fromkeys(candidate.line for candidate in (names, units) if candidate is not None))
+        headings, tuple(dict.fromkeys(candidate.line for candidate in (names, units) if candidate is not None)), beside
     )
+
+
+def _without_values_beside(lines: Sequence[str], table: Table) -> tuple[Sequence[str], dict[str, str]]:
+    """The lines with the two above the numbers cut to the table, and what stands beside it on them: names, and under
+    each of them a value, as oscilloscopes write their time base."""
+    above = [index for index in range(table.start - 1, -1, -1) if lines[index].strip()][:2]
+    if len(above) < 2 or table.separator == BLANKS:
+        return lines, {}
+    edge = max(table.columns) + 1
+    values, names = (split(lines[index], table.separator) for index in above)
+    beside = dict(zip(names[edge:], values[edge:], strict=False))
+    are_values = [bool(_VALUE.fullmatch(value)) and not _VALUE.fullmatch(name) for name, value in beside.items()]
+    if not beside or len(values) != len(names) or len(beside) < len(names) - edge or not all(are_values):
+        return lines, {}
+    cut = {index: table.separator.join(cells[:edge]) for index, cells in zip(above, (values, names), strict=True)}
+    return [cut.get(index, line) for index, line in enumerate(lines[: table.start])], beside
 
 
 def _units(candidates: Sequence[_Candidate]) -> _Candidate | None:
@@ -91,11 +111,13 @@ def _units(candidates: Sequence[_Candidate]) -> _Candidate | None:
     return labelled or (nearest if nearest is not None and nearest.is_units() else None)
 
 
-def _names(candidates: Sequence[_Candidate], units: _Candidate | None) -> _Candidate | None:
-    """The line of names among those from the nearest to the farthest; above a line of `units` the nearest to it."""
+def _names(candidates: Sequence[_Candidate], units: _Candidate | None, lines: Sequence[str]) -> _Candidate | None:
+    """The line of names among those from the nearest to the farthest; above a line of `units` that next to it."""
     if units is not None and units.label == "":
         # Lines under the units are no names, which would then lack these units.
-        return next((candidate for candidate in candidates if candidate.line < units.line), None)
+        nearest = next((candidate for candidate in candidates if candidate.line < units.line), None)
+        between = lines[nearest.line + 1 : units.line] if nearest is not None else []
+        return None if any(line.strip() for line in between) else nearest
     words = [candidate for candidate in candidates if not candidate.holds_value()]
     if words and words[0].is_next and not words[0].label:
         return words[0]
@@ -113,6 +135,9 @@ def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
         if not lines[index].strip():
             continue
         bare = uncommented(lines[index]).strip(BLANKS)
+        if _MARKER.fullmatch(bare):
+            is_next = False
+            continue
         label = _LABEL.match(bare)
         kind = "" if label is None else "units" if label["units"] else "names"
         cells = _cells(bare[label.end() :] if label else bare, table)

@@ -1,22 +1,23 @@
 """MATLAB files: version 5 by scipy, version 7.3 (HDF5) by h5py. Only numbers and texts are read; nothing is executed.
 
-Vectors are channels, `name`; a matrix is one channel a column, `name(:,1)`. Single numbers and texts are properties. A
-structure is a block; the variables outside structures are a block without a name.
+Variables and structures become channels and blocks as variables.py describes. Tables, timetables and other objects are
+stored in a form that only MATLAB reads: a file without anything else is rejected, with the command that exports them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
 import scipy.io
 
-from underskin.errors import damage_said
-from underskin.recordings.channels import Block, Channel, Contents, as_values
-from underskin.recordings.readers import hdf5_file
+from underskin.errors import FileError, damage_said
+from underskin.recordings.channels import Contents
+from underskin.recordings.readers import hdf5_file, variables
 
 MAGIC_73 = b"MATLAB 7.3 MAT-file"
-_MOST_COLUMNS = 1000
+_EXPORTS = {"timetable": "writetimetable({0}, '{0}.csv')", "table": "writetable({0}, '{0}.csv')"}
+_OTHERWISE = "save its numbers as vectors or structures"
 
 
 def read(stream: BinaryIO, file: str) -> Contents:
@@ -26,50 +27,66 @@ def read(stream: BinaryIO, file: str) -> Contents:
     stream.seek(0)
     with damage_said(file, "", lambda error: f"no MATLAB file: {type(error).__name__}: {error}"):
         # SciPy's stubs accept paths only
-        variables = _variables_73(stream, file) if is_73 else scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
-    return _contents({name: value for name, value in variables.items() if not name.startswith("__")})
+        stored = _variables_73(stream, file) if is_73 else scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
+    objects = dict(_objects(stored))
+    numbers = {
+        name: value for name, value in stored.items() if not name.startswith("__") and name not in (*objects, "None")
+    }
+    messages = tuple(_message(name, of_class) for name, of_class in objects.items())
+    found = variables.contents(numbers, file)
+    if messages and not found.blocks:
+        raise FileError(file, "", "; ".join(messages))
+    return Contents(found.blocks, found.properties, (*messages, *found.warnings))
 
 
-def _contents(variables: Mapping[str, Any]) -> Contents:
-    properties: dict[str, str | float] = {}
-    blocks = []
-    structures = {name: value for name, value in variables.items() if isinstance(value, Mapping)}
-    for name, values in {"": variables, **structures}.items():
-        channels: list[Channel] = []
-        for variable, value in values.items():
-            label = f"{name}.{variable}" if name else variable
-            if isinstance(value, str):
-                properties[label] = value
-            elif isinstance(value, int | float | np.integer | np.floating):
-                properties[label] = float(value)
-            elif isinstance(value, np.ndarray) and value.dtype.kind in "iufc":
-                channels += _channels(variable, value)
-        if channels:
-            blocks.append(Block(name, tuple(channels)))
-    return Contents(tuple(blocks), properties)
+def _objects(stored: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The names and classes of objects."""
+    found = [(name, value.of_class) for name, value in stored.items() if isinstance(value, _Object)]
+    opaque = stored.get("None")  # SciPy's name for them
+    if isinstance(opaque, np.ndarray) and opaque.dtype.names and {"s0", "s2"} <= {*opaque.dtype.names}:
+        found += [(_text(entry["s0"]), _text(entry["s2"])) for entry in opaque.ravel()]
+    return found
 
 
-def _channels(name: str, value: Any) -> Iterator[Channel]:
-    values = as_values(value)
-    if values.ndim == 1:
-        yield Channel(name, "", values)
-    elif values.ndim == 2 and values.shape[1] <= _MOST_COLUMNS:
-        for column in range(values.shape[1]):
-            yield Channel(f"{name}(:,{column + 1})", "", values[:, column])
+def _text(given: Any) -> str:
+    return given.decode("latin-1") if isinstance(given, bytes) else str(given)
+
+
+def _message(name: str, of_class: str) -> str:
+    how = _EXPORTS[of_class].format(name) if of_class in _EXPORTS else ""
+    return f"{name!r} is a MATLAB {of_class}, which only MATLAB reads: {f'there, {how}' if how else _OTHERWISE}"
+
+
+class _Object:
+    """A variable of a class of MATLAB."""
+
+    def __init__(self, of_class: str) -> None:
+        self.of_class = of_class
 
 
 def _variables_73(stream: BinaryIO, file: str) -> dict[str, Any]:
     with h5py.File(stream, "r") as source:
         hdf5_file.refuse_outside(source, file)
-        return {
-            name: {inner: _value(value[inner]) for inner in value} if isinstance(value, h5py.Group) else _value(value)
-            for name, value in source.items()
-            if not name.startswith("#")  # #refs#, #subsystem#: MATLAB's own
-        }
+        return _structure_73(source)
+
+
+def _structure_73(group: Any) -> dict[str, Any]:
+    return {
+        name: _structure_73(value) if isinstance(value, h5py.Group) and not _class_73(value) else _value(value)
+        for name, value in group.items()
+        if not name.startswith("#")  # #refs#, #subsystem#: MATLAB's own
+    }
+
+
+def _class_73(stored: Any) -> str:
+    """The class of an object; empty for numbers, texts and structures."""
+    return _text(stored.attrs.get("MATLAB_class", b"")) if "MATLAB_object_decode" in stored.attrs else ""
 
 
 def _value(dataset: Any) -> Any:
-    """A variable as by loadmat; None where it holds neither numbers nor text (cells, references, objects)."""
+    """A variable as by loadmat; None where it holds neither numbers nor text (cells, references)."""
+    if of_class := _class_73(dataset):
+        return _Object(of_class)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         return None
     if dataset.dtype.names == ("real", "imag"):

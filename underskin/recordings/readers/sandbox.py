@@ -20,7 +20,7 @@ import orjson
 
 from underskin.errors import ErrorCode, FileError
 from underskin.parallel import limit_process
-from underskin.recordings.channels import Block, Channel, Contents, Document
+from underskin.recordings.channels import Block, Channel, Contents, Document, TextColumn
 from underskin.recordings.readers import parsing_limits
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.readers.parsing_limits import ParsingLimits
@@ -46,7 +46,9 @@ def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits | 
     blocks = []
     for block in contents["blocks"]:
         channels = tuple(Channel(**channel) for channel in block["channels"])
-        blocks.append(Block(**{**block, "channels": channels, "group_starts": tuple(block["group_starts"])}))
+        texts = tuple(TextColumn(**{**column, "texts": tuple(column["texts"])}) for column in block["texts"])
+        parts = {"channels": channels, "texts": texts, "group_starts": tuple(block["group_starts"])}
+        blocks.append(Block(**{**block, **parts}))
     return Contents(tuple(blocks), contents["properties"], tuple(contents["warnings"]), contents["layout"])
 
 
@@ -124,7 +126,8 @@ def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
     contents = parse(name, stream, "")
     if isinstance(contents, Contents):
         blocks = [
-            {**vars(block), "channels": [vars(channel) for channel in block.channels]} for block in contents.blocks
+            {**vars(block), "channels": list(map(vars, block.channels)), "texts": list(map(vars, block.texts))}
+            for block in contents.blocks
         ]
         return {**vars(contents), "blocks": blocks}
     return {"document": contents.campaign, "warnings": contents.warnings}

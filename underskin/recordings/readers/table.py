@@ -56,11 +56,14 @@ class Table:
     def row(self, line: str) -> list[float | complex | None] | None:
         """The numbers of a row, one for each of `columns`, NaN for an overload, None for an empty cell of a line with
         all separators; None where the line is no row."""
-        cells = self.cells(line)
+        return self.row_of(self.cells(line), line)
+
+    def row_of(self, cells: Sequence[str], line: str) -> list[float | complex | None] | None:
+        """The same of the cells of a line."""
         if not _LEAST <= len(cells) <= self.width:
             return None
-        ended = self.width - len(cells) if room(line, self.separator) >= self.width else 0
-        cells += [""] * ended
+        if len(cells) < self.width and room(line, self.separator) >= self.width:
+            cells = [*cells, *[""] * (self.width - len(cells))]
         if len(cells) <= max(self.columns):
             return None
         row = [self._number(cells[column], column) for column in self.columns]
@@ -192,6 +195,7 @@ def no_row(index: int, line: str, table: Table, file: str) -> FileError:
 
 _FEW = 64  # lines that are read one by one where they are not plain
 _MOST_GROUPS = 1000
+_MOST_DIFFERENT = 1_000_000  # texts of a column that is kept
 _PLAIN = b"0123456789+-.eE\n"  # bytes of lines that are read at once, beside separators
 Lines = list[tuple[int, str]]  # with their numbers, from 0
 
@@ -276,6 +280,28 @@ class OtherCells:
         self.first = self.first or (index, line)
 
 
+@dataclass
+class Words(OtherCells):
+    """The cells of a column of words; of those that are numbers, `count` and `example` have none."""
+
+    texts: dict[str, int] = field(default_factory=dict)
+    codes: "array[int]" = field(default_factory=lambda: array("q"))
+
+    def add(self, cell: str, index: int, line: str, *, is_number: bool) -> None:
+        """Add the cell of the next row; of too many different ones none is kept."""
+        if not is_number:
+            self.see(cell, index, line)
+        if self.kept:
+            self.codes.append(self.texts.setdefault(cell.strip(), len(self.texts)))
+        else:
+            self.codes = array("q")
+
+    @property
+    def kept(self) -> bool:
+        """Whether it may tell recordings apart."""
+        return len(self.texts) <= _MOST_DIFFERENT
+
+
 class RowReader:
     """Reads the rows of a text from the table's start on.
 
@@ -284,30 +310,30 @@ class RowReader:
     """
 
     def __init__(self, table: Table, headings: frozenset[str], file: str) -> None:
-        self._table = table
-        self._headings = headings
+        self.table = table
+        self.headings = headings
         self._file = file
         self._is_plain = table.columns == tuple(range(table.width)) and not table.complex_ones
         self.sections: list[Section] = []
         self.under: Lines = []  # lines since the last row
-        self.texts = {column: OtherCells() for column in range(table.width) if column not in table.columns}
+        self.texts = {column: Words() for column in range(table.width) if column not in table.columns}
         self.overloads: dict[int, OtherCells] = {}
         self.count = 0
 
     def take_all(self, written: str) -> None:
         """Read the rows of a text."""
         for first, lines in text.blocks(written):
-            skipped = max(0, self._table.start - first)
+            skipped = max(0, self.table.start - first)
             if skipped < len(lines):
                 self._take(first + skipped, lines[skipped:])
         for section in self.sections:
             for count, index, line in section.ended.values():
                 if section.count - count < _LEAST:  # a row with an empty cell is no end of a column
-                    raise no_row(index, line, self._table, self._file)
+                    raise no_row(index, line, self.table, self._file)
 
     def _take(self, first: int, lines: Sequence[str]) -> None:
         """Read lines, the first of which has the index `first`."""
-        table = self._table
+        table = self.table
         numbers = plain_numbers(lines, table.separator, table.decimal, table.width) if self._is_plain else None
         if numbers is not None and not (self.sections and self.sections[-1].ended):
             self.count += len(lines)
@@ -320,7 +346,8 @@ class RowReader:
                 self._take_line(index, line)
 
     def _take_line(self, index: int, line: str) -> None:
-        row = self._table.row(line)
+        cells = self.table.cells(line)
+        row = self.table.row_of(cells, line)
         if row is None:
             self.under.append((index, line))
             return
@@ -328,33 +355,31 @@ class RowReader:
         self.count += 1
         self._check(section, index, line, row)
         numbers: list[float] = []
-        for column, number in zip(self._table.columns, row, strict=True):
+        for column, number in zip(self.table.columns, row, strict=True):
             value = math.nan if number is None else number
-            numbers += [value.real, value.imag] if column in self._table.complex_ones else [value.real]
+            numbers += [value.real, value.imag] if column in self.table.complex_ones else [value.real]
         section.add(index, 1, numbers)
-        if self.texts:
-            cells = [*self._table.cells(line), *[""] * self._table.width]
-            for column, seen in self.texts.items():
-                if text.number(cells[column], self._table.decimal) is None:
-                    seen.see(cells[column], index, line)
+        for column, words in self.texts.items():
+            cell = cells[column] if column < len(cells) else ""
+            words.add(cell, index, line, is_number=text.number(cell, self.table.decimal) is not None)
 
     def _check(self, section: Section, index: int, line: str, row: Sequence[float | complex | None]) -> None:
         """Note overloads and the ends of columns; raises FileError where a number follows the end of its column."""
-        for column, number in zip(self._table.columns, row, strict=True):
+        for column, number in zip(self.table.columns, row, strict=True):
             if number is None:
                 section.ended.setdefault(column, (section.count, index, line))
             elif column in section.ended:
-                raise no_row(*section.ended[column][1:], self._table, self._file)
+                raise no_row(*section.ended[column][1:], self.table, self._file)
             elif number != number:
-                cell = self._table.cells(line)[column]
-                if text.number(cell, self._table.decimal) is None:
+                cell = self.table.cells(line)[column]
+                if text.number(cell, self.table.decimal) is None:
                     self.overloads.setdefault(column, OtherCells()).see(cell, index, line)
 
     def _section(self, index: int) -> Section:
         """The section of the row at an index."""
         foreign = [line for line in self.under if line[1].strip() and not is_comment(line[1])]
-        if foreign and not any(line.strip() in self._headings for _, line in foreign):
-            raise no_row(*foreign[0], self._table, self._file)
+        if foreign and not any(line.strip() in self.headings for _, line in foreign):
+            raise no_row(*foreign[0], self.table, self._file)
         if foreign or not self.sections:
             self.sections.append(Section(index, index, self.under if self.sections else []))
             self.sections[-1].start_group()

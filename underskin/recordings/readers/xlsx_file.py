@@ -27,6 +27,7 @@ _WORKBOOK = "xl/workbook.xml"
 _OTHERS = {
     "xl/workbook.bin": "is a binary workbook (.xlsb): save it as .xlsx or CSV",
     "content.xml": "is an OpenDocument file: save the table as .xlsx or CSV",
+    "header.properties": "is a JPK force file: in JPK DP, export the curves as text (.txt)",
     "word/document.xml": "is a Word document: save the table as .xlsx or CSV",
     "ppt/presentation.xml": "is a presentation: save the table as .xlsx or CSV",
 }

@@ -1,0 +1,330 @@
+"""A first rig description of a file, guessed from the names and units of its channels and properties.
+
+It is to be looked over: a heading may mislead, and what the file does not state is missing. Of a table with a row a
+line, columns such as `Sensor`, `Preload [N]` and `Sphere diameter [mm]` are fields of the recording; columns that are
+called alike but for their first word (`s01 |H|`, `s01 phase`, `s02 |H|`, …) are one recording for each of these words.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from underskin.recordings.channels import Block, Contents
+from underskin.recordings.readers.text import time_zone, with_zone
+from underskin.recordings.readers.unit_labels import decibel_reference, in_brackets, lab_field, labelled_unit, unit
+from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, SCHEMA, channel_fields
+
+_RATE = "sample_rate_hz"
+_RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
+_BY_DIMENSION = {
+    "frf": {
+        "force": "force_n",
+        "charge": "charge_pc",
+        "frequency": "frequency_hz",
+        "charge/force": "frf_re_pc_per_n",
+        "time": "time_s",
+    },
+    "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
+    "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
+}
+_MAGNITUDES = ("mag", "modulus", "|")  # as analysers call the absolute value of an FRF
+_OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
+_BY_WORD = {
+    "force": "force_n",
+    "load": "force_n",
+    "charge": "charge_pc",
+    "amplifier": "charge_pc",
+    "coh": "coherence",
+    "frequency": "frequency_hz",
+    "phase": PHASE,
+    "displacement": "displacement_mm",
+    "depth": "displacement_mm",
+    "time": "time_s",
+}
+_OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
+_DEFLECTIONS = ("deflection", "cantilever", "durchbiegung")
+_TIMES = (
+    *("recorded at", "recorded", "measured at", "acquired at", "date and time", "date/time", "datetime"),
+    *("timestamp", "start time", "date"),
+)  # of a file's properties, in lower case, the surest first
+RECORDED_AT = "recorded_at"
+_OF_RECORDING = {
+    "frf": ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", _RATE, RECORDED_AT),
+    "indentation": ("sensor", "indenter_radius_mm", "stage_stiffness_n_per_mm", RECORDED_AT),
+    "compression": ("sample_height_mm", "sample_diameter_mm", RECORDED_AT),
+}
+OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius_mm")
+_ONE_SENSOR = {"id": "s01", "x_mm": 0, "y_mm": 0}
+_SENSORS = ("sensor", "taxel", "sensore", "capteur")
+_WHEN = ("time", "date", "zeit", "datum", "heure", "ora", "data")
+_ROW_FIELDS = (  # of columns beside an FRF: field, dimension, and a word of the name
+    ("dynamic_force_n", "force", re.compile(r"dyn", re.IGNORECASE)),
+    ("preload_n", "force", re.compile(r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precarico", re.IGNORECASE)),
+    ("indenter_radius_mm", "length", re.compile(r"radius|rayon|raggio|radio", re.IGNORECASE)),
+)
+_DIAMETER = re.compile(r"dia\w*m|durchmesser|diamètre|[øØ⌀]", re.IGNORECASE)
+_RADIUS = "radius"  # the derived channel
+_IMAGINARY = re.compile(r"imag|\bim\b")
+_QUOTED = re.compile(r"'([^']*)'")
+_FIRST_WORD = re.compile(r"(?P<first>[^\s_:]+)[\s_:]+(?P<rest>\S.*)")
+
+
+class Column(Protocol):
+    """A channel's name, its unit as labelled, and whether its values are complex."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def unit(self) -> str: ...  # noqa: D102
+    @property
+    def is_complex(self) -> bool: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A `Column`."""
+
+    name: str
+    unit: str
+    is_complex: bool = False
+
+
+def main_blocks(contents: Contents) -> list[Block]:
+    """The blocks with the channels of the longest one: beside the data, a file may hold a table of results."""
+    longest = max(
+        contents.blocks, key=lambda block: sum(len(channel.values) for channel in block.channels), default=None
+    )
+    names = {channel.name for channel in longest.channels} if longest is not None else set()
+    return [block for block in contents.blocks if names == {channel.name for channel in block.channels}]
+
+
+def of_contents(contents: Contents) -> dict[str, Any]:
+    """The rig description that the contents of a file suggest, as a document; `None` stands for what is missing."""
+    blocks = main_blocks(contents)
+    columns = {
+        channel.name: Heading(channel.name, channel.label, np.iscomplexobj(channel.values))
+        for block in blocks
+        for channel in block.channels
+    }
+    texts = dict.fromkeys(column.name for block in blocks for column in block.texts)
+    dated = any(block.recorded_at is not None for block in contents.blocks)
+    document = guessed(list(columns.values()), contents.properties, {}, list(texts), dated=dated)
+    kind = document["kind"]
+    document = {**document, **_entries(list(columns.values()), document)}
+    rated = any(block.sample_rate_hz is not None for block in contents.blocks) or "time_s" in document["channels"]
+    optional = [RECORDED_AT, "stage_stiffness_n_per_mm"]
+    optional += [_RATE] if rated or "force_n" not in document["channels"] else []
+    optional += ["dynamic_force_n"] if "force_n" in document["channels"] else []
+    optional += ["sensor"] if kind == "indentation" or "recordings" in document else []
+    needed = [name for name in _OF_RECORDING[kind] if name not in optional]
+    skin = [name for name in OF_SKIN if kind == "frf" or name == "poisson_ratio"]
+    sensors = _sensors(contents, document)
+    if kind == "frf" and not sensors:
+        document["recording"] = {"sensor": _ONE_SENSOR["id"], **document["recording"]}
+    return {
+        **document,
+        "skin": {
+            **{name: document["skin"].get(name) for name in skin},
+            **({"sensors": sensors or [dict(_ONE_SENSOR)]} if kind == "frf" else {}),
+        },
+        "recording": {**dict.fromkeys(needed), **document["recording"]},
+    }
+
+
+def _sensors(contents: Contents, document: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The sensors that the file names, whose positions are missing."""
+    names = [one["sensor"] for one in document.get("recordings", [])]
+    column = document["recording"].get("sensor", {}).get("channel")
+    for block in contents.blocks if column else ():
+        words, channel = block.words(column), block.headed(column)
+        names += list(words.texts) if words is not None else []
+        names += [f"{number:g}" for number in np.unique(channel.values.real)] if words is None and channel else []
+    return [{"id": name, "x_mm": None, "y_mm": None} for name in dict.fromkeys(filter(None, names))]
+
+
+def guessed(
+    columns: Sequence[Column],
+    properties: Mapping[str, Any],
+    skin: Mapping[str, Any],
+    texts: Sequence[str] = (),
+    *,
+    dated: bool = False,
+) -> dict[str, Any]:
+    """A first rig description from units and names of channels, columns of words and properties; `skin`: its known
+    values; `dated`: whether each part of the file has its own time of recording."""
+    kind, fields = likely(columns)
+    channels: dict[str, Any] = {}
+    for column, field in zip(columns, fields, strict=True):
+        if field and field not in channels:
+            channels[field] = {"channel": column.name}
+    in_columns, derived = _row_fields(columns, texts, kind, fields)
+    skin_values = {name: skin[name] for name in (*OF_SKIN, "sensors") if skin.get(name) is not None}
+    return {
+        "schema": SCHEMA,
+        "kind": kind,
+        "skin": {"poisson_ratio": 0.5, **skin_values},
+        "recording": {**_stated(properties, kind, dated=dated), **in_columns},
+        **({"derived": derived} if derived else {}),
+        "channels": _with_spring(channels, columns, properties) if kind == "indentation" else channels,
+    }
+
+
+def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
+    """The kind of recording, and the likely field of each channel; empty if there is no indication."""
+    dimensions = [column_unit.dimension if (column_unit := unit(column.unit)) else "" for column in columns]
+    kind = "frf"
+    charged = any("charge" in dimension for dimension in dimensions) or any(
+        "charge" in column.name.lower() for column in columns
+    )
+    if "length" in dimensions and not charged:
+        named = any(words in column.name.lower() for column in columns for words in _OF_COMPRESSION)
+        kind = "compression" if named else "indentation"
+    elif not charged and any(word in column.name.lower() for column in columns for word in _OF_SPRINGS):
+        kind = "indentation"
+    phases = any("phase" in column.name.lower() for column in columns)
+    is_spectrum = "frequency" in dimensions
+    fields = []
+    for column, dimension in zip(columns, dimensions, strict=True):
+        name = column.name.lower()
+        word = next((field for word, field in _BY_WORD.items() if word in name), "")
+        field = COMPLEX_FRF if column.is_complex else _BY_DIMENSION[kind].get(dimension) or word
+        if decibel_reference(column.unit) is not None:
+            field = MAGNITUDE
+        if field == "frf_re_pc_per_n" and _IMAGINARY.search(name):
+            field = "frf_im_pc_per_n"
+        if field == "frf_re_pc_per_n" and (phases or any(part in name for part in _MAGNITUDES)):
+            field = MAGNITUDE
+        if is_spectrum and kind == "frf" and field in ("force_n", "charge_pc", "time_s"):
+            field = ""  # of the recording
+        fields.append(field if field in channel_fields(kind) else "")
+    return kind, fields
+
+
+def _row_fields(
+    columns: Sequence[Column], texts: Sequence[str], kind: str, fields: Sequence[str]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """The fields of the recording that columns hold, and the formulas that these need."""
+    found: dict[str, Any] = {}
+    derived: dict[str, str] = {}
+    for name in texts:
+        lower = name.lower()
+        if any(word in lower for word in _SENSORS):
+            found.setdefault("sensor", {"channel": name})
+        elif any(word in lower.split() for word in _WHEN):
+            found.setdefault(RECORDED_AT, {"channel": name})
+    for column, field in zip(columns, fields, strict=True):
+        if field or kind != "frf" or "frequency_hz" not in fields:
+            continue
+        column_unit = unit(column.unit)
+        dimension = column_unit.dimension if column_unit is not None else ""
+        if dimension == "length" and _DIAMETER.search(column.name) and "'" not in column.name:
+            found.setdefault("indenter_radius_mm", {"channel": _RADIUS})
+            derived[_RADIUS] = f"'{column.name}' / 2"
+        elif not dimension and any(word in column.name.lower() for word in _SENSORS):
+            found.setdefault("sensor", {"channel": column.name})
+        for row_field, needed, word in _ROW_FIELDS:
+            if dimension == needed and word.search(column.name):
+                found.setdefault(row_field, {"channel": column.name})
+                break
+    return found, derived
+
+
+def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str, Any]:
+    """`recordings` and the common `channels` of a table with the same columns for each sensor; empty of another."""
+    common = [column for column in columns if document["channels"].get("frequency_hz") == {"channel": column.name}]
+    by_sensor: dict[str, dict[str, Heading]] = {}
+    for column in columns:
+        parts = _FIRST_WORD.fullmatch((in_brackets(column.name) or (column.name,))[0])
+        if parts is not None and column not in common:
+            heading = Heading(column.name, column.unit, column.is_complex)
+            by_sensor.setdefault(parts["first"], {})[parts["rest"]] = heading
+    alike = {tuple(of_sensor) for of_sensor in by_sensor.values()}
+    if document["kind"] != "frf" or not common or len(by_sensor) < 2 or len(alike) != 1:
+        return {}
+    entries = []
+    for sensor, of_sensor in by_sensor.items():
+        fields = likely([*common, *of_sensor.values()])[1][len(common) :]
+        channels = {
+            field: {"channel": one.name} for field, one in zip(fields, of_sensor.values(), strict=True) if field
+        }
+        entries.append({"sensor": sensor, "channels": channels})
+    return {"channels": {"frequency_hz": {"channel": common[0].name}}, "recordings": entries}
+
+
+def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
+    """The recording's fields that the file itself states under their own names."""
+    named = {field: stated for stated in properties for field in (stated, *(lab_field(stated) or ())[:1])}
+    rate = next((stated for stated in properties if stated.lower().replace(" ", "_") in _RATES), None)
+    if rate is not None:
+        named[_RATE] = rate
+    when = None if dated else _time_stated(properties)
+    named = {name: stated for name, stated in named.items() if name != RECORDED_AT}
+    named |= {} if when is None else {RECORDED_AT: when}
+    return {name: {"property": named[name]} for name in _OF_RECORDING[kind] if name in named}
+
+
+def _time_stated(properties: Mapping[str, Any]) -> str | None:
+    """The property of a file with its time of recording; None if no usable one exists."""
+    by_name = {name.lower().replace("_", " ").strip(): name for name in properties}
+    return next((by_name[name] for name in _TIMES if name in by_name and _is_time(properties[by_name[name]])), None)
+
+
+def _is_time(value: Any) -> bool:
+    try:
+        with_zone(str(value), time_zone())
+    except ValueError:
+        return False
+    return True
+
+
+def _with_spring(channels: dict[str, Any], columns: Sequence[Column], properties: Mapping[str, Any]) -> dict[str, Any]:
+    """The channels by field, with a deflection if no channel is a force.
+
+    Deflection gives the force, and the stage's travel the depth; the constant is a property of the file in N/m, if
+    there is one.
+    """
+    lengths = [column for column in columns if (label := unit(column.unit)) and label.dimension == "length"]
+    springs = [column.name for column in lengths if any(word in column.name.lower() for word in _DEFLECTIONS)]
+    travel = next((column.name for column in lengths if column.name not in springs), None)
+    if "force_n" in channels or not springs or travel is None:
+        return channels
+    deflection = {"channel": springs[0]}
+    constant = next((name for name in properties if _is_stiffness(labelled_unit(name))), None)
+    force = {"force_n": {**deflection, "spring_constant_n_per_m": {"property": constant}}} if constant else {}
+    return {**channels, "displacement_mm": {"channel": travel, "deflection": deflection}, **force}
+
+
+def _is_stiffness(label: str) -> bool:
+    parsed = unit(label)
+    return parsed is not None and parsed.dimension == "force/length"
+
+
+def missing(document: Mapping[str, Any]) -> list[str]:
+    """The fields of a guessed document that are `None`, by their places."""
+    sensors = document["skin"].get("sensors") or []
+    places = ["skin.sensors: x_mm and y_mm of each"] if any(sensor["x_mm"] is None for sensor in sensors) else []
+    lacking = [
+        f"{part}.{name}" for part in ("skin", "recording") for name, value in document[part].items() if value is None
+    ]
+    return [*lacking, *places, *([] if document["channels"] else ["channels"])]
+
+
+def taken(document: Mapping[str, Any]) -> dict[str, str]:
+    """What a rig description, as a document, takes each column for."""
+    given: Sequence[Mapping[str, Any]] = [document, *document.get("recordings", [])]
+    held = [one.get(part, {}) for one in given for part in ("recording", "channels")]
+    by_channel: dict[str, str] = {}
+    for field, how in (pair for fields in held for pair in fields.items()):
+        names = how.get("channel", []) if isinstance(how, Mapping) else []
+        by_channel |= dict.fromkeys([names] if isinstance(names, str) else names, field)
+    for name, formula in reversed(document.get("derived", {}).items()):
+        by_channel |= dict.fromkeys(_QUOTED.findall(str(formula)), by_channel.get(name, name))
+    return by_channel
+
+
+def holds_frfs(contents: Contents) -> bool:
+    """Whether a table seems to hold FRFs."""
+    return any(field.startswith("frf_") for field in taken(of_contents(contents)).values())
