@@ -71,15 +71,18 @@ def test_power_law_relaxes_as_lee_and_radok() -> None:
     time = np.concatenate([np.linspace(0, ramp, 400), ramp + np.geomspace(1e-3, 30.0, 60)])
     depth = np.minimum(time / ramp, 1.0) * depth_mm
     recording = IndentationRecording("i", R_MM, depth, hertz_force(depth, R_MM, E_MPA), time_s=time)
+    campaign = Campaign("one", SKIN, (recording,))
     for n in (0.05, 0.15, 0.4):
         values = {"relaxed_fraction": 0.0, "relaxation_exponent": n}
-        found = predicted(["contact_creep"], Campaign("one", SKIN, (recording,)), **{"contact_point i": 0.0}, **values)
+        found = predicted(["contact_creep"], campaign, **{"contact_point i": 0.0}, **values)
         reached = np.minimum(ramp / np.maximum(time, 1e-12), 1.0)
         integral = 1.5 * time ** (1.5 - n) * beta(1.5, 1 - n) * betainc(1.5, 1 - n, reached)
         exact = hertz_force(np.array([depth_mm]), R_MM, E_MPA)[0] * integral / ramp**1.5
         assert found[20:] == pytest.approx(exact[20:], rel=5e-3)
-    assert contact_creep.meaning({"relaxation_exponent": 0.1}).startswith("From each time to one ten times as long")
-    assert not contact_creep.meaning({"relaxation_exponent": 0.0})
+    assert contact_creep.meaning({"relaxation_exponent": 0.1}, campaign).startswith(
+        "From each time to one ten times as long"
+    )
+    assert not contact_creep.meaning({"relaxation_exponent": 0.0}, campaign)
 
 
 def test_power_law_and_pair_multiply() -> None:
