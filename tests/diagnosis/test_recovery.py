@@ -189,11 +189,13 @@ def lenses(name: str) -> dict[str, Any]:
     """Two spheres, so wide that strains are small, on a layer of 2 mm and 4 MPa by the linear theory."""
     thickness, d33, hidden = 2.0, 14.0, HIDDEN["frf", name].effect
     shear = REDUCED / 3
-    solved = {
-        "sticking_contact": sticking,
-        "elastic_tip": lambda: yielding(1 / hidden["ratio"], 0.0, 1.0),
-        "film_shear": lambda: yielding(0.0, hidden["ratio"] * 1.35 * thickness / 0.05, hidden["lag_mm"] / thickness),
-    }[name]()
+    solved = (
+        sticking()
+        if name == "sticking_contact"
+        else yielding(1 / hidden["ratio"], 0.0, 1.0)
+        if name == "elastic_tip"
+        else yielding(0.0, hidden["ratio"] * 1.35 * thickness / 0.05, hidden["lag_mm"] / thickness)
+    )
     random = np.random.default_rng(53)
     recordings: list[dict[str, Any]] = []
     for radius in (200.0, 400.0):

@@ -274,7 +274,8 @@ def _transforms(
     of_layer = [x for x in candidates if x is not None and x.slopes.any()]
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer, moving=bool(of_layer))
     glued = Layer(contacts.poisson_ratio.value[..., None], slip[..., None])
-    transmission, of_film = glued.transmission(k), []
+    transmission = glued.transmission(k)
+    of_film: list[tuple[Differentiated, Floats]] = []
     if contacts.film is not None:
         stretch, of_film = _film_charge(k, glued, *contacts.film, contacts.thickness)
         transmission = transmission + stretch
