@@ -86,7 +86,8 @@ def slip(glue_stiffness: float) -> float:
 class Layer:
     """An elastic layer of unit thickness.
 
-    Its functions take wave numbers k ≥ 0 in units of 1/h, (k,); their derivatives are those by ν and by the slip.
+    Its functions take wave numbers k ≥ 0 in units of 1/h, (k,); derivatives are by ν and slip, of `stiffening` also by
+    the tip's share.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ import math
 from underskin.mechanisms.base import HeavyTailed, Mechanism, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 
-_REASON = "rubber tips have 0.3 to 3 times the skin's E, polymers 100 times and more"
+_REASON = "rubber tips have 0.3 to 3 times the skin's E, soft printed ones 10, hard polymers hundreds of times"
 
 
 class ElasticTip(Mechanism):
@@ -25,7 +25,7 @@ class ElasticTip(Mechanism):
     order = 40
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     parameters_stated = (
-        Parameter("modulus_ratio", "-", 0.2, 1e4, HeavyTailed(math.log(10), 1.5), "log", math.inf, _REASON, shown=2.0),
+        Parameter("modulus_ratio", "-", 0.2, 1e4, HeavyTailed(math.log(20), 1.5), "log", math.inf, _REASON, shown=2.0),
     )
 
     def act(self, state: Contacts, values: Values) -> None:
