@@ -19,6 +19,7 @@ from rig.elastomer import campaign_of_curves, record_curves
 from rig.recorded import campaign, record_lines
 from tests.support.lean_reports import beside
 from tests.support.sticking_punch import sticking_spheres
+from tests.support.yielding_bodies import REDUCED, WAVE_NUMBERS, layer, press, transmitted
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import from_dict
 
@@ -27,7 +28,10 @@ _LEFT_OPEN = 0.2  # of its set, where the answer is ambiguous
 # Among which it is sought, in `make soak` among all
 _RIVALS = {
     "frf": ("modulus_error", "thickness_error", "sensor_spread", "moving_contact_edge", "contact_resonance"),
-    "sticking_contact": ("modulus_error", "thickness_error", "moving_contact_edge", "layered_contact"),  # on a layer
+    **dict.fromkeys(  # on a layer
+        ("sticking_contact", "elastic_tip", "film_shear"),
+        ("modulus_error", "thickness_error", "moving_contact_edge", "layered_contact"),
+    ),
     "indentation": ("modulus_error", "layered_contact", "instrument_compliance", "strain_stiffening"),
     "compression": ("modulus_error", "platen_friction", "strain_stiffening", "cell_collapse"),
 }
@@ -66,6 +70,8 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
     ("frf", "timing_delay"): Hidden({"delay_us": 80.0}, {"delay": "delay_us"}),
     ("frf", "modulus_error"): Hidden({"factor": 1.4}, {"modulus_factor": "factor"}),
     ("frf", "sticking_contact"): Hidden({"share": 1.0}, {"sticking_share": "share"}),
+    ("frf", "elastic_tip"): Hidden({"ratio": 1.0}, {"modulus_ratio": "ratio"}),
+    ("frf", "film_shear"): Hidden({"lag_mm": 0.3, "ratio": 0.5}, {"shear_lag": "lag_mm", "lateral_ratio": "ratio"}),
     ("frf", "thickness_error"): Hidden({"factor": 1.15}, {"thickness_factor": "factor"}),
     ("indentation", "layered_contact"): Hidden({}),
     ("indentation", "adhesion"): Hidden(
@@ -158,18 +164,46 @@ def cycles(name: str) -> dict[str, Any]:
     return {"schema": "campaign/1", "name": name, "skin": {"poisson_ratio": 0.5}, "recordings": [recording]}
 
 
+_DISC = 0.5  # radius of the sensor over the layer's thickness
+
+
+def sticking() -> list[tuple[float, float, float]]:
+    """FR/(Gh³), offset over h and σ of spheres that stick to a layer."""
+    solved = sticking_spheres(1.5, np.array([_DISC]))
+    pressed = zip(solved.a, solved.load, solved.sigma[:, 0], strict=True)
+    return [(float(load), 0.0, float(sigma)) for a, load, sigma in pressed if a > 0.3]
+
+
+def yielding(tip: float, film: float, lag: float) -> list[tuple[float, float, float]]:
+    """The same of frictionless ones with E'/E'_tip = `tip`; a film's charge is `film` times C of `film_strain`."""
+    pressure, shear, _ = layer()
+    passed = pressure + film * lag**2 * WAVE_NUMBERS * shear / (1 + (lag * WAVE_NUMBERS) ** 2)
+    rows = []
+    for depth in np.geomspace(3e-4, 0.03, 8):
+        force, shape = press(50.0, float(depth), tip)
+        rows += [(50.0 * force, offset, transmitted(passed * shape, _DISC, offset)) for offset in (0.0, 0.5, 1.0)]
+    return rows
+
+
 def lenses(name: str) -> dict[str, Any]:
-    """Two spheres, so wide that strains are small, that stick to a layer of 2 mm and 4 MPa by the linear theory."""
-    thickness, shear, rho, d33 = 2.0, 4.0 / 3, np.array([0.5]), 14.0
-    solved = sticking_spheres(1.5, rho)
+    """Two spheres, so wide that strains are small, on a layer of 2 mm and 4 MPa by the linear theory."""
+    thickness, d33, hidden = 2.0, 14.0, HIDDEN["frf", name].effect
+    shear = REDUCED / 3
+    solved = (
+        sticking()
+        if name == "sticking_contact"
+        else yielding(1 / hidden["ratio"], 0.0, 1.0)
+        if name == "elastic_tip"
+        else yielding(0.0, hidden["ratio"] * 1.35 * thickness / 0.05, hidden["lag_mm"] / thickness)
+    )
     random = np.random.default_rng(53)
     recordings: list[dict[str, Any]] = []
     for radius in (200.0, 400.0):
-        for number in np.flatnonzero(solved.a > 0.3):
-            frf = 1.5 * rho[0] ** 2 * d33 * float(solved.sigma[number, 0]) * math.exp(random.normal(0.0, 0.005))
+        for load, offset, sigma in solved:
+            frf = 1.5 * _DISC**2 * d33 * sigma * math.exp(random.normal(0.0, 0.005))
             recordings.append({
                 "id": f"r{len(recordings)}", "sensor": "s", "indenter_radius_mm": radius, "dynamic_force_n": 0.001,
-                "preload_n": float(solved.load[number]) * shear * thickness**3 / radius,
+                "preload_n": load * shear * thickness**3 / radius, "position_mm": [offset * thickness, 0.0],
                 "frequency_hz": np.geomspace(1.0, 100.0, 16).tolist(),
                 "frf_re_pc_per_n": (frf * (1 + random.normal(0.0, 0.003, 16))).tolist(),
                 "frf_im_pc_per_n": (frf * random.normal(0.0, 0.003, 16)).tolist(),
@@ -182,7 +216,11 @@ def lenses(name: str) -> dict[str, Any]:
 
 
 # Of which the rig has no effect
-DRAWN = {"cell_collapse": cycles, "cyclic_softening": cycles, "sticking_contact": lenses}
+DRAWN = {
+    "cell_collapse": cycles,
+    "cyclic_softening": cycles,
+    **dict.fromkeys(("sticking_contact", "elastic_tip", "film_shear"), lenses),
+}
 
 
 @pytest.mark.slow

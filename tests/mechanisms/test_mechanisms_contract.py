@@ -37,6 +37,10 @@ EACH = [(name, kind) for name in NAMES for kind in CATALOGUE[name].kinds]
 TRIPLES: list[tuple[tuple[str, ...], Kind]] = [
     (("layered_contact", "adhesion", "moving_contact_edge"), "frf"),
     (("compressible_layer", "interface_slip", "layered_contact"), "frf"),
+    (("interface_slip", "film_shear", "layered_contact"), "frf"),
+    (("compressible_layer", "film_shear", "moving_contact_edge"), "frf"),
+    (("adhesion", "elastic_tip", "layered_contact"), "frf"),
+    (("compressible_layer", "elastic_tip", "contact_resonance"), "frf"),
     (("thickness_error", "misalignment", "contact_resonance"), "frf"),
     (("contact_creep", "strain_stiffening", "moving_contact_edge"), "frf"),
     (("crosstalk", "preload_dependent_d33", "ageing"), "frf"),

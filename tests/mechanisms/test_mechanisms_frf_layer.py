@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.mechanisms.mechanism_contacts import RHO, E, H, level, linear_contact, oracle_rows
+from tests.mechanisms.mechanism_contacts import LINEAR_MM, RHO, E, H, level, linear_contact, oracle_rows
 from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
 from tests.support.oracle import NEEDS_ORACLE
+from tests.support.yielding_bodies import REDUCED, WAVE_NUMBERS, film_strain, layer, press, transmitted
 from underskin.physics import charge_response, hertz
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import hertz_transform, normal_stress
@@ -103,3 +104,31 @@ def test_neighbours_tell_direction_centred_press() -> None:
         assert level(names, centred, offset_x=-0.4, offset_y=0.7, fraction=0.2) == pytest.approx(moved, rel=1e-6)
         other = level(names, centred, offset_x=0.4, offset_y=0.7, fraction=0.2)
         assert abs(other / moved - 1) > 0.005
+
+
+@pytest.mark.parametrize(("a_over_h", "lag_over_h"), [(0.3, 0.05), (0.9, 0.2), (0.9, 0.8)])
+def test_film_stretched_on_its_glue(a_over_h: float, lag_over_h: float) -> None:
+    """The charge by stretch is that of a membrane solved by finite differences."""
+    shape = np.asarray(hertz_transform(WAVE_NUMBERS * a_over_h))
+    per_strain = 0.4 * 1.35 * H / 0.05e-3
+    expected = transmitted(layer()[0] * shape, RHO) + per_strain * film_strain(shape, RHO, lag_over_h)
+    found = level(["film_shear"], linear_contact(a_over_h), shear_lag=1e3 * lag_over_h * H, lateral_ratio=0.4)
+    assert found.real == pytest.approx(expected, rel=3e-5)
+
+
+@pytest.mark.parametrize(("depth", "ratio"), [(0.002, 1.0), (0.02, 0.5), (0.02, 4.0)])
+def test_tip_yields_on_a_layer(depth: float, ratio: float) -> None:
+    """A tip that yields presses the layer as rings of pressure on both bodies do."""
+    force, shape = press(50.0, depth, 1 / ratio)
+    modulus = E / 0.75
+    preload = 50.0 * force / REDUCED * modulus * H**3 / (LINEAR_MM * 1e-3)
+    recording = frf_recording(indenter_radius_mm=LINEAR_MM, preload_n=preload, dynamic_force_n=preload / 1e3)
+    found = level(["layered_contact", "elastic_tip"], recording, modulus_ratio=ratio)
+    assert found.real == pytest.approx(transmitted(layer()[0] * shape, RHO), rel=2e-4)
+
+
+def test_tip_yields_on_a_half_space() -> None:
+    """There it is a rigid sphere, larger by the skin's share of what yields, at finite strain too."""
+    larger = level([], frf_recording(indenter_radius_mm=6.0, preload_n=2.0))
+    found = level(["elastic_tip"], frf_recording(indenter_radius_mm=4.0, preload_n=2.0), modulus_ratio=2.0)
+    assert found == pytest.approx(larger, rel=1e-6)

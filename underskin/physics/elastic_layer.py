@@ -12,6 +12,7 @@ p = (1 − 2ν)/(2 − 2ν), which is 0 for an incompressible layer, and g = 2k 
     D      = C² + k² − 2pk² + p²(k² − H²)           + g (CH + k)
     M D    = C + kH − p kH                          + g (H + kC)     M: normal stress, base / surface
     M_t D  = kC + p (H − kC)                        + g kH           M_t: normal stress at the base / surface shear
+    M_s D  = kC − p (H + kC)                                         M_s: shear at the base / normal surface stress
     K D    = CH − k + 2pk − p²(CH + k)              + g H²           K: surface deflection, layer / half space
 
 Contacts are solved many at once and with derivatives. Lengths are in units of the thickness, α = a/h. The integral
@@ -31,7 +32,10 @@ a flat punch whose φ at the edge is that of adhesion:
     P = F R/(E' h³),   Δ = δ R/h²,   U = √(w/(E' h³)) R
     P = (4/3) α³ A(α) − U √(8π α³) G(α),   Δ = α² B(α) − U √(2πα) V(α),   dF/dδ = 2 E' a S(α)  (edge held)
 
-A, B, G, V, S are 1 at α = 0 and depend only on α, the Poisson ratio and the glue line: they are solved once for each
+The tip may yield too, as a half space (Johnson, Contact Mechanics (1985), section 4.2: the depths add): with its share
+t of the compliance, E' is E* = (1 − t) E' and 1 − K is (1 − t)(1 − K) everywhere above.
+
+A, B, G, V, S are 1 at α = 0 and depend only on α, the Poisson ratio, the glue line and t: they are solved once for each
 layer at Chebyshev points in α, which takes about a millisecond.
 
 The stress follows in the same way: at the same points in α, the transforms of both pressures at given wave numbers are
@@ -82,7 +86,8 @@ def slip(glue_stiffness: float) -> float:
 class Layer:
     """An elastic layer of unit thickness.
 
-    Its functions take wave numbers k ≥ 0 in units of 1/h, (k,); their derivatives are those by ν and by the slip.
+    Its functions take wave numbers k ≥ 0 in units of 1/h, (k,); derivatives are by ν and slip, of `stiffening` also by
+    the tip's share.
 
     Parameters
     ----------
@@ -90,6 +95,9 @@ class Layer:
         0 to 0.5, 0.5 included. Arrays are several layers; functions then answer (…, k).
     slip : float, or ndarray (…, 1)
         0 (bonded) to 1 (frictionless).
+    tip : float
+        Share of the indenter in the compliance of its contact with a half space of the layer's material: 0 (rigid) to
+        below 1.
 
     Raises
     ------
@@ -99,12 +107,15 @@ class Layer:
 
     poisson_ratio: float | Floats = 0.5
     slip: float | Floats = 0.0
+    tip: float = 0.0
 
     def __post_init__(self) -> None:
         if not np.all((self.poisson_ratio >= 0) & (self.poisson_ratio <= 0.5)):
             raise out_of_range("poisson_ratio", self.poisson_ratio, "must be 0 to 0.5")
         if not np.all((self.slip >= 0) & (self.slip <= 1)):
             raise out_of_range("slip", self.slip, "must be 0 (bonded) to 1 (frictionless)")
+        if not 0 <= self.tip < 1:
+            raise out_of_range("tip", self.tip, "must be 0 (rigid) to below 1")
 
     def transmission(self, k: Floats) -> Differentiated:
         """Normal transmission M(k), 1 at k = 0, as `hankel_transform.normal_stress` takes it (γ_n, σ)."""
@@ -118,6 +129,12 @@ class Layer:
         bonded = k * cosh * decay, (sinh - k * cosh) * decay, np.zeros_like(k)
         return self._ratio(k, bonded, k * sinh * decay)
 
+    def base_shear(self, k: Floats) -> Differentiated:
+        """Shear M_s(k) that a normal surface stress puts on the base; like k at k = 0."""
+        k, decay, cosh, sinh = _scaled_hyperbolic(k)
+        bonded = k * cosh * decay, -(sinh + k * cosh) * decay, np.zeros_like(k)
+        return self._ratio(k, bonded, np.zeros_like(k))
+
     def compliance(self, k: Floats) -> Differentiated:
         """Compliance K(k): surface deflection over that of the half space of the same ν; 0 at k = 0, 1 at k = ∞."""
         k, decay, cosh, sinh = _scaled_hyperbolic(k)
@@ -125,11 +142,16 @@ class Layer:
         return self._ratio(k, bonded, sinh**2)
 
     def stiffening(self, k: Floats) -> Differentiated:
-        """1 − K(k), exact to rounding where K is close to 1; falls like k² e^(−2k)."""
+        """What the base takes from the contact's compliance, (1 − t)(1 − K(k)) of that of two half spaces.
+
+        Exact to rounding where K is close to 1; falls like k² e^(−2k). Derivatives by ν, slip and the tip's share t.
+        """
         k, decay, _, sinh = _scaled_hyperbolic(k)
         square, far = k * (1 + k), decay**2
         bonded = (1 + square - sinh) * far, -2 * square * far, (square + sinh) * far
-        return self._ratio(k, bonded, (k + sinh) * far)
+        held = self._ratio(k, bonded, (k + sinh) * far)
+        value = (1 - self.tip) * held.value
+        return Differentiated(value, np.stack([*((1 - self.tip) * held.slopes), -held.value]))
 
     def _ratio(self, k: Floats, bonded: tuple[Floats, Floats, Floats], glue: Floats) -> Differentiated:
         """[(1 − s) (b₀ + b₁ p + b₂ p²) + 2ks (1 − p) g]/[the same of D], all scaled by e^(−2k); s is the slip."""
@@ -272,7 +294,7 @@ class ContactEquation:
             sphere_depth=depth,
             stiffness=np.pi / 2 * _last_axis(punch, 0),
             edge_force=_last_axis(punch, 0) / punch_edge,
-            edge_depth=constant(2 / np.pi, 2) / punch_edge,
+            edge_depth=constant(2 / np.pi, len(punch_edge.slopes)) / punch_edge,
             sphere_shape=sphere / _last_axis(sphere, slice(1)),
             punch_shape=punch / _last_axis(punch, slice(1)),
         )
@@ -352,7 +374,7 @@ _STIFFNESS: _Law = ((1.0, 0.0, 4, False),)
 
 @dataclass(frozen=True)
 class ContactRows:
-    """Contacts (rows,) with derivatives by P, U, ν and the slip of the glue line.
+    """Contacts (rows,) with derivatives by P, U, ν, the slip of the glue line and the tip's share.
 
     NaN where there is none: below pull-off, or beyond a/h = LARGEST_A_OVER_H.
 
@@ -454,7 +476,7 @@ class ContactCurves:
     Attributes
     ----------
     sphere_transform, punch_transform : Differentiated, (points, k)
-        At the points `interval.nodes` in α, with derivatives by ν and by the slip.
+        At the points `interval.nodes` in α, with derivatives by ν, the slip and the tip's share.
     """
 
     def __init__(self, grid: CurveGrid, layer: Layer) -> None:
@@ -462,7 +484,7 @@ class ContactCurves:
         solved = grid.equation.solve(layer)
         ratios = (solved.sphere_force, solved.edge_force, solved.sphere_depth, solved.edge_depth, solved.stiffness)
         at_nodes = np.stack([_stacked(ratio) for ratio in ratios], axis=-1).transpose(1, 0, 2)
-        coefficients = self.interval.coefficients(at_nodes)  # (count, 3, 5)
+        coefficients = self.interval.coefficients(at_nodes)  # (count, 4, 5)
         slopes = self.interval.derivative(coefficients[:, :1])
         self._coefficients = np.concatenate([coefficients[:, :1], slopes, coefficients[:, 1:]], axis=1)
         # A, G and their slopes for the compiled function.
@@ -471,8 +493,9 @@ class ContactCurves:
         self._start = _Start(at)
         shapes = np.concatenate([_stacked(solved.sphere_shape), _stacked(solved.punch_shape)]).transpose(1, 0, 2)
         transforms = (shapes @ grid.transforms).transpose(1, 0, 2)
-        self.sphere_transform = Differentiated(transforms[0], transforms[1:3])
-        self.punch_transform = Differentiated(transforms[3], transforms[4:])
+        sphere, punch = np.split(transforms, 2)
+        self.sphere_transform = Differentiated(sphere[0], sphere[1:])
+        self.punch_transform = Differentiated(punch[0], punch[1:])
 
     def at_load(self, load: Floats, root_adhesion: Floats) -> ContactRows:
         """Contacts under given loads, on the branch that is stable under force control.
@@ -501,7 +524,7 @@ class ContactCurves:
         return ContactRows(Differentiated(alpha, slopes), *map(rows, laws))
 
     def stiffness_at(self, alpha: Floats) -> Differentiated:
-        """S at a/h (rows,) from 0 to LARGEST_A_OVER_H, with derivatives by α, ν and the slip."""
+        """S at a/h (rows,) from 0 to LARGEST_A_OVER_H, with derivatives by α, ν, the slip and the tip's share."""
         value, *slopes = self._evaluated(self.interval.basis(alpha))[:, _STIFFNESS[0][2]]
         return Differentiated(value, np.stack(slopes))
 
@@ -519,9 +542,9 @@ class ContactCurves:
         return alpha
 
     def _evaluated(self, basis: Floats) -> Floats:
-        """The curves' values and derivatives with respect to α, ν and slip: (4, curves, rows)."""
+        """The curves' values and derivatives with respect to α, ν, slip and tip: (5, curves, rows)."""
         flat = self._coefficients.reshape(len(self._coefficients), -1)
-        values: Floats = (basis @ flat).T.reshape(4, -1, len(basis))
+        values: Floats = (basis @ flat).T.reshape(self._coefficients.shape[1], -1, len(basis))
         return values
 
 
@@ -548,13 +571,14 @@ def _stacked(x: Differentiated) -> Floats:
 
 
 def _law(law: _Law, alpha: Floats, root_adhesion: Floats, at: Floats) -> Floats:
-    """Σ of factor · U^m · α^n · curve over the law's terms, with its derivatives by α, U, ν and slip: (5, rows)."""
-    total = np.zeros((5, len(alpha)))
+    """Σ of factor · U^m · α^n · curve over the law's terms, with its derivatives by α, U and as `at`'s: (6, rows)."""
+    total = np.zeros((1 + len(at), len(alpha)))
+    other_than_root = np.arange(len(total)) != 2
     for factor, exponent, column, adhesive in law:
         power: Floats = factor * alpha**exponent
         term = power * at[:, column]
         term[1] += exponent / alpha * term[0]
-        total[[0, 1, 3, 4]] += root_adhesion * term if adhesive else term
+        total[other_than_root] += root_adhesion * term if adhesive else term
         if adhesive:
             total[2] += term[0]
     return total

@@ -267,35 +267,47 @@ class Contacts:
     relaxed: Differentiated | None = None  # that E over the one that a fast oscillation meets; None where they are one
     second_over_first: Differentiated | None = None  # c₂ of Yeoh's law, of one row; None of a neo-Hookean layer
     friction: Differentiated | None = None  # 0 slips to 1 sticks, of one row; None of a frictionless sphere
+    tip: Differentiated | None = None  # its share of E*'s compliance, E*/E'_tip, of one row; None of a rigid one
+    film: tuple[Differentiated, Differentiated] | None = None  # charge by stretch [1/m] and shear lag [m], of one row
     layered: bool = False  # contact by the layer of finite thickness, not by the half space
     stiffness: Differentiated | None = None  # dF/dδ [N/m] at the present radius, where a mechanism reads it
 
     @property
     def share_a_layer(self) -> bool:
-        """Whether the linear layer, its Poisson ratio and its glue line, is the same at all points."""
-        layers = [x.value for x in (self.poisson_ratio, self.slip) if x is not None]
+        """Whether the linear layer and the tip (Poisson ratio, glue line, share) are the same at all points."""
+        layers = [x.value for x in (self.poisson_ratio, self.slip, self.tip) if x is not None]
         return all(bool((value == value.flat[0]).all()) for value in layers)
 
     @property
     def reduced_modulus(self) -> Differentiated:
-        """E' = E/(1 − ν²) [Pa]."""
-        return self.modulus / (1 - self.poisson_ratio**2.0)
+        """E* [Pa]: E' = E/(1 − ν²), of a tip that yields too 1/E* = 1/E' + 1/E'_tip."""
+        of_skin = self.modulus / (1 - self.poisson_ratio**2.0)
+        return of_skin if self.tip is None else of_skin * (1.0 - self.tip)
 
     @property
     def hertz_radius(self) -> Differentiated:
-        """a [m] of a sphere on a half space without adhesion, a³ = 3 F R/(4 E'): `hertz.contact_radius` with slopes."""
+        """a [m] of a sphere on a half space without adhesion, a³ = 3 F R/(4 E*): `hertz.contact_radius` with slopes."""
         nu = self.poisson_ratio.value
         area = 1 - nu * nu
         a = np.cbrt(0.75 * self.force * self.indenter_radius * area / self.modulus.value)
-        return chain(a, (-a / (3 * self.modulus.value), self.modulus), (a * (-2 * nu / (3 * area)), self.poisson_ratio))
+        a_rigid = chain(
+            a, (-a / (3 * self.modulus.value), self.modulus), (a * (-2 * nu / (3 * area)), self.poisson_ratio)
+        )
+        return a_rigid if self.tip is None else a_rigid / cbrt(1.0 - self.tip)
 
     @property
     def cbrt_load(self) -> Differentiated:
-        """L^(1/3) with which to enter the tables, which are for ν = 0.5: L = F/(R² E) · (0.75/(1 − ν²))²."""
+        """L^(1/3) with which to enter the tables, which are for ν = 0.5: L = F/(R² E) · (0.75/(1 − ν²))².
+
+        To the skin a tip that yields is a rigid one of radius R E'/E*.
+        """
         nu = self.poisson_ratio.value
         area = 1 - nu * nu
         x = np.cbrt(self.force / self.indenter_radius**2 / self.modulus.value * (0.75 / area) ** 2)
-        return chain(x, (-x / (3 * self.modulus.value), self.modulus), (x * (4 * nu / (3 * area)), self.poisson_ratio))
+        x_rigid = chain(
+            x, (-x / (3 * self.modulus.value), self.modulus), (x * (4 * nu / (3 * area)), self.poisson_ratio)
+        )
+        return x_rigid if self.tip is None else x_rigid * cbrt((1.0 - self.tip) ** 2.0)
 
 
 @dataclass
@@ -370,10 +382,11 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
 
     def by_parameters(quantity: Differentiated, otherwise: Floats | float) -> Differentiated:
         slopes = np.where(beyond, 0.0, quantity.slopes).reshape(-1, *shape)
-        by_load, by_root, by_poisson_ratio, by_slip = slopes
+        by_load, by_root, by_poisson_ratio, by_slip, by_tip = slopes
         terms = [(by_load, load), (by_poisson_ratio, contacts.poisson_ratio)]
         terms += [] if root is None else [(by_root, root)]
         terms += [] if slip is None else [(by_slip, slip)]
+        terms += [] if contacts.tip is None else [(by_tip, contacts.tip)]
         value = np.where(beyond.reshape(shape), otherwise, quantity.value.reshape(shape))
         return chain(value, *terms)
 
@@ -382,13 +395,14 @@ def _on_layer(contacts: Contacts, curves: ContactCurves) -> PressedContacts:
 
 
 def stiffness(contacts: Contacts, pressed: PressedContacts, curves: ContactCurves) -> Differentiated:
-    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the present contact radius, with the edge fixed and E' unrelaxed."""
+    """dF/dδ = 2 E' a S(a/h) [N/m] of the layer at the present contact radius, edge fixed, E* unrelaxed as E'."""
     alpha = pressed.a_over_h
     shape = alpha.value.shape
     at_radius = curves.stiffness_at(np.minimum(alpha.value, LARGEST_A_OVER_H).ravel())
-    by_alpha, by_poisson_ratio, by_slip = at_radius.slopes.reshape(-1, *shape)
+    by_alpha, by_poisson_ratio, by_slip, by_tip = at_radius.slopes.reshape(-1, *shape)
     terms = [(by_alpha, alpha), (by_poisson_ratio, contacts.poisson_ratio)]
     terms += [] if contacts.slip is None else [(by_slip, contacts.slip)]
+    terms += [] if contacts.tip is None else [(by_tip, contacts.tip)]
     result = chain(at_radius.value.reshape(shape), *terms) * alpha * contacts.thickness
     result = 2.0 * contacts.reduced_modulus * result
     return result if contacts.relaxed is None else result / contacts.relaxed

@@ -12,7 +12,8 @@ table(a, L, e) − table(a, 0, e) in contact with a half space, and the correcti
 for its ν, and a sphere that sticks what it has for friction. A layer that stiffens by Yeoh's law adds what it has for
 its c₂, in contact with a half space too, with the α of Hertz. The transform of the pressure is p̂ = s p̂_sphere + (1 −
 s) p̂_punch, s the sphere's share of the load; on the half space p̂_sphere is Hertz', 3 (sin x − x cos x)/x³, and
-p̂_punch sin x/x, x = k a/h; on the layer both come from its own contact (elastic_layer).
+p̂_punch sin x/x, x = k a/h; on the layer both come from its own contact (elastic_layer). To M a film that the layer's
+shear stretches adds its charge.
 
 A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond
 its a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to
@@ -246,7 +247,8 @@ class SigmaOfContacts:
 def layer_of(contacts: Contacts) -> Layer:
     """The linear layer of the contacts."""
     slip = 0.0 if contacts.slip is None else float(contacts.slip.value.flat[0])
-    return Layer(float(contacts.poisson_ratio.value.flat[0]), slip)
+    tip = 0.0 if contacts.tip is None else float(contacts.tip.value.flat[0])
+    return Layer(float(contacts.poisson_ratio.value.flat[0]), slip, tip)
 
 
 def incompressible(contacts: Contacts) -> bool:
@@ -256,8 +258,10 @@ def incompressible(contacts: Contacts) -> bool:
 
 
 def as_in_the_table(contacts: Contacts) -> bool:
-    """Whether contacts are those of the table: spheres without adhesion, on a bonded incompressible layer."""
-    return contacts.work_of_adhesion is None and contacts.slip is None and incompressible(contacts)
+    """Whether contacts are those of the table: spheres without adhesion, on a bonded incompressible layer, over a
+    film that is not stretched."""
+    changed = contacts.work_of_adhesion, contacts.slip, contacts.film
+    return changed == (None, None, None) and incompressible(contacts)
 
 
 def _transforms(
@@ -266,15 +270,21 @@ def _transforms(
     """p̂ · M · disc (quantities, …, contacts, k), with derivatives by a/h, rT/h and further variables; and these
     variables."""
     slip = np.zeros(1) if contacts.slip is None else contacts.slip.value
-    of_layer = [x for x in (contacts.poisson_ratio, contacts.slip) if x is not None and x.slopes.any()]
+    candidates = (contacts.poisson_ratio, contacts.slip, contacts.tip)
+    of_layer = [x for x in candidates if x is not None and x.slopes.any()]
     shape = _half_space_shape(k, pressed) if layer is None else _layer_shape(pressed, layer, moving=bool(of_layer))
-    transmission = Layer(contacts.poisson_ratio.value[..., None], slip[..., None]).transmission(k)
+    glued = Layer(contacts.poisson_ratio.value[..., None], slip[..., None])
+    transmission = glued.transmission(k)
+    of_film: list[tuple[Differentiated, Floats]] = []
+    if contacts.film is not None:
+        stretch, of_film = _film_charge(k, glued, *contacts.film, contacts.thickness)
+        transmission = transmission + stretch
     by_poisson_ratio, by_slip = transmission.slopes
     disc, by_rho = _disc(k, rho[..., None])
     passed = transmission.value * disc
     terms: list[tuple[tuple[Floats | float, Floats], ...]] = [((shape.value, passed),)]
     further = []
-    if any(x.slopes.any() for x in (pressed.a_over_h, contacts.thickness, *of_layer)):
+    if any(x.slopes.any() for x in (pressed.a_over_h, contacts.thickness, *of_layer, *(x for x, _ in of_film))):
         terms += [((shape.by_alpha, passed),), ((shape.value, transmission.value * by_rho),)]
         if pressed.sphere_share is not None:
             terms.append(((shape.by_share, passed),))
@@ -285,12 +295,34 @@ def _transforms(
         if contacts.slip in of_layer:
             terms.append(((shape.value, by_slip * disc), (shape.by_slip, passed)))
             further.append(contacts.slip)
+        if contacts.tip in of_layer:
+            terms.append(((shape.by_tip, passed),))
+            further.append(contacts.tip)
+        for variable, by_variable in of_film:
+            terms.append(((shape.value, by_variable * disc),))
+            further.append(variable)
     result = np.empty((len(terms), *np.broadcast_shapes(shape.value.shape, passed.shape)))
     for quantity, (first, *others) in zip(result, terms, strict=True):
         np.multiply(*first, out=quantity)
         for pressure, transmitted in others:
             quantity += pressure * transmitted
     return result, further
+
+
+def _film_charge(
+    k: Floats, layer: Layer, per_length: Differentiated, shear_lag: Differentiated, thickness: Differentiated
+) -> tuple[Differentiated, list[tuple[Differentiated, Floats]]]:
+    """Charge by the film's stretch beside that by pressure, c λ² k M_s/(1 + (λ k)²), by ν and the slip.
+
+    And its derivatives by c (`per_length` times h) and λ (`shear_lag` over h), with these variables.
+    """
+    c, lag = per_length * thickness, shear_lag / thickness
+    of_c, of_lag = (x.value[..., None] for x in (c, lag))
+    yielding = 1 / (1 + (of_lag * k) ** 2)
+    by_c = of_lag**2 * k * yielding
+    shear = layer.base_shear(k)
+    by_lag = of_c * (2 * of_lag) * k * yielding**2 * shear.value
+    return shear * (of_c * by_c), [(c, by_c * shear.value), (lag, by_lag)]
 
 
 @dataclass(frozen=True)
@@ -302,6 +334,7 @@ class _Shape:
     by_share: Floats
     by_poisson_ratio: Floats | float = 0.0
     by_slip: Floats | float = 0.0
+    by_tip: Floats | float = 0.0
 
 
 def _half_space_shape(k: Floats, pressed: PressedContacts) -> _Shape:
