@@ -156,7 +156,7 @@ def test_instrument_files_need_rig_tell_modulus(tmp_path: Path) -> None:
     assert re.search(r"^read force_n: 'Load \(N\)' in N: .* N$", told.stdout, re.MULTILINE)
     without = run("d33", str(tmp_path / "block.csv"))
     assert without.returncode == 2
-    assert "a rig description must say what its channels are; it has " in without.stderr
+    assert "a rig description must say what its channels are (`underskin read FILE --draft" in without.stderr
     assert "Compression (mm)" in without.stderr
     nowhere = run("d33", str(tmp_path / "block.csv"), "--rig", str(tmp_path / "none.yaml"))
     assert (nowhere.returncode, "none.yaml: cannot be opened" in nowhere.stderr) == (2, True)

@@ -41,7 +41,8 @@ def test_raw_curve_diagnosed_rig_description(tmp_path: Path) -> None:
     asked = ["diagnose", str(file), *fewer, "--output-dir", str(tmp_path / "reports")]
     without = CliRunner().invoke(app, asked)
     assert without.exit_code == 2
-    assert "a rig description must say what its channels are; it has Piezo [nm], Deflection [nm]" in without.stderr
+    assert "a rig description must say what its channels are (" in without.stderr
+    assert "; it has Piezo [nm], Deflection [nm]" in without.stderr
     assert "names from line 2, units from line 3" in without.stderr
     told = CliRunner().invoke(app, [*asked, "--rig", str(rig)])
     assert told.exit_code == 0

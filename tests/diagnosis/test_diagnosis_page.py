@@ -317,7 +317,7 @@ def test_curves_explained_adhesion_alone_page() -> None:
     assert modulus["low"] <= 0.5 <= modulus["high"]
     assert report["fit"]["after"]["heldout_rmse_percent"] < 1.2 * report["fit"]["noise_floor_percent"]
     said = Tags(text).text.replace(" ", "")
-    assert f"addstothelaw.{modulus['value']:.4g}" in said
+    assert f"addtothelaw.{modulus['value']:.4g}" in said
     assert set(figures_in(text)) == {"where", "curve", "before_after", "explanations", "parameters"}
     titles = [axis.title.text for axis in adhesive_figure().select_yaxes()]
     assert titles == ["force [N]", "residual<br>before [mN]", "residual<br>after [mN]"]
