@@ -37,7 +37,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_STUCK = 1.0  # nats that a fit from other starts must gain
 _SMOOTH_ERROR = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
 _ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
 _DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted
