@@ -582,14 +582,15 @@ def reading_steps(travel: Floats, force: Floats) -> Floats:
     """The jump of the travel's reading before each sample (samples,), 0 where there is none.
 
     A sphere or platen that moves so fast takes the force with it, at least by the secant stiffness of the curve: at a
-    step of the reading alone, as between the segments of a file, the force stays. In the air nothing shows.
+    step of the reading alone, as between the segments of a file, the force stays. In the air nothing shows, and the
+    last sample is no segment.
     """
     moved, changed = np.diff(travel, prepend=travel[0]), np.diff(force, prepend=force[0])
     steps, noise = np.zeros(len(travel)), roughness(force)
     least = _SUDDEN * max(roughness(travel), 1e-3 * float(np.ptp(travel)))
     loaded = np.abs(force - force[0])
     stiffness = loaded.max() / max(float(np.ptp(travel)), 1e-300)
-    for sample in np.flatnonzero(np.abs(moved) > least).tolist():
+    for sample in np.flatnonzero(np.abs(moved[:-1]) > least).tolist():
         beside = np.abs(np.delete(moved[max(sample - _BESIDE, 1) : sample + _BESIDE + 1], min(sample - 1, _BESIDE)))
         expected = stiffness * abs(moved[sample])
         is_loaded = loaded[sample] > _SUDDEN * noise and expected > _SUDDEN * max(noise, abs(changed[sample]))
