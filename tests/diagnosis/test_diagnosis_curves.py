@@ -400,7 +400,8 @@ def test_adhesion_gel_liquid_leaves_modulus(work: float, table: SigmaTable) -> N
 
 def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     """A soft gel under a cantilever in a liquid: the zeros of both ways differ, the force steps where it turns, and
-    threads of gel let go gradually, without a visible pull-off. E, 15 kPa, and the drag lie in their intervals."""
+    threads of gel let go gradually, without a jump. Adhesion and drag lead; E, 15 kPa, and the drag lie in their
+    intervals, that of E as wide as a stage that gives would have it."""
     travel = 1e-3 * np.concatenate([np.linspace(-3.0, 0.17, 1200), np.linspace(0.17, -3.0, 1201)[1:]])  # mm
     time = 5e-4 * np.arange(len(travel))
     force = 16 / 9 * 0.015 * np.sqrt(0.010) * np.maximum(travel, 0.0) ** 1.5
@@ -411,13 +412,14 @@ def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     force += 3e-3 * largest * np.random.default_rng(4).normal(size=len(time))
     recording = IndentationRecording("gel", 0.010, travel, force, time_s=np.asarray(time, dtype=np.float64))
     measured = Campaign("gel", SkinDescription(poisson_ratio=0.5), (recording,), units_checked=True)
-    report = underskin.diagnose(measured, without=beside("liquid_drag", "instrument_compliance"))
-    assert report.verdict == "explained", report.statement
-    assert [mechanism.name for mechanism in report.mechanisms] == ["liquid_drag"]
+    report = underskin.diagnose(measured, without=beside("liquid_drag", "instrument_compliance", "adhesion"))
+    assert {mechanism.name for mechanism in report.mechanisms} == {"liquid_drag", "adhesion"}, report.statement
     assert report.fit is not None
-    modulus, (found,) = report.fit.after.youngs_modulus, report.mechanisms[0].parameters
+    modulus = report.fit.after.youngs_modulus
+    (found,) = (mechanism.parameters[0] for mechanism in report.mechanisms if mechanism.name == "liquid_drag")
     assert modulus is not None
     assert modulus.low is not None
     assert modulus.high is not None
-    assert modulus.low <= 0.015 <= modulus.high < 1.5 * modulus.low
+    assert modulus.low <= 0.015 <= modulus.high
+    assert modulus.value == pytest.approx(0.015, rel=0.1)
     assert found.low <= drag <= found.high
