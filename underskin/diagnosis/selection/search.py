@@ -1,7 +1,7 @@
 """Which sets of mechanisms are fitted; `answers` makes their probabilities.
 
 Nothing and every single are fitted. Sets of two and three guesses grow from the best, one mechanism at a time; in any
-case all pairs are fitted of curves, and of laws of declared values, material, contact and increment: two may cancel.
+case all pairs are tried of curves, and of laws of declared values, material, contact and increment: two may cancel.
 So may the laws that are no guesses, contact with the layer itself and its moving edge: every single is fitted beside
 both. A fit that
 begins at one mechanism's best parameters may end where the other one does not show, since two laws that bend a curve
