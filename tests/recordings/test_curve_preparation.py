@@ -9,7 +9,8 @@ from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
 from underskin.recordings import rig_description
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, from_dict
+from underskin.recordings.curve_course import contact_events
 from underskin.recordings.curve_preparation import falling, periodic_error
 from underskin.recordings.damaged_readings import marks, spikes
 from underskin.recordings.plausibility import at_reading, implausible
@@ -127,6 +128,36 @@ def test_a_step_of_the_reading_is_taken_out() -> None:
     assert finding.code == "reading_steps"
     assert finding.arguments["step_mm"] == pytest.approx(0.02, rel=0.15)
     assert modulus_mpa(campaign(read, pressed(depth))) == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_wrong_last_reading_is_no_step() -> None:
+    """Nothing follows that would say by how much the reading jumped: no sample is lost."""
+    depth = ways(-0.1, 0.3)
+    read = np.append(depth[:-1], depth[-1] + 0.05)
+    assert implausible(campaign(read, pressed(depth))) == []
+
+
+def test_lost_rows_on_a_plateau_are_no_step_of_the_reading() -> None:
+    """A foam's force stays on its plateau, also where the file lacks samples of it."""
+    strain = np.concatenate([np.linspace(0.0, 0.2, 100), np.linspace(0.25, 0.85, 200)])
+    force = np.minimum(strain / 0.05, 1.0) + 40.0 * np.maximum(strain - 0.6, 0.0) ** 2
+    foam = {"id": "foam", "kind": "compression", "sample_height_mm": 20.0, "sample_diameter_mm": 20.0}
+    foam |= {"displacement_mm": (20 * strain).tolist(), "force_n": force.tolist()}
+    document = {"schema": "campaign/1", "name": "foam", "skin": {"poisson_ratio": 0.3}, "recordings": [foam]}
+    read, problems = from_dict(document)
+    assert problems == []
+    assert "reading_steps" not in {finding.code for finding in implausible(read)}
+
+
+@pytest.mark.parametrize("drift", [-1e-3, 3e-4])
+def test_a_drift_is_no_part_of_a_pull_off(drift: float) -> None:
+    """The force of an event is that beside the air at its time, also where the air drifts [N/s]."""
+    depth = ways(-3.0, 0.3, -3.0, samples=1000)
+    back, load = np.arange(len(depth)) >= 1000, hertz(np.array(0.3))
+    sticks = np.where(back & (depth > -0.1), 0.1 * load * np.clip(1 - depth / 0.3, 0.0, 1.0), 0.0)
+    force = pressed(depth, noise=1e-4) - sticks + drift * 0.02 * np.arange(len(depth))
+    (event,) = contact_events(campaign(depth, force).curves[0])
+    assert event.arguments["events"]["pull_off"]["force_n"] == pytest.approx(-0.1 * load, rel=0.1)
 
 
 def test_a_snap_in_is_no_step_of_the_reading() -> None:

@@ -210,6 +210,20 @@ def test_sound_files(kind: Any) -> None:
     assert recording.charge_pc == pytest.approx(CHARGE, abs=precision)
 
 
+def test_a_sound_file_without_samples_is_refused() -> None:
+    with pytest.raises(FileError, match="holds no samples"):
+        contents(wav(np.zeros(0), np.int16), "run.wav")
+
+
+def test_cells_of_structures_and_numbers_are_left_out() -> None:
+    """A cell array that mixes them does not keep the channels beside it from being read."""
+    mixed = np.empty(2, dtype=object)
+    mixed[:] = [{"gain": 2.0}, FORCE]
+    found = contents(matlab_5({"notes": mixed, "force": FORCE}), "run.mat")
+    assert [channel.name for channel in found.blocks[0].channels] == ["force"]
+    assert any(warning.startswith("'notes': no numbers") for warning in found.warnings)
+
+
 @pytest.mark.parametrize(
     ("data", "name", "how"),
     [

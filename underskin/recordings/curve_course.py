@@ -177,11 +177,13 @@ def contact_events(curve: CurveRecording) -> list[Finding]:
     if not (curve.has_sphere and len(force)):
         return []
     seen = curve_landmarks(displacement, force, *time)
+    clock = time[0] if time else np.arange(float(len(force)))
+    in_air = seen.zero + seen.drift * (clock - (np.median(clock[seen.air]) if seen.drift else 0.0))
     events = {
         name: {
             "displacement_mm": float(displacement[sample]),
             "time_s": float(time[0][sample]) if time else None,
-            "force_n": float(force[sample]) - seen.zero,
+            "force_n": float(force[sample] - in_air[sample]),
         }
         for name, sample in (("snap_in", seen.snap_in), ("pull_off", seen.detaches))
         if sample is not None

@@ -581,15 +581,16 @@ _SUDDEN = 6.0  # least ratio of a step of the reading to these, and to noise
 def reading_steps(travel: Floats, force: Floats) -> Floats:
     """The jump of the travel's reading before each sample (samples,), 0 where there is none.
 
-    A sphere or platen that moves so fast takes the force with it, at least by the secant stiffness of the curve: at a
-    step of the reading alone, as between the segments of a file, the force stays. In the air nothing shows.
+    A sphere that moves so fast takes the force with it, at least by the secant stiffness of the curve (which a foam
+    between platens does not): at a step of the reading alone, as between the segments of a file, the force stays. In
+    the air nothing shows, and the last sample is no segment.
     """
     moved, changed = np.diff(travel, prepend=travel[0]), np.diff(force, prepend=force[0])
     steps, noise = np.zeros(len(travel)), roughness(force)
     least = _SUDDEN * max(roughness(travel), 1e-3 * float(np.ptp(travel)))
     loaded = np.abs(force - force[0])
     stiffness = loaded.max() / max(float(np.ptp(travel)), 1e-300)
-    for sample in np.flatnonzero(np.abs(moved) > least).tolist():
+    for sample in np.flatnonzero(np.abs(moved[:-1]) > least).tolist():
         beside = np.abs(np.delete(moved[max(sample - _BESIDE, 1) : sample + _BESIDE + 1], min(sample - 1, _BESIDE)))
         expected = stiffness * abs(moved[sample])
         is_loaded = loaded[sample] > _SUDDEN * noise and expected > _SUDDEN * max(noise, abs(changed[sample]))
@@ -681,7 +682,7 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
 
 def _without_steps(curve: CurveRecording, _: Orientation) -> tuple[CurveRecording, list[Finding]]:
     finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-    if len(finite) < _LEAST:
+    if not curve.has_sphere or len(finite) < _LEAST:
         return curve, []
     steps = reading_steps(curve.displacement_mm[finite], curve.force_n[finite])
     if not steps.any():

@@ -15,7 +15,7 @@ import numpy as np
 
 from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import KINDS, SCHEMA
-from underskin.recordings.channels import Block, Channel, Contents, Values, text_left_out
+from underskin.recordings.channels import Block, Channel, Contents, TextColumn, Values, text_left_out
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.damaged_readings import marks, spikes
 from underskin.recordings.readers import channel_arithmetic
@@ -560,6 +560,9 @@ def _rows_of_recordings(rig: RigDescription, block: Block, file: str) -> list[Bl
 
     Raises FileError where a column has too many values to tell recordings apart.
     """
+    held = [block.words(signal.channel) for signal in rig.row_fields]
+    texts = (_filled(column) if any(column is words for words in held) else column for column in block.texts)
+    block = replace(block, texts=tuple(texts))
     columns = {signal.channel: _codes(block, signal.channel) for signal in rig.row_fields}
     if not columns:
         return [block]
@@ -585,13 +588,18 @@ def _rows_of_recordings(rig: RigDescription, block: Block, file: str) -> list[Bl
     ]
 
 
+def _filled(column: TextColumn) -> TextColumn:
+    """A column of words in which an empty cell repeats the one above."""
+    filled = np.array([bool(text) for text in column.texts])[column.codes]
+    above = np.maximum.accumulate(np.where(filled, np.arange(len(filled)), 0))
+    return replace(column, codes=column.codes[above])
+
+
 def _codes(block: Block, name: str) -> Indices:
-    """The rows of a column, (rows,), as the indices of their different values; an empty cell repeats the one above."""
+    """The rows of a column, (rows,), as the indices of their different values."""
     words, channel = block.words(name), block.headed(name)
     if words is not None:
-        filled = np.array([bool(text) for text in words.texts])[words.codes]
-        above = np.maximum.accumulate(np.where(filled, np.arange(len(filled)), 0))
-        return words.codes[above]
+        return words.codes
     assert channel is not None
     return np.unique(channel.values, return_inverse=True)[1]
 

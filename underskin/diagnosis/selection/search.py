@@ -1,7 +1,7 @@
 """Which sets of mechanisms are fitted; `answers` makes their probabilities.
 
 Nothing and every single are fitted. Sets of two and three guesses grow from the best, one mechanism at a time; in any
-case all pairs are fitted of curves, and of laws of declared values, material, contact and increment: two may cancel.
+case all pairs are tried of curves, and of laws of declared values, material, contact and increment: two may cancel.
 So may the laws that are no guesses, contact with the layer itself and its moving edge: every single is fitted beside
 both. A fit that
 begins at one mechanism's best parameters may end where the other one does not show, since two laws that bend a curve
@@ -37,7 +37,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_STUCK = 1.0  # nats that a fit from other starts must gain
 _SMOOTH_ERROR = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
 _ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
 _DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted

@@ -68,8 +68,12 @@ def _walk(structure: Mapping[str, Any], path: str, depth: int, found: _Found, fi
             found.properties[here] = value
         elif isinstance(value, bool | int | float | np.number):
             found.properties[here] = float(np.real(value))
-        elif not isinstance(value, np.ndarray | list | tuple) or not _add_array(
-            np.asarray(value), Channel(name, label, np.zeros(0)), here, (channels, texts, inner)
+        elif not isinstance(value, np.ndarray | list) or not _add_array(
+            # lists are cells, with structures among them
+            np.asarray(value, dtype=object if isinstance(value, list) else None),
+            Channel(name, label, np.zeros(0)),
+            here,
+            (channels, texts, inner),
         ):
             found.left_out.append(here)
     if channels:

@@ -19,18 +19,18 @@ _OF_8_BITS = 128  # the level of silence
 def read(stream: BinaryIO, file: str) -> Contents:
     """The channels of a WAV file; raises FileError where it is none."""
     stream.seek(0)
-    with damage_said(file, "", lambda error: f"is no WAV file that can be read: {error}"):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")  # of chunks that hold no samples
-            try:
-                rate, samples = wavfile.read(stream)
-            except MemoryError:
-                raise FileError(
-                    file, "", "declares more samples than the file holds, or than there is memory"
-                ) from None
-        samples = samples.reshape(len(samples), -1)
+    with (
+        damage_said(file, "", lambda error: f"is no WAV file that can be read: {error}"),
+        warnings.catch_warnings(record=True) as caught,
+    ):
+        warnings.simplefilter("always")  # of chunks that hold no samples
+        try:
+            rate, samples = wavfile.read(stream)
+        except MemoryError:
+            raise FileError(file, "", "declares more samples than the file holds, or than there is memory") from None
     if not len(samples) or rate <= 0:
         raise FileError(file, "", "holds no samples")
+    samples = samples.reshape(len(samples), -1)
     if samples.dtype.kind == "u":
         scaled = (samples.astype(np.float64) - _OF_8_BITS) / _OF_8_BITS
     elif samples.dtype.kind == "i":
