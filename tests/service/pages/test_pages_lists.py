@@ -152,13 +152,13 @@ def test_pages_dark_reader_prefers(dark: Visit, place: str) -> None:
         dark.require_accessible()
 
 
-def test_titles_of_panels_stay_apart_on_a_phone(visitor: Visit) -> None:
+def test_titles_of_panels_stay_apart_on_a_phone(visitor: Visit, server: Server) -> None:
     page = visitor.page
     page.set_viewport_size({"width": 390, "height": 844})
     document = campaign("many preloads", lines=4)
     one = document["recordings"][0]
     document["recordings"] = [{**one, "id": f"r{number}", "preload_n": 0.5 + 0.1 * number} for number in range(10)]
-    kept = visitor.page.request.post(f"{visitor.address}/v1/campaigns?skin=phone", data=document).json()["id"]
+    kept = server.http.post("/v1/campaigns", params={"skin": "phone"}, json=document).json()["id"]
     visitor.go(f"/campaigns/{kept}")
     page.locator("#figure-frf .plot").scroll_into_view_if_needed()
     page.locator("#figure-frf .main-svg").first.wait_for()

@@ -106,7 +106,6 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
         page.wait_for_url("**/skins/example")
         page.get_by_text("Name, notes and tags").click()
         page.get_by_label("Notes").fill("a scratch")
-        page.wait_for_load_state("networkidle")  # what the page asks for without a cookie would fail
         page.context.clear_cookies()
         page.get_by_role("button", name="Save").click()
         page.wait_for_url("**/login?next=/skins/example&unsent=1")
@@ -114,6 +113,7 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
         page.get_by_label("Key").fill(keys["write"])
         page.get_by_role("button", name="Log in").click()
         page.wait_for_url("**/skins/example")  # the page of the form
+        somebody.wrong.clear()  # what the page asked for without a cookie was refused
         page.wait_for_function("() => document.querySelector('[name=remark]')?.value === 'a scratch'")
         page.get_by_role("button", name="Save").click()
         page.get_by_text("a scratch").first.wait_for()
@@ -125,6 +125,7 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
         assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
         page.get_by_role("button", name="Log out").click()
         page.wait_for_url("**/login")
+        somebody.wrong.clear()  # so was what it still asked for
         somebody.go("/")
         page.wait_for_url("**/login?next=/")
 
