@@ -13,8 +13,8 @@ from underskin.units import to_lab
 
 if TYPE_CHECKING:
     from underskin.inversion.invert import Inversion
-    from underskin.recordings.frf.flat_zone import FrfSpread
     from underskin.recordings.frf.spectra import Frf
+    from underskin.recordings.frf.thinned_lines import FrfSpread
 
 MOST_SINGLE = 48  # recordings whose lines are drawn one by one, from the recordings
 _RANGES = ("magnitude_pc_per_n", "phase_deg", "coherence")
@@ -66,7 +66,7 @@ def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
 
 def spreads(cached: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
     """Those of `numbers` again."""
-    from underskin.recordings.frf.flat_zone import FrfSpread
+    from underskin.recordings.frf.thinned_lines import FrfSpread
 
     return [
         FrfSpread(
@@ -98,10 +98,10 @@ def _preload_columns(campaign: Campaign, inversion: "Inversion") -> dict[str, li
 
 def spreads_of(measured_frfs: "Sequence[tuple[FrfRecording, Frf]]") -> "list[FrfSpread]":
     """FRFs of recordings alike."""
-    from underskin.recordings.frf import flat_zone
+    from underskin.recordings.frf import thinned_lines
 
     conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in measured_frfs]
-    return flat_zone.spreads([frf for _, frf in measured_frfs], conditions)
+    return thinned_lines.spreads([frf for _, frf in measured_frfs], conditions)
 
 
 def _plain(spread: "FrfSpread") -> dict[str, Any]:

@@ -173,9 +173,10 @@ def test_a_pull_off_without_a_jump_is_an_event() -> None:
     assert [mechanism.name for mechanism in report.mechanisms] == ["adhesion"]
     assert modulus_mpa(report) == pytest.approx(1.0, rel=0.1)
     (told,) = (finding.statement for finding in report.findings if finding.code == "contact_events")
-    place, force = map(float, re.search(r"comes off at (\S+) mm .* from (\S+) N", told).groups())  # type: ignore[union-attr]
-    assert place == pytest.approx(0.0, abs=0.03)
-    assert force == pytest.approx(-0.1 * press.max(), rel=0.1)
+    comes_off = re.search(r"comes off at (\S+) mm .* from (\S+) N", told)
+    assert comes_off is not None
+    assert float(comes_off[1]) == pytest.approx(0.0, abs=0.03)
+    assert float(comes_off[2]) == pytest.approx(-0.1 * press.max(), rel=0.1)
 
 
 def test_displacement_wrong_sign_turned_told() -> None:

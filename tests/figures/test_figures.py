@@ -12,7 +12,7 @@ from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, d33_history
 from underskin.figures.traces import raw_traces
 from underskin.recordings.channels import Channel
-from underskin.recordings.frf.flat_zone import FrfLines, FrfSpread
+from underskin.recordings.frf.thinned_lines import FrfLines, FrfSpread
 
 SDS_OF_95 = 1.959963984540054  # half the width of a 95 % interval of a normal distribution
 

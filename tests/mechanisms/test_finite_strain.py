@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from rig.solved.layer import Material, PressedLayer, Sublayer
 from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted
-from underskin.mechanisms.models.indentation import Layers, Sphere, Stiffening, layer_ratios
+from underskin.mechanisms.models.sphere_contact import Layers, Sphere, Stiffening, layer_ratios
 from underskin.mechanisms.models.sphere_kernels import LARGEST_CBRT_LOAD
 from underskin.physics.sphere_law import SphereLaw
 from underskin.recordings.campaign import Campaign, IndentationRecording

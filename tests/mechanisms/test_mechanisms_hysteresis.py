@@ -9,7 +9,7 @@ from tests.mechanisms.indentation_loops import E_MPA, NO_CREEP, R_MM, REDUCED, T
 from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted, table
 from underskin.mechanisms import Unsupported, compose
 from underskin.mechanisms.laws import contact_creep
-from underskin.mechanisms.models.indentation import Sphere, Stiffening
+from underskin.mechanisms.models.sphere_contact import Sphere, Stiffening
 from underskin.recordings.campaign import Campaign, IndentationRecording
 from underskin.units import Floats
 

@@ -11,8 +11,9 @@ from underskin.inversion import elastomer
 from underskin.recordings import rig_description
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.curve_course import contact_events
-from underskin.recordings.curve_preparation import falling, periodic_error
+from underskin.recordings.curve_preparation import falling
 from underskin.recordings.damaged_readings import marks, spikes
+from underskin.recordings.periodic_error import periodic_error
 from underskin.recordings.plausibility import at_reading, implausible
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,7 @@ import pytest
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording, parse
-from underskin.recordings.frf import flat_zone as summary
+from underskin.recordings.frf import thinned_lines
 from underskin.recordings.frf.estimation import common_delay, lines_of, without_delay
 from underskin.recordings.frf.flat_zone import (
     Condition,
@@ -151,8 +151,8 @@ def test_sine_mains_beside_idle_lines_no_pick() -> None:
     assert (zone.low_hz, zone.high_hz, zone.left_out_hz) == (5.0, 110.0, ())
     assert "high-pass" not in zone.reason
     assert zone.holds(frequency).tolist() == sines.tolist()
-    assert summary.lines_of("r", frfs[0]).frequency_hz.tolist() == frequency[sines].tolist()
-    (first, _) = summary.spreads(frfs, [(4.0, 1.0), (4.0, 2.0)] * 2)
+    assert thinned_lines.lines_of("r", frfs[0]).frequency_hz.tolist() == frequency[sines].tolist()
+    (first, _) = thinned_lines.spreads(frfs, [(4.0, 1.0), (4.0, 2.0)] * 2)
     assert first.frequency_hz.tolist() == frequency[sines].tolist()
 
 

@@ -10,7 +10,7 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.page_styles import LEAST_PHASE, WHOLE_NUMBERS, decade_ticks, is_logarithmic
 from underskin.figures.style import ZONE, label, line_style, marked, styled
-from underskin.recordings.frf.flat_zone import FrfLines, FrfSpread
+from underskin.recordings.frf.thinned_lines import FrfLines, FrfSpread
 from underskin.units import Floats
 
 PlotlyTrace = dict[str, Any]

@@ -98,6 +98,8 @@ _HIDDEN = 24.0  # times the noise: least travel of a sphere moving for as long a
 _FITTED, _LEAST_FITTED, _CLOSER = 200, 40, 3  # samples of the fit of a drift in air; refinements of its grid
 _LEAST_AIR, _SHORTER = 0.1, 0.9  # least share of samples in air; factor by which that part is shortened until straight
 _PLAIN = 60.0  # least F statistic of a drift
+RETURN = 0.05  # of the range of displacement: smaller returns are noise
+_SAMPLED = 20_000  # samples among which turns are sought
 _BACK = 0.25  # of the range of displacement, from its start
 _QUIET = 3e-3  # noise of a quiet force, of its range
 _STRAIGHT = 1.5  # times the noise: largest scatter of samples about the line of a drift
@@ -158,7 +160,7 @@ def visible_contact(displacement: Floats, force: Floats, time: Floats | None) ->
     """
     seen = curve_landmarks(displacement, force, time)
     number = np.arange(len(force))
-    returns = float(displacement[seen.turn] - displacement[-1]) > _RETURN * float(np.ptp(displacement))
+    returns = float(displacement[seen.turn] - displacement[-1]) > RETURN * float(np.ptp(displacement))
     in_contact = number >= (0 if seen.snap_in is None else seen.snap_in)
     if seen.pull_off is not None:
         in_contact &= number < seen.pull_off
@@ -191,6 +193,24 @@ def contact_events(curve: CurveRecording) -> list[Finding]:
     return [Finding(Reason.CONTACT_EVENTS, curve.id, "force_n", {"events": events})] if events else []
 
 
+def turning_points(travel: Floats) -> Indices:
+    """The samples between which the travel is monotonic, except for returns below a twentieth of its range; includes
+    the first and the last sample."""
+    at = np.unique(np.linspace(0, len(travel) - 1, min(len(travel), _SAMPLED)).round().astype(np.intp))
+    values, least = travel[at].tolist(), RETURN * float(np.ptp(travel))
+    turns, extreme, direction = [0], 0, 0
+    for index, value in enumerate(values):
+        if direction == 0:
+            if abs(value - values[0]) > least:
+                direction, extreme = (1 if value > values[0] else -1), index
+        elif (value - values[extreme]) * direction >= 0:
+            extreme = index
+        elif (values[extreme] - value) * direction > least:
+            turns.append(extreme)
+            direction, extreme = -direction, index
+    return at[np.unique([*turns, len(values) - 1])]
+
+
 def foot(displacement: Floats, force: Floats) -> int | None:
     """The sample of an approach (samples,) from which the force rises by Hertz's law; None for too few samples.
 
@@ -212,12 +232,9 @@ def foot(displacement: Floats, force: Floats) -> int | None:
     return int(np.argmax(displacement > _least(travel, misfit)[1]))
 
 
-_RETURN = 0.05  # of the range of displacement: smaller returns are noise
-
-
 def presses_again(displacement: Floats) -> bool:
     """Whether a curve is loaded again after its way back, by more than a twentieth of its range."""
-    least = _RETURN * np.ptp(displacement)
+    least = RETURN * np.ptp(displacement)
     returned = np.flatnonzero(np.maximum.accumulate(displacement) - displacement > least)
     after = displacement[returned[0] :] if len(returned) else displacement[:1]
     return bool((after - np.minimum.accumulate(after)).max() > least)

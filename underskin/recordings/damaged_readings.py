@@ -1,4 +1,4 @@
-"""Readings of a force that are none: marks that an instrument writes in their place, and spikes."""
+"""Readings that are none: of a force marks that an instrument writes in their place, and spikes; of a travel jumps."""
 
 import numpy as np
 
@@ -57,3 +57,28 @@ def spikes(force: Floats) -> Mask:
     inside = np.flatnonzero(~beyond)
     lasting = np.diff(inside).max(initial=1) > 3 or beyond[0] or beyond[-1]
     return none if lasting or not high > low else beyond
+
+
+_BESIDE = 5  # samples on either side of a step, whose steps are compared with it
+_SUDDEN = 6.0  # least ratio of a step of the reading to these, and to noise
+
+
+def reading_steps(travel: Floats, force: Floats) -> Floats:
+    """The jump of the travel's reading before each sample (samples,), 0 where there is none.
+
+    A sphere that moves so fast takes the force with it, at least by the secant stiffness of the curve (which a foam
+    between platens does not): at a step of the reading alone, as between the segments of a file, the force stays. In
+    the air nothing shows, and the last sample is no segment.
+    """
+    moved, changed = np.diff(travel, prepend=travel[0]), np.diff(force, prepend=force[0])
+    steps, noise = np.zeros(len(travel)), roughness(force)
+    least = _SUDDEN * max(roughness(travel), 1e-3 * float(np.ptp(travel)))
+    loaded = np.abs(force - force[0])
+    stiffness = loaded.max() / max(float(np.ptp(travel)), 1e-300)
+    for sample in np.flatnonzero(np.abs(moved[:-1]) > least).tolist():
+        beside = np.abs(np.delete(moved[max(sample - _BESIDE, 1) : sample + _BESIDE + 1], min(sample - 1, _BESIDE)))
+        expected = stiffness * abs(moved[sample])
+        is_loaded = loaded[sample] > _SUDDEN * noise and expected > _SUDDEN * max(noise, abs(changed[sample]))
+        if is_loaded and len(beside) and abs(moved[sample]) > _SUDDEN * beside.max():
+            steps[sample] = moved[sample] - np.median(moved[sample + 1 : sample + 1 + _BESIDE])
+    return steps

@@ -73,14 +73,19 @@ _FIRST_WORD = re.compile(r"(?P<first>[^\s_:]+)[\s_:]+(?P<rest>\S.*)")
 
 
 class Column(Protocol):
-    """A channel's name, its unit as labelled, and whether its values are complex."""
+    """A channel, without its values."""
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str:
+        """As the file has it."""
+
     @property
-    def unit(self) -> str: ...  # noqa: D102
+    def unit(self) -> str:
+        """As labelled; empty without one."""
+
     @property
-    def is_complex(self) -> bool: ...  # noqa: D102
+    def is_complex(self) -> bool:
+        """Whether its values are complex."""
 
 
 @dataclass(frozen=True)

