@@ -380,6 +380,11 @@ class Fitter:
         fit[:, index] = np.clip(fit[:, index] + change, self.low[index], self.high[index])
         return replace(points, fit=fit), np.exp(fit[:, index] - points.fit[:, index])
 
+    def rescaled(self, points: Points) -> Evaluated:
+        """The points of FRFs with the most probable d33 of each, and derivatives."""
+        products = self.products(points, slopes=True, place=self.has_position_scatter)
+        return self._with_d33(self.weighed(*self._scaled(points, products, self._ratio(points, products))))
+
     def _with_d33(self, at: Evaluated) -> Evaluated:
         """With the most probable d33 at these noise levels; needs no further prediction."""
         information, gradient = self.posterior_equations(at)

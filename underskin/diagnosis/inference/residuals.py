@@ -197,7 +197,7 @@ def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
     covariance, sensor_log_gain = (
         np.tile(values, (len(fit), 1)) for values in (point.covariance, point.sensor_log_gain)
     )
-    initial = held.evaluate(Points(fit, covariance, sensor_log_gain))
+    initial = held.rescaled(Points(fit, covariance, sensor_log_gain))
     fitted = held.descend(initial, 1, lambda at: np.full(len(at), cost + MAY_MATTER_NATS))
     return fitted[np.flatnonzero(fitted.cost < cost + MAY_MATTER_NATS)]
 

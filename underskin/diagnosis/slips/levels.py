@@ -24,7 +24,6 @@ from itertools import product
 from math import log
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 from scipy.stats import qmc
 
@@ -243,19 +242,25 @@ def _by_cause(levels: Levels, columns: Floats, alternatives: Sequence[Alternativ
     values = [levels.value - (none if one.offset is None else one.offset) for one in alternatives]
     right = np.stack([*values, *(none if one.column is None else one.column for one in alternatives)], axis=1)
     evidence, amplitude = np.full(count, -np.inf), np.zeros(count)
+    scatters = np.array(_SCATTER)
+    prior = _SCATTER_PRIOR.log_density(np.log(scatters))
     for spread, position_scatter in product(levels.spreads, levels.position_scatters):
         fixed = levels.expected(spread, columns) + np.diag((levels.slope * position_scatter) ** 2)
-        for scatter in _SCATTER:
-            root = np.linalg.cholesky(fixed + scatter**2 * np.eye(len(none)))
-            white = solve_triangular(root, right, lower=True, check_finite=False)
-            value, column = white[:, :count], white[:, count:]
-            size = 1 + (column**2).sum(axis=0)
-            best = (value * column).sum(axis=0) / size
-            density = 0.5 * (size * best**2 - np.log(size) - (value**2).sum(axis=0)) - np.log(np.diag(root)).sum()
-            density += float(_SCATTER_PRIOR.log_density(log(scatter)))
-            better = density > evidence
-            evidence = np.where(better, density, evidence)
-            amplitude = np.where(better, best, amplitude)
+        eigenvalues, vectors = np.linalg.eigh(fixed)  # of all s: C = V (Λ + s²) Vᵀ
+        turned = vectors.T @ right
+        value, column = turned[:, :count], turned[:, count:]
+        variance = np.maximum(eigenvalues, 0.0) + scatters[:, None] ** 2
+        square, along, size = (1 / variance) @ np.stack(
+            [value**2, value * column, column**2]
+        )  # (scatters, alternatives)
+        best = along / (1 + size)
+        density = (
+            0.5 * (along * best - np.log1p(size) - square - np.log(variance).sum(axis=1)[:, None]) + prior[:, None]
+        )
+        chosen = density.argmax(axis=0), np.arange(count)
+        better = density[chosen] > evidence
+        evidence = np.where(better, density[chosen], evidence)
+        amplitude = np.where(better, best[chosen], amplitude)
     return Explained(evidence, amplitude)
 
 
