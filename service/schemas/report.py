@@ -21,6 +21,7 @@ from service.schemas.report_several import (
 from underskin.findings.codes import FindingCode
 
 Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
+Origin = Literal["skin", "rig", "chain"]
 RecordingKind = Literal["frf", "indentation", "compression"]
 
 
@@ -53,6 +54,9 @@ class ReportMechanism(BaseModel):
     """A mechanism that the recordings ask for."""
 
     name: str = Field(description="Its name in the catalogue.", examples=["contact_resonance"])
+    origin: Origin | None = Field(
+        default=None, alias="of", description="What it belongs to: the skin, the rig or the measuring chain."
+    )
     probability: float = Field(description="Posterior that it is there, 0 to 1.")
     parameters: list[Parameter] = Field(description="How strong it is.")
     explains_percent: float | None = Field(
@@ -100,6 +104,15 @@ class Idealised(BaseModel):
     name: str = Field(description="Its name.")
     probability: float = Field(description="Posterior that it is there, summed over the answers.")
     effect_percent: float | None = Field(description="What it changes of the response, root mean square [%].")
+
+
+class Remainder(BaseModel):
+    """What an explanation of curves leaves beyond the noise."""
+
+    percent: float = Field(description="Its size in percent of the largest force [%].")
+    over_noise: float = Field(description="Its size over a sample's noise [-].")
+    axis: str = Field(description="The axis along which it was looked for.", examples=["displacement_mm"])
+    statement: str = Field(description="The same in words, with the place where it is largest.")
 
 
 class Power(BaseModel):
@@ -174,6 +187,7 @@ class Report(BaseModel):
     campaigns: list[str] | None = Field(default=None, description="Of several: the names of all.")
     verdict: Verdict = Field(description="What the probabilities say; docs/diagnosis.md explains each.")
     probability: float = Field(description="Posterior of the stated answer, 0 to 1.")
+    headline: str | None = Field(default=None, description="The result with its number in at most 20 words.")
     statement: str = Field(description="The result in up to three sentences.")
     location: Location = Field(description="Where recordings and the paper's model differ.")
     mechanisms: list[ReportMechanism] = Field(description="The set of mechanisms that leads.")
@@ -186,6 +200,9 @@ class Report(BaseModel):
     not_identifiable: list[NotIdentifiable] = Field(description="What these recordings cannot tell.")
     findings: list[ReportFinding] = Field(description="What looks wrong in the data, or limits the answer.")
     fit: Fit | None = Field(description="How much better the recordings are described; null of several campaigns.")
+    remainder: Remainder | None = Field(
+        default=None, description="Of curves: what the explanation leaves beyond the noise; null where nothing does."
+    )
     power: list[Power] = Field(description="What the campaign could have seen.")
     d33: ReportD33 | None = Field(description="d33 of the sensors; null of curves and where nothing can be told.")
     by_kind: list[KindParameter] | None = Field(

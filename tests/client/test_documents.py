@@ -87,7 +87,7 @@ def test_declared_skin_has_the_fields_of_campaigns(kind: type[Document]) -> None
 @pytest.mark.parametrize("operation", ANSWERS)
 def test_an_answer_holds_all_that_came(operation: str) -> None:
     came = EXAMPLES[operation]["answer"]
-    answer = ANSWERS[operation].of(came)
+    answer = ANSWERS[operation].from_json(came)
     assert dict(answer) == came
     assert plain(answer) == came
 
@@ -106,7 +106,7 @@ def plain(value: Any) -> Any:
 
 
 def test_fields_have_types_that_editors_complete() -> None:
-    diagnosis = Diagnosis.of(EXAMPLES["diagnosis"]["answer"])
+    diagnosis = Diagnosis.from_json(EXAMPLES["diagnosis"]["answer"])
     assert diagnosis.report is not None
     assert diagnosis.report.verdict == diagnosis.verdict == "explained"
     (mechanism,) = diagnosis.report.mechanisms
@@ -121,14 +121,14 @@ def test_fields_have_types_that_editors_complete() -> None:
 
 def test_newer_older_server_answers_no_error() -> None:
     """What a newer or an older server answers is no error."""
-    answer = MechanismEntry.of({"name": "adhesion", "own": False, "colour": "green"})
+    answer = MechanismEntry.from_json({"name": "adhesion", "own": False, "colour": "green"})
     assert (answer.name, answer["colour"], answer.package, answer.kinds) == ("adhesion", "green", None, ())
 
 
 def test_documents_are_values() -> None:
     came = EXAMPLES["skin"]["answer"]
-    answer = SkinDetail.of(came)
+    answer = SkinDetail.from_json(came)
     assert answer == came
-    assert answer == SkinDetail.of(came)
+    assert answer == SkinDetail.from_json(came)
     with pytest.raises(dataclasses.FrozenInstanceError):
         answer.id = "other"  # type: ignore[misc]

@@ -24,7 +24,7 @@ BESIDE_SKINS = (
 )
 
 EVERY = tuple(CATALOGUE)  # what is wrong with recordings themselves is found without a mechanism
-_MOST_SENTENCES = 3
+_MOST_SENTENCES, _MOST_WORDS = 3, 20
 
 
 def beside(*mechanisms: str) -> tuple[str, ...]:
@@ -38,7 +38,12 @@ def sentences(statement: str) -> list[str]:
 
 
 def held(report: Mapping[str, Any]) -> dict[str, Any]:
-    """The report, held to what all promise: three sentences, and probabilities of answers that exclude one another."""
+    """The report, held to what all promise: a headline of 20 words with the number to quote, three sentences, and
+    probabilities of answers that exclude one another."""
+    headline, quoted = report["headline"], report["d33"] if (report["d33"] or {}).get("quotable") else None
+    assert 1 <= len(headline.split()) <= _MOST_WORDS, headline
+    assert "_" not in headline, headline
+    assert quoted is None or f"{quoted['value']:.3g}" in headline, headline
     assert 1 <= len(sentences(report["statement"])) <= _MOST_SENTENCES, report["statement"]
     answers = [report["probability"], *(entry["probability"] for entry in report["alternatives"])]
     assert all(0 <= probability <= 1 for probability in answers)

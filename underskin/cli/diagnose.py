@@ -48,8 +48,8 @@ def refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_d
 
 
 def in_words(document: Mapping[str, Any]) -> str:
-    """A report's verdict and statement, on two lines."""
-    return f"{document['verdict']}\n{document['statement']}"
+    """A report's verdict and headline, and on the next line its statement."""
+    return f"{document['verdict']}: {document['headline']}\n{document['statement']}"
 
 
 def write_report(document: dict[str, Any], path: Path) -> None:

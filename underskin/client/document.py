@@ -19,7 +19,7 @@ class Document(Mapping[str, Any]):
     """The JSON object as it came."""
 
     @classmethod
-    def of(cls, document: Mapping[str, Any]) -> Self:
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
         """The answer in a JSON object; nothing is checked, since the server did."""
         values = {name: _value(hint, document.get(name)) for name, hint in _hints(cls).items()}
         return cls(document=document, **values)
@@ -102,4 +102,4 @@ def _value(hint: Any, value: Any) -> Any:
         return None
     if origin is Mapping:
         return {name: _value(arguments[1], entry) for name, entry in value.items()}
-    return hint.of(value) if isinstance(hint, type) and issubclass(hint, Document) else value
+    return hint.from_json(value) if isinstance(hint, type) and issubclass(hint, Document) else value

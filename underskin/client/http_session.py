@@ -65,7 +65,7 @@ class Session:
         cursor: str | None = None
         while True:
             page = self.json("GET", f"/v1/{noun}", {"limit": 200, "cursor": cursor, **filters})
-            yield from map(kind.of, page[noun])
+            yield from map(kind.from_json, page[noun])
             cursor = page["next"]
             if cursor is None:
                 return

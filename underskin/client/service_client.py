@@ -131,20 +131,20 @@ class Client:
 
     def design(self, **fields: float | str) -> DesignAnswer:
         """Sensitivity and spatial resolution of a skin's design; `fields` as `POST /v1/design` takes them."""
-        return DesignAnswer.of(self._request("POST", "/v1/design", fields))
+        return DesignAnswer.from_json(self._request("POST", "/v1/design", fields))
 
     def field(self, **fields: float | str) -> FieldAnswer:
         """The stress in a section through the layer under a sphere; `fields` as `GET /v1/field` takes them."""
-        return FieldAnswer.of(self._session.json("GET", "/v1/field", fields))
+        return FieldAnswer.from_json(self._session.json("GET", "/v1/field", fields))
 
     def tables(self) -> tuple[TableEntry, ...]:
         """The tables of the service that answers are computed from: σ, influence and contact."""
-        return tuple(map(TableEntry.of, self._request("GET", "/v1/tables")["tables"]))
+        return tuple(map(TableEntry.from_json, self._request("GET", "/v1/tables")["tables"]))
 
     def undo(self, change_id: str) -> Change:
         """Take a change back that `client.campaigns.changes` or `client.skins.changes` lists, unless something builds
         on it."""
-        return Change.of(self._request("POST", path_of("changes", change_id, "undo")))
+        return Change.from_json(self._request("POST", path_of("changes", change_id, "undo")))
 
     def health(self) -> str:
         """`ok` while the process answers; needs no key."""

@@ -54,7 +54,7 @@ def diagnose(
     """
     campaign, refused = (campaign.campaign, campaign.problems) if isinstance(campaign, Reading) else (campaign, [])
     result = pipeline.diagnose(campaign, table or load_table(), progress, limits, without)
-    return Report.of(report_document(pipeline.with_refused(result, refused)))
+    return Report.from_json(report_document(pipeline.with_refused(result, refused)))
 
 
 def diagnose_together(
@@ -118,4 +118,4 @@ def _with_refused(document: Mapping[str, object], campaigns: Sequence[Campaign |
         ]
     findings = document["findings"]
     assert isinstance(findings, list)
-    return Report.of({**document, "findings": [*refused, *findings]})
+    return Report.from_json({**document, "findings": [*refused, *findings]})

@@ -237,6 +237,9 @@ NEEDED_FIELDS = ("dwell_s", "dynamic_force_n", "load_cycles", "sensor")  # of a 
 READS = (*NEEDED_FIELDS, "stiffness", "id")
 
 
+Origin = Literal["skin", "rig", "chain"]
+
+
 class Stage(Enum):
     """Where in a model a mechanism acts, in the order of composition; the value names the stage in a sentence."""
 
@@ -274,7 +277,8 @@ class Mechanism:
     composition; `kinds` of recordings that it acts on; `axes` of the campaign on which the effect shows;
     `parameters_stated`, the parameters where they are the same for all campaigns and kinds; `reads`, of READS:
     fields of a recording without which it cannot be predicted, the contacts' `stiffness`, and `id` where its lines
-    differ between recordings of one and the same contact.
+    differ between recordings of one and the same contact; `of`, what it belongs to: the skin, the rig that presses it,
+    or the measuring chain.
     """
 
     name: str
@@ -285,6 +289,7 @@ class Mechanism:
     needs: str = "nothing beyond the recordings themselves"
     stage: ClassVar[Stage]
     order: ClassVar[int] = 100
+    of: ClassVar[Origin] = "skin"
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]]
     reads: ClassVar[tuple[str, ...]] = ()

@@ -13,7 +13,7 @@ import numpy as np
 from underskin.errors import InvalidInput, not_finite, not_unique
 from underskin.extensions import described
 from underskin.mechanisms import base
-from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Uniform
+from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Origin, Parameter, Stage, Uniform
 from underskin.mechanisms.models.composition import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
 from underskin.mechanisms.models.contact_state import joined
 from underskin.mechanisms.models.curves import CompressionModel
@@ -87,6 +87,7 @@ def _check_traits(mechanism: Mechanism) -> None:
     stage: Any = getattr(mechanism, "stage", None)
     _require("stage", stage, isinstance(stage, Stage), f"must be one of Stage: {', '.join(Stage.__members__)}")
     _require("order", mechanism.order, isinstance(mechanism.order, int), "must be a whole number")
+    _require("of", mechanism.of, mechanism.of in get_args(Origin), f"must be one of {', '.join(get_args(Origin))}")
     for field, allowed, needed in (
         ("kinds", get_args(Kind), True),
         ("axes", base.AXES, True),

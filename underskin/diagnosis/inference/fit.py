@@ -381,8 +381,10 @@ class Fitter:
         return replace(points, fit=fit), np.exp(fit[:, index] - points.fit[:, index])
 
     def rescaled(self, points: Points) -> Evaluated:
-        """The points of FRFs with the most probable d33 of each, and derivatives."""
+        """The points with derivatives, of FRFs each with its most probable d33."""
         products = self.products(points, slopes=True, place=self.has_position_scatter)
+        if not isinstance(products, FrfProducts):
+            return self.weighed(points, products)
         return self._with_d33(self.weighed(*self._scaled(points, products, self._ratio(points, products))))
 
     def _with_d33(self, at: Evaluated) -> Evaluated:

@@ -247,6 +247,7 @@ class Facts:
         own = [
             {
                 "name": name,
+                "of": named[name].of,
                 "probability": self._probability(name),
                 "parameters": parameters_of(self.shown, name),
                 "explains_percent": self._explains_percent(name),

@@ -136,6 +136,7 @@ def mechanisms_of_curves(joined: KindsTogether, names: Sequence[str], leading: S
         rows += [
             {
                 "name": name,
+                "of": explanation.best.hypothesis.lines.mechanisms[name].of,
                 "parameters": parameters_of(explanation, name),
                 "explains_percent": rounded(100 * max(1 - _misfit_square(explanation) / without, 0.0), 3),
             }

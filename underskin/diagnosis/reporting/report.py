@@ -12,7 +12,9 @@ from underskin.diagnosis.localisation import reaches_all_along
 from underskin.diagnosis.reporting import entries, numbers, statement
 from underskin.diagnosis.reporting.d33 import StatedD33
 from underskin.diagnosis.reporting.facts import DiagnosisResult, Facts
+from underskin.diagnosis.reporting.headline import headline
 from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.reporting.remainder import remainder_document
 from underskin.diagnosis.reporting.unlisted_law import confirming
 from underskin.diagnosis.selection.answers import Search
 
@@ -24,6 +26,7 @@ _EMPTY: Mapping[str, Any] = {  # the report of recordings that say too little, a
     "campaign": "",
     "verdict": "insufficient_data",
     "probability": None,
+    "headline": "",
     "statement": "",
     "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
     "mechanisms": [],
@@ -34,6 +37,7 @@ _EMPTY: Mapping[str, Any] = {  # the report of recordings that say too little, a
     "not_identifiable": [],
     "findings": [],
     "fit": None,
+    "remainder": None,
     "power": [],
     "d33": None,
 }
@@ -65,6 +69,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             "next_experiment": None,
             "provenance": dict(diagnosis.provenance),
         }
+        document["headline"] = headline(document)
         return Reported(document, StatedD33(None, why_not=["its recordings say too little"]))
     facts = Facts(diagnosis)
     search, leading = facts.search, facts.leading
@@ -83,6 +88,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         "not_identifiable": facts.d33.not_identifiable(diagnosis.confounded),
         "findings": facts.findings,
         "fit": facts.fit,
+        "remainder": remainder_document(facts.problem, facts.shown),
         "power": [
             {"mechanism": limit.mechanism, "smallest_visible_percent": rounded(limit.smallest_visible_percent, 2)}
             for limit in diagnosis.power
@@ -98,6 +104,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }
+    document["headline"] = headline(document)
     return Reported(document, facts.d33)
 
 

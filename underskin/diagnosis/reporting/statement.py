@@ -58,7 +58,7 @@ def statement(facts: Facts) -> str:
     what to quote, or, where nothing is missing, what would have shown.
     """
     verdict, fit, alike = facts.verdict, facts.fit, facts.alike
-    slips = [*_clauses(facts.findings, _SLIPS), numbers.outlying_sensors(facts.problem, facts.shown)]
+    slips = [*_clauses(facts.findings, SLIPS), numbers.outlying_sensors(facts.problem, facts.shown)]
     slips = [words for words in slips if words]
     decides = [*(contradiction["statement"] for contradiction in facts.contradictions), *slips]
     apart = bool(decides)
@@ -111,7 +111,7 @@ def insufficient_statement(what: Lacking | None, findings: Sequence[Mapping[str,
     """The statement on a campaign from which nothing can be concluded."""
     assert what is not None
     beginning = _TO_CORRECT if what.lack in _CORRECTED else _INSUFFICIENT
-    return of_clauses([beginning + lacking(what)], _clauses(findings, _SLIPS))
+    return of_clauses([beginning + lacking(what)], _clauses(findings, SLIPS))
 
 
 # For the layout of a stored report's statement on its page only.
@@ -120,9 +120,12 @@ def lacking_part(text: str) -> str:
     return text.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
 
 
-def first_and_rest(text: str) -> tuple[str, str]:
-    """The first sentence of a statement, the verdict, without its full stop, and the other sentences."""
-    first, _, rest = text.partition(". ")
+def first_and_rest(report: Mapping[str, Any]) -> tuple[str, str]:
+    """The headline of a report without its full stop, and its statement; of a report that was kept without a headline,
+    the first sentence of the statement and the others."""
+    if report.get("headline"):
+        return report["headline"].rstrip("."), report["statement"]
+    first, _, rest = report["statement"].partition(". ")
     return first.rstrip("."), rest
 
 
@@ -287,7 +290,7 @@ def _power_clause(power: Sequence[Power], kind: Kind) -> str:
     return f"of the {all_of_them} known mechanisms {which}: {', '.join(in_words([name]) for name in shown)}"
 
 
-_SLIPS = (
+SLIPS = (
     *(FindingCode.NO_RESPONSE, FindingCode.IMPOSSIBLE_GEOMETRY, FindingCode.NO_FINITE_LINE, FindingCode.REFUSED),
     *(FindingCode.IMPOSSIBLE_NUMBER, FindingCode.SERIES_NOT_USABLE, FindingCode.CURVE_NOT_USABLE),
     *(

@@ -45,7 +45,9 @@ _FINDINGS = {
     "series_not_usable": "samples cannot be used",
     "sign_flipped": "sign reversed",
     "units_off_by_1000": "unit off by a factor of 1000",
+    "strong": "strong sensor",
     "unusual_magnitude": "unusual size",
+    "weak": "weak sensor",
 }  # by code; other codes are words already
 _UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the suffix of an axis' name
 _POWERS = 1e-4  # below which four digits are written as a power of ten

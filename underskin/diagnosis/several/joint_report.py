@@ -14,6 +14,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, MOST_NAMED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.reporting.d33 import StatedD33
+from underskin.diagnosis.reporting.headline import within_words
 from underskin.diagnosis.reporting.numbers import rounded
 from underskin.diagnosis.reporting.report import ALTERNATIVES, LEAST_PROBABILITY, SCHEMA, Reported
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
@@ -121,6 +122,7 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
     closing = [skin.dates.order_clause(), _d33_of_last(names[-1], last)]
     return {
         **_begun(name, list(skin.reports), verdict, probability),
+        "headline": within_words([*(clause.partition(":")[0] for clause in decisive), *_change_clauses(skin), stated]),
         "statement": of_clauses(first, _change_clauses(skin), closing, names=names),
         "location": _nowhere("campaign"),
         "mechanisms": mechanisms,
@@ -164,6 +166,7 @@ def fleet_document(name: str, campaigns: Sequence[str], fleet: Fleet) -> dict[st
     names = [*fleet.reports, *fleet.lacking, *campaigns]
     return {
         **_begun(name, campaigns, verdict, probability),
+        "headline": within_words([*_departure_clauses(fleet.quantities, quantities), first]),
         "statement": of_clauses([first], _departure_clauses(fleet.quantities, quantities), asides, names=names),
         "location": _nowhere("skin"),
         "mechanisms": mechanisms,

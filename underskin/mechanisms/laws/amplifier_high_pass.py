@@ -18,6 +18,7 @@ class AmplifierHighPass(Mechanism):
     Sensorics, 2002, chapter 11)."""
     stage = Stage.LINES
     order = 30
+    of = "chain"
     axes = ("frequency_hz", "phase")
     parameters_stated = (
         Parameter("corner", "Hz", 1e-3, 1e3, HeavyTailed(-0.7, 1.5), "log", limit=0.0, shown=1.0, reason=_REASON),

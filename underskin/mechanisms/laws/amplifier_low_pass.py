@@ -32,6 +32,7 @@ class AmplifierLowPass(Mechanism):
     (1930) 536."""
     stage = Stage.LINES
     order = 35
+    of = "chain"
     axes = ("frequency_hz", "phase")
     parameters_stated = (
         Parameter(

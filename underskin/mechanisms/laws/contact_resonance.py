@@ -35,6 +35,7 @@ class ContactResonance(Mechanism):
     Appl. Math. Mech. 22 (1958) 442, for the layer's S."""
     stage = Stage.LINES
     order = 10
+    of = "rig"
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
     reads = ("stiffness",)
     parameters_stated = (

@@ -24,6 +24,7 @@ class Crosstalk(Mechanism):
     source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling between leads)."
     stage = Stage.NEIGHBOURS
     order = 10
+    of = "chain"
     axes = ("position_mm", "sensor")
     needs = "at least two sensors, and presses within three thicknesses of a neighbour"
     reads = ("sensor",)

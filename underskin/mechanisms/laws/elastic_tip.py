@@ -23,6 +23,7 @@ class ElasticTip(Mechanism):
     source = "Hertz 1882; Johnson, Contact Mechanics (1985), section 4.2: the depths of both bodies add."
     stage = Stage.CONTACT
     order = 40
+    of = "rig"
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     parameters_stated = (
         Parameter("modulus_ratio", "-", 0.2, 1e4, HeavyTailed(math.log(20), 1.5), "log", math.inf, _REASON, shown=2.0),

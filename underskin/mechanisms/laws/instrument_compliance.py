@@ -29,6 +29,7 @@ class InstrumentCompliance(Mechanism):
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance)."
     stage = Stage.CURVE
     order = 10
+    of = "rig"
     kinds = ("indentation",)
     axes = ("force_n",)
     parameters_stated = (

@@ -34,6 +34,7 @@ class LiquidDrag(Mechanism):
     cantilevers in water)."""
     stage = Stage.CURVE
     order = 30
+    of = "rig"
     kinds = ("indentation",)
     axes = ("time_s",)
     needs = "time_s, and two speeds, a hold or a way back"

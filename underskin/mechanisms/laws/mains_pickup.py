@@ -43,6 +43,7 @@ class MainsPickup(Mechanism):
     source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads)."
     stage = Stage.ADDED_CHARGE
     order = 10
+    of = "chain"
     axes = ("frequency_hz", "dynamic_force_n")
     needs = "a line within 3 Hz of 50 or 60 Hz"
     parameters_stated = (

@@ -26,6 +26,7 @@ class Misalignment(Mechanism):
     e/h)."""
     stage = Stage.POSITION
     order = 10
+    of = "rig"
     axes = ("position_mm", "sensor", "preload_n", "indenter_radius_mm")
     needs = "nothing; where every press is centred and nothing tells its direction, its length alone is a parameter"
 

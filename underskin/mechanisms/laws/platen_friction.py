@@ -25,6 +25,7 @@ class PlatenFriction(Mechanism):
     source = "Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111."
     stage = Stage.CURVE
     order = 20
+    of = "rig"
     kinds = ("compression",)
     axes = ("sample_height_mm", "sample_diameter_mm")
     parameters_stated = (

@@ -30,6 +30,7 @@ class TimingDelay(Mechanism):
     5.1)."""
     stage = Stage.LINES
     order = 40
+    of = "chain"
     axes = ("phase", "frequency_hz")
     parameters_stated = (
         Parameter(

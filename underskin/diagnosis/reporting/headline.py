@@ -1,0 +1,102 @@
+"""The headline of a report: what it says, with the number, in at most 20 words.
+
+It is made of the report alone, so that reports that were kept without one have it too. Parts come in the order in which
+a reader needs them: a slip in the recordings, the answer, the number to quote, what would decide. A part that does not
+fit is left out.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from underskin.diagnosis.data.names import EXPLAINED, MOST_QUOTED, NAMED, in_words
+from underskin.diagnosis.reporting.statement import SLIPS
+from underskin.diagnosis.reporting.wording import finding, in_its_unit, number, readable, unit
+from underskin.findings.formatting import capital, in_percent
+from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
+
+_WORDS = 20  # read at a glance
+_DIGITS = 3
+
+Document = Mapping[str, Any]
+
+
+def headline(report: Document) -> str:
+    """One sentence of at most 20 words on a report of one campaign."""
+    return readable(within_words(_parts(report)))
+
+
+def within_words(parts: Iterable[str]) -> str:
+    """A sentence of at most 20 words, of those parts that fit, in their order."""
+    chosen: list[str] = []
+    for part in parts:
+        if part and len(" ".join([*chosen, part]).split()) <= _WORDS:
+            chosen.append(part)
+    return f"{capital('; '.join(chosen))}."
+
+
+def _parts(report: Document) -> Iterator[str]:
+    slips = [entry for entry in report["findings"] if entry["code"] in SLIPS]
+    if slips:
+        where = f" ({slips[0]['recording']})" if slips[0]["recording"] else ""
+        yield f"{finding(slips[0]['code'])}{where}"
+    yield next(answer for answer in _answers(report) if len(answer.split()) <= _WORDS)
+    yield _to_quote(report)
+    planned = report.get("next_experiment")
+    if report["verdict"] == "ambiguous" and planned and planned["recordings"]:
+        repeats = sum(recording["repeats"] for recording in planned["recordings"])
+        recordings = "one more recording" if repeats == 1 else f"{repeats} more recordings"
+        yield f"{recordings} may decide ({in_percent(planned['probability_of_deciding'])})"
+
+
+def _answers(report: Document) -> Iterator[str]:
+    """The answer, the fullest first; the last fits always."""
+    verdict, probability = report["verdict"], in_percent(report["probability"] or 0.0)
+    mechanisms = report["mechanisms"]
+    names = in_words([mechanism["name"] for mechanism in mechanisms])
+    if verdict == "insufficient_data":
+        yield "nothing can be told from these recordings"
+    elif verdict == "no_mismatch":
+        yield "nothing is missing"
+    elif verdict == "unexplained":
+        law = report["unnamed"]
+        if law is not None:
+            change = f"a change of {acted_on(law['acts_on'], law['axis'])} over {followed(law['axis'])}"
+            yield f"no known mechanism describes this ({probability}): {change}"
+        yield f"something is missing that no known mechanism describes ({probability})"
+    elif verdict == "explained":
+        few = mechanisms if len(mechanisms) <= MOST_QUOTED else ()
+        yield " and ".join(map(_with_strength, few)) or names
+        yield names
+    else:
+        certain = [group for group in report["presence"] if group["probability"] >= EXPLAINED]
+        for group in certain:
+            either = " or ".join(in_words([name]) for name in group["mechanisms"])
+            yield f"{either} ({in_percent(group['probability'])}), not settled"
+        rivals = f"{1 + sum(rival['probability'] > NAMED for rival in report['alternatives'])} explanations remain"
+        yield f"{rivals}, {names or 'nothing missing'} leads with {probability}"
+        yield rivals
+
+
+def _with_strength(mechanism: Document) -> str:
+    """A mechanism with where it acts and its first parameter: "adhesion, work of adhesion 148 mJ/m² (145–151)"."""
+    of = ", ".join((mechanism.get("scope") or {}).get("sensors") or ())
+    name = in_words([mechanism["name"]]) + (f" of {of}" if of else "")
+    return ", ".join([name, *map(_value, mechanism["parameters"][:1])])
+
+
+def _value(parameter: Document) -> str:
+    parameter = in_its_unit(parameter)
+    called = parameter["name"].replace("_", " ")
+    value, low, high = (number(parameter[end], _DIGITS) for end in ("value", "low", "high"))
+    size = f"{value} {unit(parameter['unit'])}".rstrip()
+    return f"{called} at or beyond {size}" if parameter.get("at_bound") else f"{called} {size} ({low}–{high})"
+
+
+def _to_quote(report: Document) -> str:
+    """d33 or E with its interval; that there is none to quote where the verdict may be read as if there were."""
+    d33, modulus = report["d33"], ((report["fit"] or {}).get("after") or {}).get("youngs_modulus")
+    if d33 is not None and d33.get("value") is not None:
+        return _value({**d33, "name": "d33"}) if d33["quotable"] else "no d33 to quote"
+    if modulus is None or modulus.get("at_bound"):
+        return ""
+    return _value({**modulus, "name": "E"})
