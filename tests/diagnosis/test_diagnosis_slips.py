@@ -152,7 +152,7 @@ def test_sensor_stands_alone_fault_no_physics(share: float, word: str, table: Si
     told = re.match(r"sensor 's3' responds with ([0-9.]+) times the others' charge", statement)
     assert told
     assert float(told[1]) == pytest.approx(share, rel=0.04)
-    assert ("peak-to-peak beside amplitudes" in statement) == (share == 2.0)
+    assert ("peak-to-peak for amplitudes" in statement) == (share == 2.0)
     assert report["verdict"] == "no_mismatch"
     assert report["statement"].startswith("Sensor 's3' responds with ")
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]

@@ -178,7 +178,7 @@ def test_recordings_of_noise_tell_nothing(table: SigmaTable) -> None:
     """A noise floor of several hundred per cent is no agreement, and no sign of physics either."""
     report = looked_at(campaign(Made(line=1.5, lines=40), table), table)
     assert report["verdict"] == "insufficient_data"
-    assert "stands out of its noise" in report["statement"]
+    assert "above its noise" in report["statement"]
 
 
 def test_noise_floor_counts_positioning_scatter(table: SigmaTable) -> None:

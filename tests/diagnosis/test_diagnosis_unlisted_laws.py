@@ -342,7 +342,7 @@ def test_constant_phase_beside_weak_sensors_told(table: SigmaTable) -> None:
     turned = changed(made, lambda entry, _, __: complex(phase * kept.get(entry.sensor, 1.0)))
     report = lean_report(turned, table, *beside("sensor_spread", "sensor_relaxation", "timing_delay", "ageing"))
     statement = report["statement"]
-    assert "What is missing beside sensor spread turns the frequency response by the same angle at all" in statement
+    assert "What is missing besides sensor spread turns the frequency response by the same angle at all" in statement
     assert "the phase by -1.2" in statement
     assert "with it and sensor spread, recordings held out are predicted to" in statement
     assert ("the reference phase of a lock-in amplifier" in statement) == is_settled(report)

@@ -1,4 +1,4 @@
-"""The leading answer is of the most probable kind: nothing, known mechanisms together, or something without a name."""
+"""The leading answer is of the most probable kind: nothing, known mechanisms together, or something unlisted."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -41,4 +41,4 @@ def test_leads_together_said_sum() -> None:
     ranked = leading_first(answers(0.34, 0.05, 0.21, 0.2, 0.2))
     statement, *_ = answer_clauses(ranked, "ambiguous", "the paper's model")
     assert statement.startswith("known mechanisms explain this (61 % together), best ageing (21 %), but these rivals")
-    assert "something without a name (34 %)" in statement
+    assert "something unlisted (34 %)" in statement

@@ -94,7 +94,7 @@ def test_slip_curve_s_force_told_reading(unit: float, slip: str) -> None:
     assert finding.code == "units_off_by_1000"
     assert f"{slip}" in finding.statement
     report = diagnose(campaign)
-    assert report["statement"].startswith("Nothing can be told before a correction")
+    assert report["statement"].startswith("Nothing can be concluded before a correction")
     assert slip in report["statement"]
     assert plausibility.at_reading(replace(campaign, units_checked=True)) == []
 

@@ -118,7 +118,7 @@ def contact_events(events: Mapping[str, Mapping[str, float | None]]) -> str:
         if name in events:
             at = events[name]
             time = "" if at["time_s"] is None else f" ({at['time_s']:.4g} s)"
-            parts.append(f"{verb} at {at['displacement_mm']:.6g} mm{time}, {how} {at['force_n']:.3g} N beside the air")
+            parts.append(f"{verb} at {at['displacement_mm']:.6g} mm{time}, {how} {at['force_n']:.3g} N against the air")
     return f"the sphere {' and '.join(parts)}: the samples of these events count for no law"
 
 
@@ -239,7 +239,7 @@ def no_simple_law(
             f"it: the nearest, {law}, predicts them to {after_percent:.2g} % instead of {before_percent:.2g} %"
         )
     return (
-        f"none of {tried} simple laws of one quantity over one axis stands out enough to be stated: the nearest, "
+        f"none of {tried} simple laws of one quantity over one axis is clear enough to be stated: the nearest, "
         f"{law}, predicts {part} held out to {after_percent:.2g} % instead of {before_percent:.2g} %"
     )
 
@@ -250,7 +250,7 @@ _AS_A_SLIP = 0.05  # largest difference of the logarithm of a factor from that o
 def sensor_alone(sensor: str, share: float, recordings: int) -> str:
     """A sensor whose level differs from the common one of the others."""
     doubled = min(abs(math.log(share / 2)), abs(math.log(2 * share))) < _AS_A_SLIP
-    causes = "its own d33, its cable, or peak-to-peak beside amplitudes" if doubled else "its own d33 or its cable"
+    causes = "its own d33, its cable, or peak-to-peak for amplitudes" if doubled else "its own d33 or its cable"
     return (
         f"sensor {sensor!r} responds with {share:.2f} times the others' charge, and they are alike: {causes}; "
         f"taken to their level by this factor ({recordings} recordings)"
@@ -373,7 +373,7 @@ LACKING: Mapping[Lack, Words] = {
     Lack.MADE_ALIKE: "all recordings were made alike, at one frequency; different preloads, spheres or places are "
     "needed",
     Lack.IMPOSSIBLE_DECLARATION: _impossible_declaration,
-    Lack.NOISE: "a response that stands out of its noise, which is {floor_percent:.0f} % of what is predicted",
+    Lack.NOISE: "a response above its noise, which is {floor_percent:.0f} % of what is predicted",
 }
 ENGLISH: Mapping[Reason, Words] = {
     Reason.REFUSED: "{field} = {value!r}: {allowed}; left out",
@@ -397,7 +397,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.SERIES_NOT_USABLE: "{refusal}: left out",
     Reason.CURVE_NOT_USABLE: "{refusal}: left out",
     Reason.OUT_OF_TABLES_DECLARED: "its contact (radius {radius_mm:.3g} mm on a layer of {thickness_mm:g} mm, at its "
-    "place beside the sensor) lies beyond the tables: left out",
+    "place off the sensor) lies beyond the tables: left out",
     Reason.OUT_OF_TABLES_UNLESS_STIFFER: "by the declared {declared_mpa:g} MPa its contact lies beyond the tables, by "
     "one up to {factor:g} times larger within; no answer that stands has such a modulus, so it was left out: a modulus "
     "that is declared too small is not ruled out",
@@ -454,7 +454,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.SERIES_PRELOAD: f"{_ALL_AS_IN}{{preload_n:g}} N looks 1000 × too {{too_large:large|small}} beside the "
     f"recorded force's "
     f"mean of {{mean_n:.3g}} N: was it given in {{given_in}}?{_LEFT_OUT}",
-    Reason.BESIDE_OTHERS: "{value:g} looks 1000 × too {too_large:large|small} beside the others: was it given in "
+    Reason.BESIDE_OTHERS: "{value:g} looks 1000 × too {too_large:large|small} against the others: was it given in "
     "{given_in}? "
     "Left out",
     Reason.DYNAMIC_FORCE_LARGE: "the dynamic force reaches the preload in all recordings, so the sphere would leave "
@@ -537,13 +537,13 @@ ENGLISH: Mapping[Reason, Words] = {
     "others and last no longer than a sample or two: damaged? They were left out",
     Reason.LINES_LEFT_OUT: lines_left_out,
     Reason.FORCE_ACTS_ONCE: "in {affected} of {recordings} recordings the force acts at each frequency once, as a "
-    "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "
+    "single sweep or blow: the lowest lines are left out, and those near a sharp resonance are off by parts of a "
     "percent; a drive that repeats itself at least four times gives them all",
-    Reason.MAINS_IN_CHARGE: "in {affected} of {recordings} recordings the charge stands out at {mains_hz:g} Hz or a "
+    Reason.MAINS_IN_CHARGE: "in {affected} of {recordings} recordings the charge is too large at {mains_hz:g} Hz or a "
     "multiple of it by about {charge_pc:significant 2} pC, and the force does not: mains pickup? The lines there "
     "are left out",
     Reason.EXCITED_AT_MAINS: "in {affected} of {recordings} recordings the force acts near a multiple of the mains "
-    "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge cannot be told from the response there, and "
+    "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge and the response cannot be separated there, and "
     "d33 holds only if there is none; record at other frequencies",
     Reason.NOISE_IN_FRF: noise_in_frf,
     Reason.BEHIND_FILTER: behind_filter,

@@ -20,7 +20,7 @@ SIMPLEST: Mapping[Kind, str] = {  # the name of the model without mechanisms, fo
 
 def in_words(names: Sequence[str]) -> str:
     """An answer's names in a sentence."""
-    special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something without a name"}
+    special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something unlisted"}
     return " and ".join(special.get(name, name.replace("_", " ")) for name in names)
 
 

@@ -143,7 +143,7 @@ class StatedD33:
         named = " or ".join(
             f"{in_words([shift.mechanism])} ({_percent(shift)})" for shift in self._largest_first[:MOST_QUOTED]
         )
-        hides = f", provided that no {named} hides" if named else ""
+        hides = f", provided that there is no {named}" if named else ""
         return (
             f"{value} {self.number['unit']} (95 %: {low} to {high} with what declared values may be off, {least} to "
             f"{most} to compare sensors or dates){self._over_declared()}{hides}"

@@ -54,7 +54,7 @@ def _answers(report: Document) -> Iterator[str]:
     mechanisms = report["mechanisms"]
     names = in_words([mechanism["name"] for mechanism in mechanisms])
     if verdict == "insufficient_data":
-        yield "nothing can be told from these recordings"
+        yield "these recordings say too little"
     elif verdict == "no_mismatch":
         yield "nothing is missing"
     elif verdict == "unexplained":

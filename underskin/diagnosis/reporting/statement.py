@@ -45,7 +45,7 @@ from underskin.recordings.readers.text import time_zone
 from underskin.units import Floats
 
 _INSUFFICIENT = "The recordings cannot tell anything: "
-_TO_CORRECT = "Nothing can be told before a correction: "
+_TO_CORRECT = "Nothing can be concluded before a correction: "
 _CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
 _SMALL = 5.0  # % of the response
 _OVER_ANSWERS = "over the answers that remain"
@@ -162,7 +162,7 @@ def answer_clauses(
     if verdict == "unexplained":
         which = "known mechanisms" if all_tried else "mechanisms that were tried"
         return [f"something is missing that none of the {which} describes (probability {percent})"]
-    by_sets = f"by sets: {_answers_in_words([leader, *rivals])}" if rivals else ""
+    by_sets = f"the sets of mechanisms are: {_answers_in_words([leader, *rivals])}" if rivals else ""
     if verdict == "explained":
         missing, by_mechanism = _lacking(leader, presence, mechanisms)
         means = _law(leader.names) or _strengths(mechanisms)
@@ -342,11 +342,11 @@ def _law_clauses(facts: Facts, leading: LeadingLaw, document: Mapping[str, Any])
     is the report's `unnamed`."""
     law, others = leading.law, in_words(leading.other_names)
     acts_on, axis = law.description.acts_on, law.description.axis
-    beside = f" beside {others}" if others else ""
+    besides = f" besides {others}" if others else ""
     floor, held = facts.fit["noise_floor_percent"], document["heldout_rmse_percent"]
     worth = _worth(held, floor, facts.traits.held_out, f" and {others}" if others else "")
     altered = _altered(leading, document)
-    second = [f"what is missing{beside} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, altered]
+    second = [f"what is missing{besides} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, altered]
     rivals = [
         f"{acted_on(rival['acts_on'], rival['axis'])} over {followed(rival['axis'])}, {rival['form']} "
         f"({in_percent(rival['probability'])} of it)"

@@ -544,4 +544,4 @@ def _asides(fleet: Fleet) -> list[str]:
     orders = [
         f"of {skin}, the last that can be used speaks: {clause}" for skin, clause in fleet.orders.items() if clause
     ]
-    return [*([f"nothing could be told of {', '.join(fleet.lacking)}"] if fleet.lacking else []), *orders]
+    return [*([f"nothing could be concluded of {', '.join(fleet.lacking)}"] if fleet.lacking else []), *orders]
