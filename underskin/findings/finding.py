@@ -543,8 +543,8 @@ ENGLISH: Mapping[Reason, Words] = {
     "multiple of it by about {charge_pc:significant 2} pC, and the force does not: mains pickup? The lines there "
     "are left out",
     Reason.EXCITED_AT_MAINS: "in {affected} of {recordings} recordings the force acts near a multiple of the mains "
-    "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge and the response cannot be separated there, and "
-    "d33 holds only if there is none; record at other frequencies",
+    "frequency alone ({frequency_hz:.4g} Hz): mains pick-up in the charge and the response cannot be separated there, "
+    "and d33 holds only if there is none; record at other frequencies",
     Reason.NOISE_IN_FRF: noise_in_frf,
     Reason.BEHIND_FILTER: behind_filter,
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",

@@ -13,12 +13,10 @@ from service.store import AnyRow, Conflict, Database, diagnoses
 from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
+from underskin.diagnosis.reporting.headline import first_and_rest
 from underskin.findings.formatting import in_percent
-from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 from underskin.surrogate.sigma_table import SigmaTable
 
-_WORTH_NAMING = 0.02  # probability of a rival, as in a report
-_MOST_RIVALS = 3
 _WORDS_OF_VERDICT = {
     "explained": "mismatch explained",
     "ambiguous": "mismatch with several explanations",
@@ -74,7 +72,9 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
     d33 = report["d33"]
     unsettled = d33 is not None and "low" in d33 and not d33.get("quotable", True)
     not_quoted = _quoted(report) if unsettled else None
-    return VerdictSummary(row.id, tag, mood, _addition(report), at, row.name, _modulus(report), outdated, not_quoted)
+    return VerdictSummary(
+        row.id, tag, mood, first_and_rest(report)[0], at, row.name, _modulus(report), outdated, not_quoted
+    )
 
 
 def _modulus(report: Mapping[str, Any]) -> str | None:
@@ -84,32 +84,6 @@ def _modulus(report: Mapping[str, Any]) -> str | None:
         return None
     value, low, high = (f"{after[name]:.3g}" for name in ("value", "low", "high"))
     return f"{value} {after['unit']} (95 %: {low} to {high})"
-
-
-def _addition(report: Mapping[str, Any]) -> str:
-    """The mechanisms that the model lacks with their probabilities; for several answers each with its probability;
-    or the unlisted law; without mismatch, what is not ruled out."""
-    verdict, probability = report["verdict"], report["probability"]
-    law = report.get("unnamed")
-    if verdict == "unexplained" and law:
-        return f"{acted_on(law['acts_on'], law['axis'])} over {followed(law['axis'])}"
-    leader = [f"{in_words(mechanisms_of(report))} {in_percent(probability)}"] if report["mechanisms"] else []
-    rivals = [
-        f"{in_words(alternative['mechanisms'])} {in_percent(alternative['probability'])}"
-        for alternative in report.get("alternatives", ())[:_MOST_RIVALS]
-        if alternative["probability"] > _WORTH_NAMING
-    ]
-    if report["mechanisms"] and verdict == "explained":
-        words = [
-            f"{in_words([mechanism['name']])} ({in_percent(mechanism['probability'])})"
-            for mechanism in report["mechanisms"]
-        ]
-        return f"the model lacks {' and '.join(words)}"
-    if probability >= EXPLAINED or verdict == "unexplained":
-        return " ".join(leader)
-    if verdict == "no_mismatch":
-        return f"not ruled out: {', '.join(rivals)}" if rivals else ""
-    return " or ".join([*leader, *rivals])
 
 
 class AdoptedVersion(ModelVersion):

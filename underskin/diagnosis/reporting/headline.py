@@ -25,6 +25,15 @@ def headline(report: Document) -> str:
     return readable(within_words(_parts(report)))
 
 
+def first_and_rest(report: Document) -> tuple[str, str]:
+    """The headline of a report without its full stop, and its statement; of a report on several campaigns that was kept
+    without a headline, the first sentence of the statement and the others."""
+    if report.get("headline") or "campaigns" not in report:
+        return (report.get("headline") or headline(report)).rstrip("."), report["statement"]
+    first, _, rest = report["statement"].partition(". ")
+    return first.rstrip("."), rest
+
+
 def within_words(parts: Iterable[str]) -> str:
     """A sentence of at most 20 words, of those parts that fit, in their order."""
     chosen: list[str] = []
@@ -56,7 +65,10 @@ def _answers(report: Document) -> Iterator[str]:
     if verdict == "insufficient_data":
         yield "these recordings say too little"
     elif verdict == "no_mismatch":
-        yield "nothing is missing"
+        rivals = [in_words(rival["mechanisms"]) for rival in report["alternatives"] if rival["probability"] > NAMED]
+        if report["probability"] < EXPLAINED and rivals:
+            yield f"nothing may be missing ({probability}), or {' or '.join(rivals)}"
+        yield "nothing is missing" if report["probability"] >= EXPLAINED else f"nothing may be missing ({probability})"
     elif verdict == "unexplained":
         law = report["unnamed"]
         if law is not None:
@@ -72,9 +84,9 @@ def _answers(report: Document) -> Iterator[str]:
         for group in certain:
             either = " or ".join(in_words([name]) for name in group["mechanisms"])
             yield f"{either} ({in_percent(group['probability'])}), not settled"
-        rivals = f"{1 + sum(rival['probability'] > NAMED for rival in report['alternatives'])} explanations remain"
-        yield f"{rivals}, {names or 'nothing missing'} leads with {probability}"
-        yield rivals
+        remaining = f"{1 + sum(rival['probability'] > NAMED for rival in report['alternatives'])} explanations remain"
+        yield f"{remaining}, {names or 'nothing missing'} leads with {probability}"
+        yield remaining
 
 
 def _with_strength(mechanism: Document) -> str:

@@ -17,8 +17,9 @@ from plotly.offline import get_plotlyjs
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.figures import explanations, several_figures
+from underskin.diagnosis.reporting.headline import first_and_rest
 from underskin.diagnosis.reporting.page_styles import SCHEME
-from underskin.diagnosis.reporting.statement import first_and_rest, lacking_part
+from underskin.diagnosis.reporting.statement import lacking_part
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed

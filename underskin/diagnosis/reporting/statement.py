@@ -120,15 +120,6 @@ def lacking_part(text: str) -> str:
     return text.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
 
 
-def first_and_rest(report: Mapping[str, Any]) -> tuple[str, str]:
-    """The headline of a report without its full stop, and its statement; of a report that was kept without a headline,
-    the first sentence of the statement and the others."""
-    if report.get("headline"):
-        return report["headline"].rstrip("."), report["statement"]
-    first, _, rest = report["statement"].partition(". ")
-    return first.rstrip("."), rest
-
-
 def answer_clauses(
     answers: Sequence[Answer],
     verdict: str,
