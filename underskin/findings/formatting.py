@@ -99,6 +99,11 @@ def grouped_by_reason(problems: Iterable[tuple[str, str]]) -> list[tuple[str, st
     return grouped
 
 
+def left_out_lines(problems: Iterable[tuple[str, str]]) -> list[str]:
+    """Lines on recordings of which no number follows, from pairs of recording and reason."""
+    return [f"left out: {recordings_called(names)}: {why}" for names, why in grouped_by_reason(problems)]
+
+
 def recordings_called(names: str) -> str:
     """Names from `grouped_by_reason`, preceded by the noun."""
     return f"recording{'s' if ', ' in names else ''} {names}"
