@@ -217,12 +217,17 @@ def parameter_at_bound(mechanism: str, parameter: str, low: float, high: float, 
     return f"{mechanism}: {called} lies at or beyond an end of its search ({limits}), which is no result"
 
 
-def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float) -> str:
-    """Mechanisms that predict held-out groups no better."""
+def held_out(
+    groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float, *, shows: bool
+) -> str:
+    """Mechanisms that predict held-out groups no better; `shows`: whether the remaining rows show one of them."""
     omitted = " and ".join(groups) if len(groups) <= 2 else f"each of {len(groups)} parts in turn"
+    named = " and ".join(mechanisms)
+    if not shows:
+        return f"without what was left out ({omitted}) the rest shows no {named}: do not extrapolate with it"
     before, after = (float(f"{percent:.4g}") for percent in (before_percent, after_percent))  # as the report has them
     return (
-        f"what was left out ({omitted}) is predicted no better with {' and '.join(mechanisms)}: "
+        f"what was left out ({omitted}) is predicted no better with {named}: "
         f"{before:.3g} % before, {after:.3g} % after; do not extrapolate with it"
     )
 

@@ -10,7 +10,8 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.service.pages.forms import said, token_of
+from tests.service.pages.forms import said as page_text
+from tests.service.pages.forms import token_of
 from tests.support.repository import ROOT
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -297,4 +298,4 @@ def test_recordings_without_a_number_are_not_in_use(server: Server, unusable: se
     place = "/campaigns/" + server.http.post("/v1/campaigns?skin=thorns", json=document).json()["id"]
     for recording in document["recordings"]:
         state = "gives no d33" if recording["id"] in unusable else "in use"
-        assert said(server, place, f">{recording['id']}</a></th><td>FRF").endswith(state)
+        assert page_text(server, place, f">{recording['id']}</a></th><td>FRF").endswith(state)
