@@ -203,11 +203,18 @@ def at_bounds(explanation: Explanation) -> dict[str, Finding]:
         mechanism, name, unit = owner.get(index, "base model"), parameter.name.removeprefix("law_"), parameter.unit
         scale = multiple_of(explanation, parameter)
         low, high = scale * parameter.low, scale * parameter.high
-        end = f"{in_digits(low if side == 'low' else high, 3)} {unit.strip('-')}".rstrip()
-        words = f"{mechanism}: {name} at or beyond {end}, where its search ends".replace("_", " ")
+        words = at_bound_in_words(mechanism, parameter, side, scale)
         arguments = {"mechanism": mechanism, "parameter": name, "low": low, "high": high, "unit": unit}
         bounds[words] = Finding(Reason.PARAMETER_AT_BOUND, "", name, arguments)
     return bounds
+
+
+def at_bound_in_words(mechanism: str, parameter: Parameter, side: str, scale: float = 1.0) -> str:
+    """That a parameter is no result: "timing delay: delay at or beyond 5000 µs, where its search ends"."""
+    end = in_digits(scale * (parameter.low if side == "low" else parameter.high), 3)
+    value = f"{end} {parameter.unit.strip('-')}".rstrip()
+    name = parameter.name.removeprefix("law_")
+    return f"{mechanism}: {name} at or beyond {value}, where its search ends".replace("_", " ")
 
 
 COUNTS = 0.003  # probability below which an answer is left out of averages

@@ -159,7 +159,10 @@ def answer_clauses(
     if verdict == "unexplained":
         which = "known mechanisms" if all_tried else "mechanisms that were tried"
         return [f"something is missing that none of the {which} describes (probability {percent})"]
-    by_sets = f"by sets: {_answers_in_words([leader, *rivals])}" if rivals else ""
+    others = sum(answer.probability for answer in answers[1:]) - sum(answer.probability for answer in rivals)
+    further = f", or others, {in_percent(others)} together" if others > NAMED else ""
+    listed += further if listed else ""
+    by_sets = f"by sets: {_answers_in_words([leader, *rivals])}{further}" if rivals else ""
     if verdict == "explained":
         missing, by_mechanism = _lacking(leader, presence, mechanisms)
         means = _law(leader.names) or _strengths(mechanisms)
@@ -169,18 +172,23 @@ def answer_clauses(
         named = " and ".join(_group_in_words(group) for group in certain)
         if any(len(group["mechanisms"]) > 1 for group in certain):
             return [f"{named}: these recordings cannot tell which", by_sets]
-        return [f"{model} lacks {named}, but these recordings cannot tell what else", by_sets, _law(mentioned)]
+        alone = {group["mechanisms"][0] for group in certain}
+        strengths = _strengths([mechanism for mechanism in mechanisms if mechanism["name"] in alone])
+        missing = f"{model} lacks {named}, but these recordings cannot tell what else"
+        return [missing, strengths, by_sets, _law(mentioned)]
     but = list(bounds)
     but += [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
     but += [f"these rivals remain: {listed}"] if listed else []
     but = but or [f"many rivals remain, each below {in_percent(NAMED)}"]
+    common = " and ".join(_group_in_words(group) for group in certain)
     doubtful = bool(idle or bounds) and leader.names != (NOTHING_MISSING,)
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
         total = in_percent(sum(answer.probability for answer in answers if answer.kind == leader.kind))
         lead = f"known mechanisms explain this ({total} together), best {in_words(leader.names)} ({percent})"
-    return [f"{lead}, but {', and '.join(but)}", misfit, _law(mentioned)]
+    all_answers = f"over all answers together: {common}" if common and rivals else ""
+    return [f"{lead}, but {', and '.join(but)}", all_answers, misfit, _law(mentioned)]
 
 
 def _lacking(
