@@ -24,7 +24,7 @@ class RelativeLevel(BaseModel):
 
 
 class SensorLevel(BaseModel):
-    """d33 of one sensor in one of several campaigns, over all answers."""
+    """d33 of one sensor in one of several campaigns, over all answers by known mechanisms."""
 
     campaign: str = Field(description="Name of the campaign.")
     sensor: str = Field(description="Id of the sensor.")
@@ -36,7 +36,8 @@ class SensorLevel(BaseModel):
 
 
 class CampaignLevel(BaseModel):
-    """d33 of the array in one of several campaigns, over the sensors that these share and over all answers."""
+    """d33 of the array in one of several campaigns, over the sensors that these share and over all answers by known
+    mechanisms."""
 
     campaign: str = Field(description="Name of the campaign.")
     unit: str = Field(description="Of the three numbers.")
