@@ -114,6 +114,14 @@ def test_a_draft_takes_what_the_file_states(tmp_path: Path) -> None:
     assert "sensor s07, preload_n 1.5, indenter_radius_mm 4" in run("read", str(file), "--rig", str(rig)).stdout
 
 
+def test_a_column_with_blank_cells_is_told(tmp_path: Path) -> None:
+    """A number that stands once above the lines that it is for is no column, and is said to be left out."""
+    file = tmp_path / "sparse.csv"
+    rows = [f"{'' if line else number},{hz},{size}" for number in (1, 2) for line, (hz, size, _) in enumerate(LINES)]
+    file.write_text("\n".join(["Sensor,Frequency [Hz],|H| [pC/N]", *rows]))
+    assert "column 'Sensor' has a number in 2 of 8 rows, and is left out" in run("read", str(file)).stdout
+
+
 def test_the_table_says_what_each_column_is_taken_for(tmp_path: Path) -> None:
     answer = run("read", str(write_table(tmp_path, "long")))
     rows = {line.partition("  ")[0]: line.split()[-1] for line in answer.stdout.splitlines() if line}
