@@ -3,7 +3,7 @@
 KINDS = {
     "frf": "FRF: charge against a shaken force",
     "indentation": "indentation: force against depth",
-    "compression": "compression of a sample of the elastomer",
+    "compression": "compression or tension of a sample of the elastomer",
 }
 # Field, words, unit, and the kinds that have it.
 SKIN = (

@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 
 # Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
 # change: what an earlier version kept is then computed anew.
-ANSWER_VERSION = 5
+ANSWER_VERSION = 6
 
 
 class D33Value(BaseModel):
@@ -62,7 +62,7 @@ class CellD33(D33Value):
 class LeftOut(BaseModel):
     """Something that the figures do without."""
 
-    recording: str | None = Field(description="The recording; null where the reason names what is meant.")
+    recording: str | None = Field(description="The recording; null for a sensor, which the reason names.")
     reason: str = Field(description="Why.")
 
 

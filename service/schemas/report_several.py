@@ -16,8 +16,15 @@ class Scope(BaseModel):
     since: str | None = Field(default=None, description="The date from which on it is there.")
 
 
+class RelativeLevel(BaseModel):
+    """The interval of a d33 to compare it with other sensors and campaigns, as wide as by the leading answer alone."""
+
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+
+
 class SensorLevel(BaseModel):
-    """d33 of one sensor in one of several campaigns."""
+    """d33 of one sensor in one of several campaigns, over all answers by known mechanisms."""
 
     campaign: str = Field(description="Name of the campaign.")
     sensor: str = Field(description="Id of the sensor.")
@@ -25,16 +32,19 @@ class SensorLevel(BaseModel):
     value: float | None = Field(description="Its estimate.")
     low: float | None = Field(description="Lower end of its 95 % interval.")
     high: float | None = Field(description="Upper end of its 95 % interval.")
+    relative: RelativeLevel | None = Field(default=None, description="To compare sensors and campaigns.")
 
 
 class CampaignLevel(BaseModel):
-    """d33 of the array in one of several campaigns, over the sensors that these share."""
+    """d33 of the array in one of several campaigns, over the sensors that these share and over all answers by known
+    mechanisms."""
 
     campaign: str = Field(description="Name of the campaign.")
     unit: str = Field(description="Of the three numbers.")
     value: float | None = Field(description="Its estimate.")
-    low: float | None = Field(description="Lower end of its 95 % interval between campaigns.")
-    high: float | None = Field(description="Upper end of its 95 % interval between campaigns.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+    relative: RelativeLevel | None = Field(default=None, description="To compare campaigns.")
 
 
 class SkinValue(BaseModel):

@@ -16,6 +16,8 @@ from service.usecases import figure_data
 from service.usecases.adopted_models import ModelInForce, model_in_force
 from service.usecases.campaign_d33 import of_array, of_inversion, of_moduli
 from underskin import InvalidInput, TableError
+from underskin.findings.finding import Finding
+from underskin.findings.formatting import left_out_lines
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -115,17 +117,26 @@ def derive(
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
-    """The findings on a campaign before it is stored, after a note on FRFs that will give no d33, and why."""
+    """The findings on a campaign before it is stored, after notes on FRFs that will give no d33, and on curves that
+    will give no modulus, and why."""
     document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **_PAPER}
     fields = _computed(document, campaign, table, None, [])[0]
+    curves = {curve.id for curve in campaign.curves}
+    without_modulus = [
+        (left["recording"], left["reason"]) for left in fields["left_out"] if left["recording"] in curves
+    ]
     findings: list[str] = fields["findings"]
-    return [*_without_d33(campaign, fields, table), *findings]
+    return [*_without_d33(campaign, fields, table), *left_out_lines(without_modulus), *findings]
 
 
 def _without_d33(campaign: Campaign, fields: dict[str, Any], table: SigmaTable) -> list[str]:
     """A sentence if a campaign's FRFs, or some of them, will give no d33; and the load parameter L."""
-    frfs = len(campaign.of(FrfRecording))
-    reasons = [exclusion["reason"] for exclusion in fields["left_out"] if exclusion["recording"] is None]
+    frfs = {recording.id for recording in campaign.of(FrfRecording)}
+    reasons = [
+        left["reason"] if left["recording"] is None else f"recording {left['recording']}: {left['reason']}"
+        for left in fields["left_out"]
+        if left["recording"] is None or left["recording"] in frfs
+    ]
     if not frfs or (fields["status"] == "ok" and not reasons):
         return []
     if fields["status"] == "ok":
@@ -231,7 +242,12 @@ def _inverted(
         findings = [finding.sentence for finding in plausibility.at_reading(campaign)]
         fields = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
         return {**_NONE, **fields}, None
-    excluded = [{"recording": None, "reason": exclusion.sentence} for exclusion in inversion.left_out]
+    excluded = [
+        {"recording": left.recording, "reason": left.statement}
+        if isinstance(left, Finding) and left.recording
+        else {"recording": None, "reason": left.sentence}
+        for left in inversion.left_out
+    ]
     return {**of_inversion(inversion), "moduli": moduli, "left_out": excluded + without_modulus}, inversion
 
 

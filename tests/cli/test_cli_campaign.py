@@ -165,6 +165,19 @@ def test_instrument_files_need_rig_tell_modulus(tmp_path: Path) -> None:
     assert (wrong.returncode, wrong.stderr) == (2, f"underskin: {rig}: schema = 'rig/9': must be rig/1\n")
 
 
+def test_a_pulled_sample_is_not_called_compressed(palm: Campaign, tmp_path: Path) -> None:
+    """The modulus of a pulled cylinder is said to be by tension."""
+    stretch = np.linspace(1.0, 1.5, 60)
+    force = -9 * np.pi / 3 * (stretch - stretch**-2)
+    strip = CompressionRecording(
+        id="strip", sample_height_mm=20.0, sample_diameter_mm=6.0, displacement_mm=20 * (1 - stretch), force_n=force
+    )
+    (tmp_path / "strip.json").write_bytes(json_file.write(replace(palm, recordings=(strip,))))
+    told = run("d33", str(tmp_path / "strip.json"))
+    assert re.search(r"strip +1 .* tension: neo-Hookean from 0 to 50 % strain", told.stdout), told.stdout
+    assert "compression" not in told.stdout
+
+
 @pytest.mark.slow
 def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None:
     strain = np.linspace(0, 0.1, 50)

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import openpyxl
 import pytest
 import yaml
 
@@ -11,6 +12,7 @@ from tests.cli.commands import run
 LINES = [(10.0, 7.0, -2.0), (20.0, 7.25, -4.5), (40.0, 7.5, -9.0), (80.0, 7.6, -18.0)]
 LONG = "Sensor;Sphere diameter [mm];Preload [N];Dynamic force [N];Frequency [Hz];|H| [pC/N];Phase [deg]"
 WIDE = "f [Hz],s01 |H| [pC/N],s01 phase [deg],s02 |H| [pC/N],s02 phase [deg]"
+HEADED = "# fs: 2 kHz\n# Preload: 1.5 N\n# Sensor: s07\nForce [N],Charge [pC]"
 SERIES = "Time [s],Force [N],Charge [pC]"
 CURVE = "Depth [mm]\tLoad [mN]"
 
@@ -24,9 +26,33 @@ def write_table(folder: Path, form: str) -> Path:
         file.write_text("\n".join([WIDE, *(f"{hz},{size},{phase},{size},{phase}" for hz, size, phase in LINES)]))
     elif form == "series":
         file.write_text("\n".join([SERIES, *(f"{row / 1000},{1 + row % 2},{7 + 7 * (row % 2)}" for row in range(64))]))
+    elif form == "headed":
+        file.write_text("\n".join([HEADED, *(f"{1 + row % 2},{7 + 7 * (row % 2)}" for row in range(64))]))
+    elif form == "merged":
+        write_merged(file := file.with_suffix(".xlsx"))
     else:
         file.write_text("\n".join([CURVE, *(f"{row / 100}\t{row**1.5:.4f}" for row in range(30))]))
     return file
+
+
+def write_merged(file: Path) -> None:
+    """Two sensors by number and two preloads each, in cells that are merged over their lines; a merged title."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    sheet.append(["May", None, "all sensors"])
+    sheet.append(["Sensor", "Preload [N]", "Frequency [Hz]", "|H| [pC/N]", "Phase [deg]"])
+    sheet.merge_cells("A1:B1")
+    for number in range(4):
+        for line, (hz, size, phase) in enumerate(LINES):
+            sheet.append([None, None, hz, size, phase])
+            if line == 0:
+                sheet.cell(sheet.max_row, 1, 1 + number // 2 if number % 2 == 0 else None)
+                sheet.cell(sheet.max_row, 2, 0.5 + number % 2)
+        sheet.merge_cells(f"B{3 + 4 * number}:B{6 + 4 * number}")
+    for first in (3, 11):
+        sheet.merge_cells(f"A{first}:A{first + 7}")
+    book.save(file)
 
 
 def completed(document: dict[str, Any]) -> dict[str, Any]:
@@ -50,6 +76,8 @@ def completed(document: dict[str, Any]) -> dict[str, Any]:
             2,
         ),
         ("series", "skin.sensor_radius_mm, recording.indenter_radius_mm, recording.preload_n", 1),
+        ("headed", "skin.sensor_radius_mm, recording.indenter_radius_mm, skin.sensors", 1),
+        ("merged", "recording.indenter_radius_mm, recording.dynamic_force_n, skin.sensors", 4),
         ("curve", "# To be completed: recording.indenter_radius_mm.", 1),
     ],
 )
@@ -71,6 +99,27 @@ def test_a_completed_draft_reads_the_file(form: str, missing: str, recordings: i
     assert read.returncode == 0
     assert f": {recordings} recordings" in read.stdout
     assert "left out" not in read.stdout
+
+
+def test_a_draft_takes_what_the_file_states(tmp_path: Path) -> None:
+    """Rate, preload and sensor stated above the columns are in the draft, and count once it is completed."""
+    file, rig = write_table(tmp_path, "headed"), tmp_path / "rig.yaml"
+    run("read", str(file), "--draft", str(rig))
+    draft = yaml.safe_load(rig.read_text())
+    assert sorted(name for name, value in draft["recording"].items() if value is not None) == [
+        *("preload_n", "sample_rate_hz", "sensor"),
+    ]
+    assert [sensor["id"] for sensor in draft["skin"]["sensors"]] == ["s07"]
+    rig.write_text(yaml.safe_dump(completed(draft)))
+    assert "sensor s07, preload_n 1.5, indenter_radius_mm 4" in run("read", str(file), "--rig", str(rig)).stdout
+
+
+def test_a_column_with_blank_cells_is_told(tmp_path: Path) -> None:
+    """A number that stands once above the lines that it is for is no column, and is said to be left out."""
+    file = tmp_path / "sparse.csv"
+    rows = [f"{'' if line else number},{hz},{size}" for number in (1, 2) for line, (hz, size, _) in enumerate(LINES)]
+    file.write_text("\n".join(["Sensor,Frequency [Hz],|H| [pC/N]", *rows]))
+    assert "column 'Sensor' has a number in 2 of 8 rows, and is left out" in run("read", str(file)).stdout
 
 
 def test_the_table_says_what_each_column_is_taken_for(tmp_path: Path) -> None:

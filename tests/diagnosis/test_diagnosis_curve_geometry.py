@@ -49,10 +49,10 @@ def block(strain: Floats, stress_mpa: Floats) -> underskin.Campaign:
     return read
 
 
-def neo_hookean(strain: Floats) -> Floats:
-    """Nominal stress [MPa] of 1 MPa, compression positive, with noise of 0.1 % of the largest."""
+def neo_hookean(strain: Floats, noise: float = 1e-3) -> Floats:
+    """Nominal stress [MPa] of 1 MPa, compression positive, with noise relative to the largest."""
     stress = ((1 - strain) ** -2 - (1 - strain)) / 3
-    return np.asarray(stress + 1e-3 * np.abs(stress).max() * np.random.default_rng(3).normal(size=len(strain)))
+    return np.asarray(stress + noise * np.abs(stress).max() * np.random.default_rng(3).normal(size=len(strain)))
 
 
 @pytest.mark.parametrize("largest", [0.08, 0.3])
@@ -96,6 +96,18 @@ def test_pulled_strip_told_without_spheres() -> None:
     assert "pressed" not in report.statement
 
 
+def test_few_points_of_a_pulled_strip_are_not_contradicted() -> None:
+    """Of several strengths each may be zero, and all together not: a strip that stiffens only where it is pulled
+    farthest is not said to stiffen in doubt, nor to have been predicted by a law that the rest does not show."""
+    stretch = 1 + np.array([0, 2, 6, 12, 20, 30, 40, 55, 70, 90, 110, 140, 170, 200, 230, 260]) / 100
+    stiffens = neo_hookean(1 - stretch, noise=0.0) * (1 + 0.014 * (stretch**2 + 2 / stretch - 3))
+    report = diagnosed(block(1 - stretch, stiffens))
+    assert [one.name for one in report.mechanisms] == ["strain_stiffening"]
+    assert "at which nothing changes" not in report.statement
+    assert "no better with" not in report.statement
+    assert "the rest shows no strain stiffening: do not extrapolate" in report.statement
+
+
 def test_a_declared_layer_is_no_guess() -> None:
     """The layer stands beside the half space with equal odds: it explains, and is not ambiguous with stiffening."""
     depth = ways(-0.05, 0.2, samples=400)
@@ -113,6 +125,29 @@ def test_layer_unknown_thickness_not_told() -> None:
     assert report.verdict == "ambiguous"
     assert "declare thickness_mm" in report.statement
     assert "stiffening" in report.statement
+
+
+@pytest.mark.parametrize(("true_mm", "declared_mm"), [(2.0, 0.8), (0.8, 2.0)])
+def test_a_wrong_thickness_is_a_rival_of_stiffening(true_mm: float, declared_mm: float) -> None:
+    """A layer pressed by a tenth of its thickness or more, with a wrong thickness declared: the true one is told."""
+    depth = ways(-0.05, 0.2, samples=400)
+    force = pressed(depth, bonded_layer(true_mm, 2.0))
+    report = diagnosed(campaign(depth, force, timed=False, skin={"thickness_mm": declared_mm}))
+    assert report.verdict == "ambiguous"
+    told = re.search(rf"not be the declared {declared_mm:g} mm: a layer of .* mm \((\S+) to (\S+)\)", report.statement)
+    assert told, report.statement
+    low, high = map(float, told.groups())
+    assert low < true_mm < high < 1.7 * low
+    assert f"a layer of the declared {declared_mm:g} mm" in report.statement
+    assert any(finding.code == "thickness_differs" for finding in report.findings)
+
+
+def test_a_thick_sample_declared_thin_is_told() -> None:
+    """Hertz's law holds; that the declared layer was tried, and does not show, is told."""
+    depth = ways(-0.05, 0.2, samples=400)
+    report = diagnosed(campaign(depth, pressed(depth), timed=False, skin={"thickness_mm": 1.0}))
+    assert report.verdict == "no_mismatch"
+    assert "with a layer of the declared 1 mm on a stiff base" in report.statement
 
 
 def test_a_sphere_pressed_deep_lacks_nothing() -> None:

@@ -1,5 +1,6 @@
 """Campaigns of one skin diagnosed together: what acts in all, what appeared and since when, what a block tells all."""
 
+import re
 from dataclasses import replace
 from html import unescape
 from typing import Any
@@ -121,6 +122,41 @@ def test_two_sensors_d33_since_date_exchanged(table: SigmaTable) -> None:
     assert finding["code"] == "sensors_exchanged"
     if SOAK:
         assert "exchanged" not in reported([before, with_gain(after, s05=0.8, s02=0.8)], table, "ageing")["statement"]
+
+
+def of_four(campaign: Campaign) -> Campaign:
+    """Of the first four sensors alone."""
+    entries = frf_recordings(campaign)
+    sensors = list(dict.fromkeys(entry.sensor for entry in entries))[:4]
+    return replace(campaign, recordings=tuple(entry for entry in entries if entry.sensor in sensors))
+
+
+@pytest.mark.parametrize("is_exchange", [True, False])
+def test_half_of_four_sensors_change(table: SigmaTable, *, is_exchange: bool) -> None:
+    """Two of four sensors that change are named with their changes, as an exchange where they have each other's d33.
+
+    The array's change is as certain as by the two others.
+    """
+    before, after = map(of_four, dates())
+    first, second = list(dict.fromkeys(entry.sensor for entry in frf_recordings(before)))[1:3]
+    if is_exchange:
+        before, after = (
+            with_gain(before, **{first: 1.18, second: 0.85}),
+            with_gain(after, **{first: 0.85, second: 1.18}),
+        )
+    else:
+        after = with_gain(after, **{first: 0.72, second: 1.2})
+    report = reported([before, after], table)
+    if is_exchange:
+        said = re.search(rf"Sensors {first} and {second} look exchanged since .*\({first} (\S+) %", report["statement"])
+    else:
+        said = re.search(rf"d33 of sensor {first}, beyond the others, fell by (\S+) %", report["statement"])
+        assert f"d33 of sensor {second}, beyond the others, rose by" in report["statement"]
+    assert said, report["statement"]
+    assert abs(float(said[1])) == pytest.approx(28.0, abs=4.0)
+    for row in report["d33"]["per_campaign"]:
+        assert row["relative"]["high"] / row["relative"]["low"] < 1.1
+        assert row["high"] / row["low"] >= 0.99 * row["relative"]["high"] / row["relative"]["low"]
 
 
 def silent(campaign: Campaign, sensor: str, seed: int) -> Campaign:

@@ -20,7 +20,7 @@ from rich.text import Text
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
-from underskin.findings.formatting import grouped_by_reason, recordings_called, significant
+from underskin.findings.formatting import left_out_lines, significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
 from underskin.inversion.invert import Inversion, array_d33_by_other, invert
@@ -80,8 +80,7 @@ class InvertedFile:
         refused += [
             (modulus.recording, modulus.result) for modulus in self.moduli if isinstance(modulus.result, InvalidInput)
         ]
-        for names, why in grouped_by_reason((recording, str(why)) for recording, why in refused):
-            notes.append(f"left out: {recordings_called(names)}: {why}")
+        notes += left_out_lines((recording, str(why)) for recording, why in refused)
         if isinstance(self.inversion, Inversion):
             notes += [f"left out: {omission.sentence}" for omission in self.inversion.left_out]
         return notes
@@ -181,7 +180,9 @@ def _elastomer(moduli: Sequence[RecordingModulus]) -> Table:
     for modulus in moduli:
         if not isinstance(modulus.result, InvalidInput):
             numbers = to_lab("youngs_modulus_mpa", [modulus.result.modulus, modulus.result.uncertainty]).tolist()
-            table.add_row(Text(modulus.recording), *_short(numbers), f"{modulus.kind}: {modulus.result.statement}")
+            table.add_row(
+                Text(modulus.recording), *_short(numbers), f"{modulus.result.load}: {modulus.result.statement}"
+            )
     return table
 
 

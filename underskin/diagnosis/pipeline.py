@@ -31,6 +31,7 @@ from underskin.diagnosis.validation.cross_validation import (
     largest_floor_percent,
     nearest_law_findings,
 )
+from underskin.diagnosis.validation.declared_thickness import thickness_findings
 from underskin.diagnosis.validation.imitation import odds_of_imitated_laws
 from underskin.diagnosis.validation.signatures import (
     Signatures,
@@ -182,6 +183,7 @@ def _diagnose_curves(
     joined = other_kinds.joined(fit)
     problem, result = joined.problem, joined.search
     result = replace(result, laws=tuple(with_laws(problem, result)))
+    partial = partial.with_findings(*thickness_findings(campaign, problem, result))
     return _complete(replace(partial, curves=campaign, joined=joined), problem, result, progress, limits)
 
 

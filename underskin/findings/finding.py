@@ -133,6 +133,18 @@ def thickness_unknown(answer: str, is_tried: bool) -> str:
     return f"{undeclared}, and {layer}, {tried}, stiffens a curve much like {answer}: declare thickness_mm"
 
 
+def thickness_differs(
+    declared_mm: float, value_mm: float, low_mm: float, high_mm: float, modulus_mpa: float, *, better: bool
+) -> str:
+    """A layer of another thickness than the declared one, which the curves show as well."""
+    value, low, high = (in_digits(end, 3) for end in (value_mm, low_mm, high_mm))
+    how = "better than" if better else "about as well as"
+    return (
+        f"the thickness may not be the declared {declared_mm:g} mm: a layer of {value} mm ({low} to {high}) on a stiff "
+        f"base describes these curves {how} the stated answer, with a Young's modulus of {modulus_mpa:.3g} MPa"
+    )
+
+
 def more_alike(count: int, noun: str) -> str:
     """The number of further cases, in brackets; empty for 0."""
     return f" ({count} more {noun}{'s' if count > 1 else ''} like it)" if count else ""
@@ -217,12 +229,17 @@ def parameter_at_bound(mechanism: str, parameter: str, low: float, high: float, 
     return f"{mechanism}: {called} lies at or beyond an end of its search ({limits}), which is no result"
 
 
-def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float) -> str:
-    """Mechanisms that predict held-out groups no better."""
+def held_out(
+    groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float, *, shows: bool
+) -> str:
+    """Mechanisms that predict held-out groups no better; `shows`: whether the remaining rows show one of them."""
     omitted = " and ".join(groups) if len(groups) <= 2 else f"each of {len(groups)} parts in turn"
+    named = " and ".join(mechanisms)
+    if not shows:
+        return f"without what was left out ({omitted}) the rest shows no {named}: do not extrapolate with it"
     before, after = (float(f"{percent:.4g}") for percent in (before_percent, after_percent))  # as the report has them
     return (
-        f"what was left out ({omitted}) is predicted no better with {' and '.join(mechanisms)}: "
+        f"what was left out ({omitted}) is predicted no better with {named}: "
         f"{before:.3g} % before, {after:.3g} % after; do not extrapolate with it"
     )
 
@@ -551,6 +568,9 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: parameter_at_bound,
     Reason.THICKNESS_UNKNOWN: thickness_unknown,
+    Reason.DECLARED_LAYER: "with a layer of the declared {declared_mm:g} mm on a stiff base (layered contact) the "
+    "recordings are {less} less probable: check the thickness, and that the sample is bonded",
+    Reason.THICKNESS_DIFFERS: thickness_differs,
     Reason.LINE_NOISE_LEVEL: "the lines scatter {level:digits 2} times more about the stated answer than about their "
     "own "
     "neighbours: part of the misfit along frequency may have been taken for noise",

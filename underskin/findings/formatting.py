@@ -1,5 +1,6 @@
 """Numbers, probabilities, lists and clauses for readers, and equal problems of many recordings in one line."""
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
@@ -20,6 +21,11 @@ def in_percent(probability: float) -> str:
     if 0.001 <= stated <= 0.999:
         return f"{100 * stated:.3g} %"
     return "under 0.1 %" if stated < 0.5 else "over 99.9 %"
+
+
+def times_in_words(nats: float) -> str:
+    """exp(nats) as a factor: "about 40 times", "more than a million times"."""
+    return f"about {in_digits(math.exp(nats), 1)} times" if nats < math.log(1e6) else "more than a million times"
 
 
 def in_digits(value: float, digits: int = 4) -> str:
@@ -97,6 +103,11 @@ def grouped_by_reason(problems: Iterable[tuple[str, str]]) -> list[tuple[str, st
             more = f" and {len(recordings) - _NAMED} more" if len(recordings) > _NAMED else ""
             grouped.append((f"{', '.join(recordings[:_NAMED])}{more}", reason))
     return grouped
+
+
+def left_out_lines(problems: Iterable[tuple[str, str]]) -> list[str]:
+    """Lines on recordings of which no number follows, from pairs of recording and reason."""
+    return [f"left out: {recordings_called(names)}: {why}" for names, why in grouped_by_reason(problems)]
 
 
 def recordings_called(names: str) -> str:

@@ -122,7 +122,7 @@ def differ_from_others(values: Floats, uncertainties: Floats) -> Mask:
 FEWEST_DATES = 3  # needed to separate scatter from change
 _SMOOTHED = 6  # dates: with five the smoothed change is at most a fourth more precise than the difference of the ends
 FEWEST_SENSORS = 3  # needed to distinguish one from the others
-_PRIOR_SENSORS = 4.0  # weight of the stated uncertainties against the observed scatter, in sensors
+PRIOR_SENSORS = 4.0  # weight of the stated uncertainties against the observed scatter, in sensors
 # Priors: the probability of none, and the scale. g: gains of single recordings scatter by 1 to 5 %, of which mounting
 # and amplifier are a part (PHYSICS.md, section 8); a chain that stays as it was differs by a percent from date to date,
 # seldom by three, so half-normal. q: as wide as the sensors of an array are spread (mixed_model), half-Cauchy.
@@ -182,6 +182,8 @@ def array_levels(value: Floats, deviation: Floats) -> ArrayLevels:
         chance = chdtrc(np.maximum(freedom, 1), score / scatter**2)
         departs = counted & (chance < BY_CHANCE / counted.sum())
     pooled = counted & ~departs
+    if departs.any():  # the scatter of all contains theirs
+        scatter = _scatter_of_others(score, np.where(departs, 0, freedom))
     level, of_level = _weighted(y, valid & pooled[:, None], u * scatter[:, None])
     levelled = valid & np.isfinite(level)
     off = np.where(levelled, y - np.where(levelled, level, 0.0), 0.0)
@@ -273,12 +275,12 @@ def _scatter_of_others(score: Floats, freedom: Floats) -> Floats:
     """The scatter of the other sensors from date to date relative to their uncertainties (sensors,), which assume the
     gain scatter of a usual rig. The median of squares is used, so that a second departing sensor has no effect."""
     counted = freedom > 0
-    if counted.sum() < FEWEST_SENSORS:
+    if counted.sum() < 2:
         return np.ones(len(score))
     usual = np.where(counted, score / np.where(counted, chdtri(np.maximum(freedom, 1), 0.5), 1.0), np.nan)
     typical = np.array([np.nanmedian(np.delete(usual, sensor)) for sensor in range(len(score))])
     others = counted.sum() - 1
-    return np.sqrt((_PRIOR_SENSORS + others * typical) / (_PRIOR_SENSORS + others))
+    return np.sqrt((PRIOR_SENSORS + others * typical) / (PRIOR_SENSORS + others))
 
 
 def _weighted(y: Floats, valid: Mask, deviation: Floats) -> tuple[Floats, Floats]:

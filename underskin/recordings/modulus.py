@@ -85,10 +85,21 @@ class CompressionModulus:
     is_pressed: bool  # whether it ends in compression
 
     @property
+    def load(self) -> str:
+        """How the sample was loaded, in words."""
+        if self._first_strain < 0 < self.last_strain:
+            return "compression and tension"
+        return "compression" if self.is_pressed else "tension"
+
+    @property
+    def _first_strain(self) -> float:
+        return 0.0 if abs(self.first_strain) < _FOOT * self.last_strain else self.first_strain
+
+    @property
     def statement(self) -> str:
         """The law and its range in words."""
         law = "straight" if self.is_straight else "neo-Hookean"
-        first = 0.0 if abs(self.first_strain) < _FOOT * self.last_strain else self.first_strain
+        first = self._first_strain
         begins, ends = ("pulled", "pressed") if self.is_pressed else ("pressed", "pulled")
         follows = f"{law} from {100 * first:.3g} to {100 * self.last_strain:.3g} % strain"
         if first < 0 < self.last_strain:
@@ -337,6 +348,7 @@ class IndentationModulus:
     declared_thickness: float | None
     noise: float
     finite_strain: float = 0.0  # increase of E by the solved contact [Pa]
+    load = "indentation"  # in words
 
     @property
     def statement(self) -> str:

@@ -142,7 +142,9 @@ def of_contents(contents: Contents) -> dict[str, Any]:
 def _sensors(contents: Contents, document: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The sensors that the file names, whose positions are missing."""
     names = [one["sensor"] for one in document.get("recordings", [])]
-    column = document["recording"].get("sensor", {}).get("channel")
+    named = document["recording"].get("sensor", {})
+    names += [str(contents.properties[named["property"]])] if "property" in named else []
+    column = named.get("channel")
     for block in contents.blocks if column else ():
         words, channel = block.words(column), block.headed(column)
         names += list(words.texts) if words is not None else []
@@ -261,8 +263,9 @@ def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str
 
 def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
     """The recording's fields that the file itself states under their own names."""
-    named = {field: stated for stated in properties for field in (stated, *(lab_field(stated) or ())[:1])}
-    rate = next((stated for stated in properties if stated.lower().replace(" ", "_") in _RATES), None)
+    bare = {(in_brackets(stated) or (stated,))[0].lower().replace(" ", "_"): stated for stated in properties}
+    named = bare | {field: stated for stated in properties for field in (stated, *(lab_field(stated) or ())[:1])}
+    rate = next((stated for name, stated in bare.items() if name in _RATES), None)
     if rate is not None:
         named[_RATE] = rate
     when = None if dated else _time_stated(properties)

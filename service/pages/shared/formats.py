@@ -125,7 +125,8 @@ def capitalize_first(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-_RECORDINGS = {"frf": "FRFs", "indentation": "indentation curves", "compression": "compression curves"}
+_RECORDINGS = {"frf": "FRFs", "indentation": "indentation curves", "compression": "compression or tension curves"}
+_KIND = {"frf": "FRF", "compression": "compression or tension"}
 
 
 def recordings(kinds: Sequence[str]) -> str:
@@ -133,9 +134,14 @@ def recordings(kinds: Sequence[str]) -> str:
     return ", ".join(_RECORDINGS.get(kind, kind) for kind in kinds)
 
 
+def kind(name: str) -> str:
+    """The kind of a recording in words."""
+    return _KIND.get(name, name)
+
+
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
     "in_percent": in_percent, "interval": interval, "end_of": end_of, "change_in_percent": change_in_percent,
     "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings, "reaches_up": reaches_up,
-    "in_readable_units": in_readable_units,
+    "in_readable_units": in_readable_units, "kind": kind,
 }  # fmt: skip

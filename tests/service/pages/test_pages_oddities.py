@@ -10,6 +10,7 @@ import httpx
 import numpy as np
 import pytest
 
+from tests.service.pages.forms import said as page_text
 from tests.service.pages.forms import token_of
 from tests.support.repository import ROOT
 from tests.support.store_server import Place, Server, campaign, running
@@ -283,3 +284,18 @@ def test_example_comes_back_once_withdrawn(tmp_path: Path) -> None:
 def _in_use(server: Server) -> list[str]:
     found = server.http.get("/v1/campaigns", params={"skin": "example", "state": "current"}).json()["campaigns"]
     return [entry["id"] for entry in found]
+
+
+@pytest.mark.parametrize(
+    "unusable", [{"s0-1N"}, {f"s{sensor}-{preload}N" for sensor in range(3) for preload in (1, 2)}]
+)
+def test_recordings_without_a_number_are_not_in_use(server: Server, unusable: set[str]) -> None:
+    """Recordings whose contacts are beyond the table are said to give no d33, the others to be in use."""
+    document = campaign("thorns")
+    for recording in document["recordings"]:
+        recording["indenter_radius_mm"] *= 0.02 if recording["id"] in unusable else 1.0
+    document["units_checked"] = True
+    place = "/campaigns/" + server.http.post("/v1/campaigns?skin=thorns", json=document).json()["id"]
+    for recording in document["recordings"]:
+        state = "gives no d33" if recording["id"] in unusable else "in use"
+        assert page_text(server, place, f">{recording['id']}</a></th><td>FRF").endswith(state)

@@ -4,6 +4,7 @@ import base64
 import html
 import io
 import re
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -12,6 +13,7 @@ import openpyxl
 import orjson
 import pytest
 
+from tests.cli.commands import run
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.store_server import Server
 
@@ -200,3 +202,17 @@ def test_a_tare_is_told_in_words(client: httpx.Client) -> None:
     upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}))
     upload.say(indenter_radius_mm="0.0075", units_checked="yes", **{"tare-force_n": "10"})
     assert "<li>the force is 0 on average over the first 10 % of all samples of each curve" in upload.page
+
+
+def test_page_and_command_say_the_same_of_a_punch(client: httpx.Client, tmp_path: Path) -> None:
+    """A flat punch declared as a sphere gives no modulus, as the command says, before the file is kept."""
+    depth = np.linspace(-0.1, 0.3, 201)
+    text = table({"Depth (mm)": depth, "Force (N)": np.where(depth > 0, 8 / 3 * depth, 0.0)})
+    upload = Upload(client, text)
+    upload.say(kind="indentation", indenter_radius_mm="1", poisson_ratio="0.5")
+    (tmp_path / "curve.txt").write_text(text)
+    (tmp_path / "rig.json").write_bytes(client.get(f"{upload.address}/rig.json").content)
+    answer = run("d33", str(tmp_path / "curve.txt"), "--rig", str(tmp_path / "rig.json"))
+    (said,) = [line for line in answer.stdout.splitlines() if line.startswith("left out: ")]
+    assert "as under a flat punch" in said
+    assert said in html.unescape(upload.page)

@@ -27,6 +27,7 @@ KNOWN = {
     3: ("c41e6ef11406b7c7", 13.402, 0.105487),  # findings of times and places
     4: ("53a90e4aa097fad6", 13.402, 0.105487),  # tolerances of the skin in the array's interval
     5: ("596c8b1b59e43529", 13.402, 0.105487),  # by the solved contact too
+    6: ("596c8b1b59e43529", 13.402, 0.105487),  # recordings that are left out by their ids
 }
 
 

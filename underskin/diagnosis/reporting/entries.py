@@ -6,8 +6,6 @@ Written for experimenters: percentages and values with units, no further statist
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from underskin.diagnosis.data.dataset import WORDS
 from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.localisation import (
@@ -20,7 +18,7 @@ from underskin.diagnosis.localisation import (
 )
 from underskin.diagnosis.planning.optimal_design import WRONG_MODULUS, NextRecordings
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Answer
-from underskin.findings.formatting import in_digits, in_percent, listed
+from underskin.findings.formatting import in_digits, in_percent, listed, times_in_words
 
 _MOST_UNLISTED = P_NOT_IN_MODEL_SPACE + 1e-3  # largest probability of none_of_these where no unlisted law shows
 _IN_PERCENT = 90.0  # beyond it an effect is given as a factor
@@ -66,8 +64,7 @@ def why_not(answer: Answer, leader: Answer) -> str:
         return "what it leaves of the misfit is not noise"
     less = leader.explanation.log_evidence - answer.explanation.log_evidence
     if less > 1:
-        factor = f"about {in_digits(np.exp(less), 1)}" if less < np.log(1e6) else "more than a million"
-        return f"the recordings are {factor} times less probable under it"
+        return f"the recordings are {times_in_words(less)} less probable under it"
     return "it explains no more and is less probable beforehand" if less > -1 else "it is less probable beforehand"
 
 

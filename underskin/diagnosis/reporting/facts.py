@@ -127,12 +127,21 @@ class Facts:
         return self.problem.kind == "indentation" and self.problem.lines.campaign.skin.thickness_mm is None
 
     @property
+    def other_thickness(self) -> list[str]:
+        """A clause on a layer of another thickness than the declared one, where the curves show it as well."""
+        findings = self.diagnosis.findings
+        return [finding.statement for finding in findings if finding.reason == Reason.THICKNESS_DIFFERS]
+
+    @property
     def _may_be_the_other(self) -> bool:
-        """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens with depth.
+        """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens with depth, or a
+        declared one may be wrong.
 
         That is so where the evidence of one in place of the other is above that which an idealised contact law may
         have.
         """
+        if self.other_thickness:
+            return True
         names = frozenset(self.shown.names)
         stiffening = names & _STIFFER_WITH_DEPTH
         if not self._has_unknown_thickness or len(stiffening) != 1:

@@ -12,6 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtri
 
 from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, MOST_NAMED, NAMED
 from underskin.diagnosis.inference.evidence import levels_covariance, profile_end
@@ -24,7 +25,7 @@ from underskin.diagnosis.slips.levels import LEAST_LEVELS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
-from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, mixture_quantile
+from underskin.inversion.mixed_model import LEVEL, ROBUST, SDS_OF_95, mixture_quantile
 from underskin.mechanisms.base import Parameter
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.frf import FrfModel
@@ -151,7 +152,8 @@ def multiple_of(explanation: Explanation, parameter: Parameter) -> float:
 
 
 def without_effect(explanation: Explanation) -> list[str]:
-    """The mechanisms whose every strength may be zero: its 95 % interval holds the value without effect.
+    """The mechanisms whose strengths may all be zero: the 95 % interval of each holds the value without effect, and so
+    does the 95 % region of several together, which may each be replaced by another.
 
     A strength is a parameter with such a value (`limit`); on a logarithmic scale none reaches 0 or ∞.
     """
@@ -163,9 +165,22 @@ def without_effect(explanation: Explanation) -> list[str]:
             for stated, limit in zip(parameters_of(explanation, name), limits, strict=True)
             if limit is not None
         ]
-        if strengths and all(stated["low"] <= limit <= stated["high"] for stated, limit in strengths):
+        zero = strengths and all(stated["low"] <= limit <= stated["high"] for stated, limit in strengths)
+        if zero and not _act_together(explanation, span):
             idle.append(name)
     return idle
+
+
+def _act_together(explanation: Explanation, span: slice) -> bool:
+    """Whether the 95 % region of several strengths together excludes their values without effect: δᵀC⁻¹δ > χ²."""
+    means, parameters = explanation.best.hypothesis.mean_indices, explanation.model.parameters
+    strengths = {index: parameters[index].fit_limit for index in range(span.start, span.stop) if index in means}
+    limits = {index: limit for index, limit in strengths.items() if limit is not None}
+    if len(limits) < 2:
+        return False
+    off = explanation.point.fit[list(limits)] - np.array(list(limits.values()))
+    precision = np.linalg.pinv(covariance_of(explanation, list(limits)), hermitian=True)
+    return bool(off @ precision @ off > chdtri(len(limits), 1 - LEVEL))
 
 
 _MEASURED = ("d33", "youngs_modulus")  # free parameters that belong to no mechanism
@@ -188,11 +203,18 @@ def at_bounds(explanation: Explanation) -> dict[str, Finding]:
         mechanism, name, unit = owner.get(index, "base model"), parameter.name.removeprefix("law_"), parameter.unit
         scale = multiple_of(explanation, parameter)
         low, high = scale * parameter.low, scale * parameter.high
-        end = f"{in_digits(low if side == 'low' else high, 3)} {unit.strip('-')}".rstrip()
-        words = f"{mechanism}: {name} at or beyond {end}, where its search ends".replace("_", " ")
+        words = at_bound_in_words(mechanism, parameter, side, scale)
         arguments = {"mechanism": mechanism, "parameter": name, "low": low, "high": high, "unit": unit}
         bounds[words] = Finding(Reason.PARAMETER_AT_BOUND, "", name, arguments)
     return bounds
+
+
+def at_bound_in_words(mechanism: str, parameter: Parameter, side: str, scale: float = 1.0) -> str:
+    """That a parameter is no result: "timing delay: delay at or beyond 5000 µs, where its search ends"."""
+    end = in_digits(scale * (parameter.low if side == "low" else parameter.high), 3)
+    value = f"{end} {parameter.unit.strip('-')}".rstrip()
+    name = parameter.name.removeprefix("law_")
+    return f"{mechanism}: {name} at or beyond {value}, where its search ends".replace("_", " ")
 
 
 COUNTS = 0.003  # probability below which an answer is left out of averages

@@ -65,7 +65,9 @@ def statement(facts: Facts) -> str:
     # A mechanism that was not tried may be what is missing: that comes first
     of_tried = verdict == "unexplained" and bool(facts.untried)
     decides += facts.untried if of_tried else []
-    open_questions = [*_clauses(facts.findings, _RESERVES), *([] if of_tried else facts.untried)]
+    doubts = (*facts.bounds, *facts.other_thickness) if verdict == "ambiguous" else ()
+    reserves = [finding for finding in facts.findings if finding["statement"] not in doubts]
+    open_questions = [*_clauses(reserves, _RESERVES), *([] if of_tried else facts.untried)]
     quoted = [
         kinds.moduli_clause(facts.joined, facts.by_kind),
         _depths_clause(facts),
@@ -86,7 +88,7 @@ def statement(facts: Facts) -> str:
             presence=facts.presence,
             mechanisms=facts.mechanisms,
             idle=facts.idle,
-            bounds=tuple(facts.bounds),
+            doubts=doubts,
             all_used=not slips,
             all_tried=not of_tried,
         )
@@ -127,16 +129,16 @@ def answer_clauses(
     presence: Sequence[Mapping[str, Any]] = (),
     mechanisms: Sequence[Mapping[str, Any]] = (),
     idle: Sequence[str] = (),
-    bounds: Sequence[str] = (),
+    doubts: Sequence[str] = (),
     *,
     all_used: bool = True,
     all_tried: bool = True,
 ) -> list[str]:
     """The verdict as a clause, and further clauses on its meaning.
 
-    `presence` and `mechanisms` are the report's, `idle` the mechanisms that may as well have no effect, `bounds` the
-    parameters at a bound of their search; `all_used` says that no recording was left out or corrected, `all_tried` that
-    no mechanism that might explain what is left was not tried.
+    `presence` and `mechanisms` are the report's, `idle` the mechanisms that may as well have no effect, `doubts` what
+    else speaks against the set, such as a parameter at the bound of its search; `all_used` says that no recording was
+    left out or corrected, `all_tried` that no mechanism that might explain what is left was not tried.
     """
     leader = answers[0]
     percent = in_percent(leader.probability)
@@ -153,28 +155,37 @@ def answer_clauses(
     if verdict == "unexplained":
         which = "known mechanisms" if all_tried else "mechanisms that were tried"
         return [f"something is missing that none of the {which} describes (probability {percent})"]
-    by_sets = f"the sets of mechanisms are: {_answers_in_words([leader, *rivals])}" if rivals else ""
+    others = sum(answer.probability for answer in answers[1:]) - sum(answer.probability for answer in rivals)
+    further = f", or others, {in_percent(others)} together" if others > NAMED else ""
+    listed += further if listed else ""
+    by_sets = f"the sets of mechanisms are: {_answers_in_words([leader, *rivals])}{further}" if rivals else ""
     if verdict == "explained":
         missing, by_mechanism = _lacking(leader, presence, mechanisms)
         means = _law(leader.names) or _strengths(mechanisms)
         return [f"{model} lacks {missing}", *([by_sets] if by_mechanism else []), means]
     certain = [group for group in presence if group["probability"] >= EXPLAINED]
-    if certain and not idle and not bounds:
+    if certain and not idle and not doubts:
         named = " and ".join(_group_in_words(group) for group in certain)
         if any(len(group["mechanisms"]) > 1 for group in certain):
             return [f"{named}: these recordings cannot tell which", by_sets]
-        return [f"{model} lacks {named}, but these recordings cannot tell what else", by_sets, _law(mentioned)]
-    but = list(bounds)
+        alone = {group["mechanisms"][0] for group in certain}
+        strengths = _strengths([mechanism for mechanism in mechanisms if mechanism["name"] in alone])
+        missing = f"{model} lacks {named}, but these recordings cannot tell what else"
+        return [missing, strengths, by_sets, _law(mentioned)]
+    but = list(doubts)
     but += [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
     but += [f"these rivals remain: {listed}"] if listed else []
     but = but or [f"many rivals remain, each below {in_percent(NAMED)}"]
-    doubtful = bool(idle or bounds) and leader.names != (NOTHING_MISSING,)
+    shared = [group for group in certain if group["probability"] > leader.probability + NAMED]
+    common = " and ".join(map(_group_in_words, shared))
+    doubtful = bool(idle or doubts) and leader.names != (NOTHING_MISSING,)
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
         total = in_percent(sum(answer.probability for answer in answers if answer.kind == leader.kind))
         lead = f"known mechanisms explain this ({total} together), best {in_words(leader.names)} ({percent})"
-    return [f"{lead}, but {', and '.join(but)}", misfit, _law(mentioned)]
+    all_answers = f"over all answers together: {common}" if common else ""
+    return [f"{lead}, but {', and '.join(but)}", all_answers, misfit, _law(mentioned)]
 
 
 def _lacking(
@@ -303,7 +314,13 @@ SLIPS = (
     *(FindingCode.CONTACTS_KEPT, FindingCode.DUPLICATED_RECORDING),
 )
 _RESERVES = (
-    *(FindingCode.TIP_SHAPE, FindingCode.THICKNESS_UNKNOWN, FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER),
+    *(
+        FindingCode.TIP_SHAPE,
+        FindingCode.THICKNESS_UNKNOWN,
+        FindingCode.THICKNESS_DIFFERS,
+        FindingCode.IMPLAUSIBLE_D33,
+        FindingCode.REMAINDER,
+    ),
     *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.UNUSUAL_SCATTER),
 )
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.report import Reported, reported
@@ -25,6 +26,7 @@ from underskin.diagnosis.several.histories import (
     parameter_values,
     periods,
     set_histories,
+    sets_of_campaign,
 )
 from underskin.diagnosis.several.joint_report import SkinOverDates, together_document
 from underskin.diagnosis.several.population import STATED
@@ -33,6 +35,7 @@ from underskin.diagnosis.several.sensors import (
     Change,
     Sensor,
     SensorsOverDates,
+    SensorsUnderSet,
     failures,
     faults_of,
     in_order,
@@ -148,6 +151,12 @@ def _skin_over_dates(
         return replace(change, causes=causes(fits[change.since], leader.sets[change.since], size, change.uncertainty))
 
     array = over_dates.array
+    over_sets = [
+        _sensors_over_sets(campaign, result, sets_of_campaign(fits[index], histories, index), table)
+        if sensors[index]
+        else []
+        for index, (campaign, result) in enumerate(zip(campaigns, results, strict=True))
+    ]
     return SkinOverDates(
         dates=dates,
         reports=reports,
@@ -157,6 +166,7 @@ def _skin_over_dates(
         histories=histories,
         periods=acting,
         sensors=sensors,
+        over_sets=over_sets,
         failures=failures([faults_of(campaign, result) for campaign, result in zip(campaigns, results, strict=True)]),
         changes=[with_causes(change) for change in over_dates.changes],
         array=None if array is None else replace(array, change=with_causes(array.change)),
@@ -171,9 +181,23 @@ def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:
 def _sensors_alone(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> dict[str, Sensor]:
     """The sensors of a campaign under its own answer, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
-    shared = {} if leader is None else {name: SharedParameters.of(leader, [name]) for name in leader.names}
+    return _sensors_under(campaign, result, leader, table)
+
+
+def _sensors_under(
+    campaign: Campaign, result: DiagnosisResult, fit: Explanation | None, table: SigmaTable
+) -> dict[str, Sensor]:
+    shared = {} if fit is None else {name: SharedParameters.of(fit, [name]) for name in fit.names}
     values = {name: parameter_values(of_name.parameters, of_name.mean) for name, of_name in shared.items()}
     return sensors_of(campaign, values, table, used_recordings(result))
+
+
+def _sensors_over_sets(
+    campaign: Campaign, result: DiagnosisResult, sets: Sequence[tuple[float, Explanation, float]], table: SigmaTable
+) -> list[SensorsUnderSet]:
+    """The sensors of a campaign under each set that can be inverted."""
+    under = [(share, _sensors_under(campaign, result, fit, table), deviation) for share, fit, deviation in sets]
+    return [SensorsUnderSet(share, sensors, deviation) for share, sensors, deviation in under if sensors]
 
 
 def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaign]]:

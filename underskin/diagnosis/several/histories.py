@@ -22,7 +22,7 @@ from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.inference.residuals import with_hidden_mechanism
 from underskin.diagnosis.reporting.facts import DiagnosisResult
-from underskin.diagnosis.reporting.numbers import parameter_index
+from underskin.diagnosis.reporting.numbers import COUNTS, parameter_index
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Search
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.mechanisms.base import Parameter
@@ -286,6 +286,20 @@ def _combined(parts: Sequence[SharedParameters]) -> tuple[Floats, Floats]:
     mean, covariance = sum(likelihoods[1:], likelihoods[0]).posterior(*prior)
     low, high = np.array([parameter.bounds for parameter in parts[0].parameters]).reshape(-1, 2).T
     return np.clip(mean, low, high), np.sqrt(np.diag(covariance))
+
+
+def sets_of_campaign(
+    campaign: CampaignFits, histories: Sequence[SetHistory], number: int
+) -> list[tuple[float, Explanation, float]]:
+    """The sets that move a campaign's predictions: the probability of each over all histories, its fit, and the
+    standard deviation of ln d33 by the strengths of its mechanisms."""
+    mechanisms, shares = campaign.problem.lines.mechanisms, dict[Names, float]()
+    for history in histories:
+        moving = tuple(name for name in history.sets[number] if mechanisms[name].moves_predictions)
+        shares[moving] = shares.get(moving, 0.0) + history.probability
+    alone = _d33_variance(campaign.fit(()), ())
+    fits = [(share, campaign.fit(names)) for names, share in shares.items() if share > COUNTS]
+    return [(share, fit, float(np.sqrt(max(_d33_variance(fit, ()) - alone, 0.0)))) for share, fit in fits]
 
 
 def d33_uncertainties(fits: Sequence[CampaignFits], leader: SetHistory) -> list[float]:

@@ -12,10 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, MOST_NAMED, NOTHING_MISSING, in_words, quantity_in_words
+from underskin.diagnosis.data.names import (
+    EXPLAINED,
+    MOST_NAMED,
+    NAMED,
+    NONE_OF_THESE,
+    NOTHING_MISSING,
+    in_words,
+    quantity_in_words,
+)
 from underskin.diagnosis.reporting.d33 import StatedD33
 from underskin.diagnosis.reporting.headline import within_words
-from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.reporting.numbers import at_bound_in_words, rounded
 from underskin.diagnosis.reporting.report import ALTERNATIVES, LEAST_PROBABILITY, SCHEMA, Reported
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
 from underskin.diagnosis.several.population import D33, REGULAR, STATED, Populations
@@ -25,7 +33,9 @@ from underskin.diagnosis.several.sensors import (
     Change,
     Failure,
     Sensor,
-    changed_once,
+    SensorsUnderSet,
+    exchanges,
+    over_sets,
 )
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -49,7 +59,8 @@ class SkinOverDates:
     p_described: float  # by known physics, all campaigns
     histories: Sequence[SetHistory]
     periods: Sequence[Period]
-    sensors: Sequence[Mapping[str, Sensor]]
+    sensors: Sequence[Mapping[str, Sensor]]  # by the leading history
+    over_sets: Sequence[Sequence[SensorsUnderSet]]
     failures: Mapping[Failure, Sequence[str]]
     changes: Sequence[Change]
     array: ArrayOverDates | None
@@ -101,24 +112,25 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
     leader, names = skin.histories[0], skin.dates.names
     unexplained = [name for name, share in zip(names, skin.p_unlisted, strict=True) if share > STATED]
     probability = leader.probability * skin.p_described
-    verdict = _verdict(unexplained, probability, bool(leader.mechanisms or skin.changes))
+    bounds = [words for period in skin.periods for words in _at_bounds(period)]
+    verdict = _verdict(unexplained, 0.0 if bounds else probability, bool(leader.mechanisms or skin.changes))
     probability = 1 - skin.p_described if unexplained else probability
     last = skin.reports[names[-1]].d33
     mechanisms = [*(_acting(period, skin.dates) for period in skin.periods), *_changed_levels(skin)]
     acting = [mechanism for mechanism in mechanisms if mechanism["name"] in leader.mechanisms]
-    exchanges = [
+    exchanged = [
         Finding(
             Reason.LEVELS_EXCHANGED,
             "",
             "sensor",
-            {"since": skin.dates.called(change.since), "first": change.sensor, "second": change.exchanged_with},
+            {"since": skin.dates.called(first.since), "first": first.sensor, "second": second.sensor},
         )
-        for change in changed_once(skin.changes)
-        if change.exchanged_with is not None
+        for first, second in exchanges(skin.changes)
     ]
-    decisive = [*_failure_clauses(skin), *_contradiction_clauses(skin.reports)]
+    decisive = [*_failure_clauses(skin), *_exchange_clauses(skin), *_contradiction_clauses(skin.reports)]
     stated = _sets_in_words(verdict, unexplained, acting, names, in_percent(probability))
     first = [*decisive, f"apart from that, {stated}"] if decisive else [stated]
+    first += [*bounds, *(_rivals_in_words(skin) if verdict == "ambiguous" else [])]
     closing = [skin.dates.order_clause(), _d33_of_last(names[-1], last)]
     return {
         **_begun(name, list(skin.reports), verdict, probability),
@@ -131,13 +143,9 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
             *(_share(sorted(change.causes), change.probability) for change in skin.changes if change.causes),
         ],
         "unnamed": None,
-        "alternatives": [
-            _share(history.mechanisms or [NOTHING_MISSING], skin.p_described * history.probability)
-            | {"why_not": _history_in_words(history, names)}
-            for history in skin.histories[1 : ALTERNATIVES + 1]
-        ],
+        "alternatives": _alternatives(skin)[:ALTERNATIVES],
         "not_identifiable": _not_identifiable({names[-1]: last}),
-        "findings": [*(finding.in_report() for finding in exchanges), *_prefixed(skin.reports, "findings")],
+        "findings": [*(finding.in_report() for finding in exchanged), *_prefixed(skin.reports, "findings")],
         **_of_kinds(skin.reports),
         "fit": None,
         "power": [],
@@ -262,7 +270,9 @@ def _acting(period: Period, dates: CampaignDates) -> dict[str, Any]:
         low, high = parameter.bounds
         ends = {"value": mean, "low": max(mean - SDS_OF_95 * sd, low), "high": min(mean + SDS_OF_95 * sd, high)}
         value = _rounded(**{name: parameter.from_fit(float(end)) for name, end in ends.items()})
-        parameters.append({"name": parameter.name, "unit": parameter.unit, **value})
+        side = parameter.ends_search(float(mean))
+        bound = {} if side is None else {"at_bound": side}
+        parameters.append({"name": parameter.name, "unit": parameter.unit, **value, **bound})
     return _mechanism(period.mechanism, period.probability, parameters, _scope(dates, period.campaigns, period.begins))
 
 
@@ -294,25 +304,37 @@ def _presence(skin: SkinOverDates) -> list[dict[str, Any]]:
 
 
 def _per_sensor(skin: SkinOverDates) -> list[dict[str, Any]]:
+    """d33 of each sensor over all sets of mechanisms, and by the leading history the interval relative to others."""
     return [
-        {"campaign": name, "sensor": sensor, "unit": "pC/N", **_rounded(value=d33, low=low, high=high)}
-        for name, sensors in zip(skin.dates.names, skin.sensors, strict=True)
-        for sensor, (d33, _, low, high) in sensors.items()
+        {
+            "campaign": name,
+            "sensor": sensor,
+            "unit": "pC/N",
+            **over_sets(parts, {sensor: d33}, d33),
+            "relative": _relative(over_sets(parts, {sensor: d33}, d33), d33),
+        }
+        for name, sensors, parts in zip(skin.dates.names, skin.sensors, skin.over_sets, strict=True)
+        for sensor, d33 in sensors.items()
     ]
 
 
+def _relative(stated: Mapping[str, float | None], d33: Sensor) -> dict[str, float | None]:
+    """The interval of a `stated` value to compare it with others, as wide as that of `d33` by one set."""
+    _, _, low, high = d33 * ((stated["value"] or np.nan) / d33[0])
+    return _rounded(low=low, high=high)
+
+
 def _per_campaign(skin: SkinOverDates) -> dict[str, Any]:
-    """d33 of the array over the sensors common to the campaigns."""
+    """d33 of the array over the sensors common to the campaigns, over all sets as that of each sensor."""
     if skin.array is None:
         return {}
-    rows = zip(skin.array.numbers, skin.array.d33, SDS_OF_95 * skin.array.uncertainty, strict=True)
-    return {
-        "per_campaign": [
-            {"campaign": skin.dates.names[number], "unit": "pC/N"}
-            | _rounded(value=d33, low=d33 - half, high=d33 + half)
-            for number, d33, half in rows
-        ]
-    }
+    rows = []
+    for number, d33, sd in zip(skin.array.numbers, skin.array.d33, skin.array.uncertainty, strict=True):
+        array = np.array([d33, sd, d33 - SDS_OF_95 * sd, d33 + SDS_OF_95 * sd])
+        stated = over_sets(skin.over_sets[number], skin.sensors[number], array)
+        name = skin.dates.names[number]
+        rows.append({"campaign": name, "unit": "pC/N", **stated, "relative": _relative(stated, array)})
+    return {"per_campaign": rows}
 
 
 def _sets_in_words(
@@ -339,6 +361,42 @@ def _acting_in_words(mechanism: Mapping[str, Any], names: Sequence[str]) -> str:
     if len(scope["campaigns"]) == len(names):
         return f"{words} in {'both' if len(names) == 2 else f'all {len(names)}'} campaigns of FRFs"
     return f"{words} in {' and '.join(scope['campaigns'])} alone"
+
+
+def _alternatives(skin: SkinOverDates) -> list[dict[str, Any]]:
+    """All answers but the leading history, the most probable first."""
+    unlisted = _share([NONE_OF_THESE], 1 - skin.p_described)
+    unlisted |= {"why_not": "what the campaigns leave to something without a name, in one of them or more"}
+    histories = [
+        _share(history.mechanisms or [NOTHING_MISSING], skin.p_described * history.probability)
+        | {"why_not": _history_in_words(history, skin.dates.names)}
+        for history in skin.histories[1:]
+    ]
+    return sorted([unlisted, *histories], key=lambda answer: -answer["probability"])
+
+
+def _rivals_in_words(skin: SkinOverDates) -> list[str]:
+    """Clauses on the rivals of an ambiguous answer, with the sum of those that are not named, and on what the answers
+    have in common."""
+    others = _alternatives(skin)
+    named = [answer for answer in others[:MOST_NAMED] if answer["probability"] > NAMED]
+    words = [f"{in_words(answer['mechanisms'])} ({in_percent(answer['probability'])})" for answer in named]
+    rest = sum(answer["probability"] for answer in others) - sum(answer["probability"] for answer in named)
+    words += [f"others, {in_percent(rest)} together"] if rest > NAMED else []
+    clauses = [f"these rivals remain: {', or '.join(words)}"] if words else []
+    shares = {
+        name: sum(history.probability for history in skin.histories if name in history.mechanisms)
+        for name in skin.histories[0].mechanisms
+    }
+    common = [f"{in_words([name])} ({in_percent(share)})" for name, share in shares.items() if share > STATED]
+    return [*clauses, f"of the answers by known mechanisms taken together, {listed(common)}"] if common else clauses
+
+
+def _at_bounds(period: Period) -> list[str]:
+    """Such as "compressible layer: poisson ratio at or beyond 0.3, where its search ends"."""
+    fits = zip(period.parameters, period.mean.tolist(), strict=True)
+    sides = [(parameter, parameter.ends_search(fit)) for parameter, fit in fits]
+    return [at_bound_in_words(period.mechanism, parameter, side) for parameter, side in sides if side is not None]
 
 
 def _history_in_words(history: SetHistory, names: Sequence[str]) -> str:
@@ -371,6 +429,23 @@ def _failure_clauses(skin: SkinOverDates) -> list[str]:
     return clauses
 
 
+def _exchange_clauses(skin: SkinOverDates) -> list[str]:
+    """Such as "sensors s02 and s05 look exchanged since 2026-09-21: each has the d33 that the other had (s02 …)"."""
+    clauses = []
+    for pair in exchanges(skin.changes):
+        first, second = (change.sensor for change in pair)
+        sizes = ", ".join(
+            f"{change.sensor} {change.percent['value']:+.3g} % ({change.percent['low']:+.3g} to "
+            f"{change.percent['high']:+.3g})"
+            for change in pair
+        )
+        since = skin.dates.called(pair[0].since)
+        clauses.append(
+            f"sensors {first} and {second} look exchanged since {since}: each has the d33 that the other had ({sizes})"
+        )
+    return clauses
+
+
 def _change_clauses(skin: SkinOverDates) -> list[str]:
     """On changes of d33: of the array, first if it changed, and of sensors, of which more than a few are counted."""
     over, dates = skin.array, skin.dates
@@ -379,7 +454,7 @@ def _change_clauses(skin: SkinOverDates) -> list[str]:
     of_array = [_change_in_words(change, dates) for change in steps]
     if over is not None and not steps:
         of_array = _array_clauses(over, skin.changes, dates, skin.histories[0].mechanisms)
-    sensors = [change for change in changed_once(skin.changes) if change.sensor is not None]
+    sensors = [change for change in skin.changes if change.sensor is not None and change.exchanged_with is None]
     clauses = [_change_in_words(change, dates) for change in sensors[:MOST_NAMED]]
     more = len(sensors) - MOST_NAMED
     clauses += [f"d33 of each sensor has {more} further changes"] if more > 0 else []
@@ -390,9 +465,6 @@ def _change_clauses(skin: SkinOverDates) -> list[str]:
 def _change_in_words(change: Change, dates: CampaignDates) -> str:
     """A clause on the change of d33 of one sensor or of the array; of the array with its possible causes, which a
     change of level cannot separate."""
-    if change.exchanged_with is not None:
-        both = f"sensors {change.sensor} and {change.exchanged_with}"
-        return f"{both} look exchanged since {dates.called(change.since)}: each has the d33 that the other had"
     whose = "of the array" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
     percent = change.percent
     low, high = sorted((abs(percent["low"]), abs(percent["high"])))

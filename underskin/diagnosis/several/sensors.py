@@ -2,8 +2,11 @@
 diagnosis, what changed since when, and which sensors failed.
 
 Changes are those of the array and those of single sensors relative to it. Two sensors of which each has the d33 of the
-other from one campaign on had their labels exchanged: an exchange, which fixes both changes, is compared with two
-changes of this size by chance.
+other from one campaign on had their labels exchanged. ln d33 of sensor i changes between two campaigns by
+    z_i = a + δ_i + e_i,   e_i ~ N(0, (f u_i)²),   δ_i = 0, or N(0, 0.2²) with the probability that a sensor changes,
+a being the change of all. An exchange has no parameter but its pair, whose z are then those of the other's label: its
+odds over all else, with a and the scatter f integrated over and the prior that two sensors change at once, decide. All
+else is calculated with the exchange undone.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -15,16 +18,24 @@ from itertools import combinations
 from typing import Self
 
 import numpy as np
+from scipy.special import chdtri
 
 from underskin.diagnosis.data.names import NAMED
 from underskin.diagnosis.reporting.facts import DiagnosisResult
+from underskin.diagnosis.reporting.numbers import QUANTILES_OF_95, with_ends
 from underskin.diagnosis.several.histories import USUAL_CHANGE, log_normal
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode, Reason
-from underskin.inversion.array_history import FEWEST_DATES, FEWEST_SENSORS, ArrayLevels, array_levels
+from underskin.inversion.array_history import (
+    FEWEST_DATES,
+    FEWEST_SENSORS,
+    PRIOR_SENSORS,
+    ArrayLevels,
+    array_levels,
+)
 from underskin.inversion.array_history import changes as changes_between_ends
 from underskin.inversion.invert import invert
-from underskin.inversion.mixed_model import SDS_OF_95
+from underskin.inversion.mixed_model import SDS_OF_95, mixture_quantile
 from underskin.prediction.adopted_model import AdoptedModel
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
@@ -35,6 +46,9 @@ from underskin.units import Floats, to_lab
 _LEAST, _LEAST_OF_ARRAY = 0.03, 0.05  # relative changes that are stated: amplifiers are calibrated to some percent
 _P_CHANGE, _P_SUSPECTED = 0.05, 0.5  # that d33 changes; of a sensor whose level stands apart in one of two campaigns
 _P_EXCHANGE = 0.2  # odds of an exchange, where two sensors have changed at once, over two changes
+_MOST_COMPARED = 12  # sensors, those that changed most: an exchange moves two of them
+_AMPLIFIER = 0.01  # of its gain, from one campaign to the next
+_SCATTERS, _PER_SD, _BEYOND = 7, 3, 4.0  # quantiles of f; values of a per standard deviation, and beyond all z
 
 
 @dataclass(frozen=True)
@@ -160,6 +174,39 @@ Sensor = Floats  # d33, its standard uncertainty, and the ends of its 95 % inter
 Values = Mapping[str, Mapping[str, float]]  # of mechanisms' parameters
 
 
+@dataclass(frozen=True, eq=False)
+class SensorsUnderSet:
+    """The sensors of a campaign under one set of mechanisms with its probability, and the standard deviation of their
+    ln d33 in common by the strengths of these mechanisms."""
+
+    share: float
+    sensors: Mapping[str, Sensor]
+    deviation: float
+
+
+def over_sets(parts: Sequence[SensorsUnderSet], level: Mapping[str, Sensor], d33: Sensor) -> dict[str, float | None]:
+    """The median and 95 % interval over the sets of a d33 that is `d33` where the sensors are `level`: every set moves
+    it as it moves them."""
+    common = {part: [name for name in level if name in part.sensors] for part in parts}
+    moved = {
+        part: np.mean([np.log(np.abs(part.sensors[name][0] / level[name][0])) for name in names])
+        for part, names in common.items()
+        if names
+    }
+    shares = np.array([part.share for part in moved])
+    if not moved:
+        return with_ends(d33[0], *d33[2:])
+    deviations = np.hypot([part.deviation for part in moved], d33[1] / np.abs(d33[0]))
+    median, *ends = (
+        float(
+            d33[0]
+            * np.exp(mixture_quantile(shares / shares.sum(), np.array(list(moved.values())), deviations, probability))
+        )
+        for probability in QUANTILES_OF_95
+    )
+    return with_ends(median, *sorted(ends))
+
+
 def sensors_of(campaign: Campaign, values: Values, table: SigmaTable, used: Collection[str]) -> dict[str, Sensor]:
     """By id, with mechanisms at these values, from the recordings `used` (ids) by the campaign's own diagnosis; without
     dead sensors, and empty where no recording can be inverted."""
@@ -187,10 +234,49 @@ class SensorsOverDates:
     `suspected`: the sensors whose level, in each campaign by itself, differs from the others'.
     """
 
-    campaigns: Sequence[Mapping[str, Sensor]]
+    campaigns: Sequence[Mapping[str, Sensor]]  # by label
     times: Floats
     unsure: Sequence[float]
     suspected: Sequence[frozenset[str]]
+
+    @cached_property
+    def _exchanges(self) -> tuple[list[Change], list[Mapping[str, Sensor]]]:
+        """The exchanges of labels, two changes each, and the campaigns with these undone."""
+        changes, right = list[Change](), list(self.campaigns)
+        for number in range(1, len(right)):
+            while (found := self._exchange(right, number)) is not None:
+                changes += found
+                names = {str(change.sensor): str(change.exchanged_with) for change in found}
+                right[number:] = [
+                    {names.get(sensor, sensor): d33 for sensor, d33 in campaign.items()} for campaign in right[number:]
+                ]
+        return changes, right
+
+    def _exchange(self, campaigns: Sequence[Mapping[str, Sensor]], number: int) -> list[Change] | None:
+        """The exchange since the previous campaign that is more probable than all else."""
+        before, after = campaigns[number - 1 : number + 1]
+        shared = [sensor for sensor in before if sensor in after]
+        if len(shared) < FEWEST_SENSORS:
+            return None
+        (first, u_first), (last, u_last) = (_logarithms([d33[sensor] for sensor in shared]) for d33 in (before, after))
+        prior = np.array([self._p_change(number, sensor, len(shared)) for sensor in shared])
+        size, sd = last - first[:, None], np.sqrt(u_last**2 + u_first[:, None] ** 2 + _AMPLIFIER**2)
+        weighed = _exchanges_weighed(size, sd, prior)
+        best = max(weighed, key=lambda pair: weighed[pair])
+        others = np.logaddexp.reduce([0.0, *(odds for pair, (odds, _) in weighed.items() if pair != best)])
+        log_odds, common = weighed[best]
+        if log_odds - others < np.log((1 - NAMED) / NAMED):
+            return None
+        p_exchange = float(1 / (1 + np.exp(others - log_odds)))
+        changes = (float(np.expm1(size[row, row] - common)) for row in best)
+        return [
+            Change(shared[row], number - 1, number, change, float(sd[row, row]), p_exchange, (), shared[other])
+            for row, other, change in zip(best, best[::-1], changes, strict=True)
+        ]
+
+    def _p_change(self, number: int, sensor: str, sensors: int) -> float:
+        """The prior probability that one of so many sensors changed since the previous campaign."""
+        return _P_SUSPECTED if sensor in self.suspected[number - 1] ^ self.suspected[number] else _P_CHANGE / sensors
 
     @cached_property
     def ids(self) -> list[str]:
@@ -199,17 +285,17 @@ class SensorsOverDates:
 
     @cached_property
     def changes(self) -> list[Change]:
-        """Those stated of the array, then of single sensors: steps between consecutive campaigns, with exchanges
-        marked, and over all of them changes too slow for a step."""
-        steps = self.steps
-        stepped = {change.sensor for change in steps}
+        """Those stated of the array, then of single sensors: steps between consecutive campaigns, and over all of them
+        changes too slow for a step."""
+        stepped = {change.sensor for change in self.steps if change.exchanged_with is None}
         gradual = [change for change in self._gradual() if change.sensor not in stepped]
-        return sorted([*self._with_exchanges(steps), *gradual], key=lambda change: change.sensor is not None)
+        return sorted([*self.steps, *gradual], key=lambda change: change.sensor is not None)
 
     @cached_property
     def steps(self) -> list[Change]:
-        """The changes between consecutive campaigns."""
-        return [change for number in range(1, len(self.campaigns)) for change in self._steps(number)]
+        """The changes between consecutive campaigns, exchanges first."""
+        steps = [change for number in range(1, len(self.campaigns)) for change in self._steps(number)]
+        return [*self._exchanges[0], *steps]
 
     @cached_property
     def array(self) -> ArrayOverDates | None:
@@ -232,23 +318,21 @@ class SensorsOverDates:
         return self._levels_of(slice(None))
 
     def _levels_of(self, numbers: slice) -> ArrayLevels:
-        """Of some campaigns (sensors, campaigns)."""
+        """Of some campaigns (sensors, campaigns), with exchanges undone."""
         value, deviation = np.full((2, len(self.ids), len(self.campaigns)), np.nan)
-        for number, campaign in enumerate(self.campaigns):
-            for sensor, (d33, uncertainty, *_) in campaign.items():
-                row = self.ids.index(sensor)
-                value[row, number], deviation[row, number] = np.log(np.abs(d33)), uncertainty / np.abs(d33)
+        for number, campaign in enumerate(self._exchanges[1]):
+            rows = [self.ids.index(sensor) for sensor in campaign]
+            value[rows, number], deviation[rows, number] = _logarithms(list(campaign.values()))
         return array_levels(value[:, numbers], deviation[:, numbers])
 
     def _steps(self, number: int) -> list[Change]:
         """The changes since the previous campaign."""
         levels = self._levels_of(slice(number - 1, number + 1))
-        suspected = self.suspected[number - 1] ^ self.suspected[number]
         steps = []
         shared = np.flatnonzero(np.isfinite(levels.departure).all(axis=1)).tolist()
         for row in shared if len(shared) >= FEWEST_SENSORS else ():
             size, sd = float(np.diff(levels.departure[row])[0]), float(np.hypot(*levels.departure_deviation[row]))
-            prior = _P_SUSPECTED if self.ids[row] in suspected else _P_CHANGE / len(shared)
+            prior = self._p_change(number, self.ids[row], len(shared))
             steps.append(_change(self.ids[row], number - 1, number, size, sd, prior))
         if np.isfinite(levels.level).all():
             size, sd = float(np.diff(levels.level)[0]), float(np.linalg.norm([*levels.deviation, self.unsure[number]]))
@@ -271,33 +355,41 @@ class SensorsOverDates:
                 gradual += [change] if _is_stated(change) else []
         return gradual
 
-    def _with_exchanges(self, steps: Sequence[Change]) -> list[Change]:
-        """The steps; two of single sensors are marked as an exchange where that is far more probable."""
-        changes = list(steps)
-        odds = {
-            (first, second): self._log_odds_of_exchange(changes[first], changes[second])
-            for first, second in combinations(range(len(changes)), 2)
-            if None not in (changes[first].sensor, changes[second].sensor)
-            and changes[first].since == changes[second].since
-        }
-        for first, second in sorted(odds, key=lambda pair: -odds[pair]):
-            free = changes[first].exchanged_with is None and changes[second].exchanged_with is None
-            if free and odds[first, second] > np.log((1 - NAMED) / NAMED):
-                changes[first], changes[second] = (
-                    replace(changes[first], exchanged_with=changes[second].sensor),
-                    replace(changes[second], exchanged_with=changes[first].sensor),
-                )
-        return changes
 
-    def _log_odds_of_exchange(self, first: Change, second: Change) -> float:
-        """Over two changes of usual size; both changes are relative to that of all sensors."""
-        before = self.campaigns[first.before]
-        log_ratio = float(np.log(np.abs(before[str(second.sensor)][0] / before[str(first.sensor)][0])))
-        log_odds = float(np.log(_P_EXCHANGE))
-        for change, expected in ((first, log_ratio), (second, -log_ratio)):
-            size, sd = float(np.log1p(change.value)), change.uncertainty
-            log_odds += float(log_normal(size - expected, sd**2) - log_normal(size, sd**2 + USUAL_CHANGE**2))
-        return log_odds
+def _logarithms(sensors: Sequence[Sensor]) -> tuple[Floats, Floats]:
+    """ln |d33| of each with its standard uncertainty."""
+    d33, uncertainty, *_ = np.reshape(sensors, (-1, 4)).T
+    return np.log(np.abs(d33)), uncertainty / np.abs(d33)
+
+
+def _exchanges_weighed(size: Floats, sd: Floats, prior: Floats) -> dict[tuple[int, int], tuple[float, float]]:
+    """Of pairs of sensors (indices): ln of the odds of their exchange over none, and the change of all with it.
+
+    `size` with `sd` (sensors, labels): the change of ln d33 if a label were that of a sensor; `prior` (sensors,): that
+    a sensor changes. 1/f² is χ² of as many degrees of freedom as `array_levels` counts for the stated uncertainties.
+    """
+    own, deviation = size.diagonal(), sd.diagonal()
+    step, margin = float(deviation.min()) / _PER_SD, _BEYOND * float(deviation.max())
+    common = np.arange(own.min() - margin, own.max() + margin + step, step)
+    scatter2 = PRIOR_SENSORS / chdtri(PRIOR_SENSORS, (np.arange(_SCATTERS) + 0.5) / _SCATTERS)[:, None]
+
+    def log_density(row: int, label: int) -> Floats:
+        offset, variance = size[row, label] - common, scatter2 * sd[row, label] ** 2
+        same, changed = (log_normal(offset, part) for part in (variance, variance + USUAL_CHANGE**2))
+        return np.asarray(np.logaddexp(np.log1p(-prior[row]) + same, np.log(prior[row]) + changed))
+
+    none = np.sum([log_density(row, row) for row in range(len(own))], axis=0)
+    total = np.logaddexp.reduce(none, axis=None)
+    most = np.argsort(-np.abs(own - np.median(own)) / deviation, kind="stable")[:_MOST_COMPARED]
+    weighed = {}
+    for first, second in combinations(sorted(most.tolist()), 2):
+        gained = [log_density(*pair) for pair in ((first, second), (second, first))]
+        lost = [log_density(row, row) for row in (first, second)]
+        exchanged = none + sum(gained) - sum(lost)
+        at_once = np.log(_P_EXCHANGE * prior[first] * prior[second])
+        log_odds = float(at_once + np.logaddexp.reduce(exchanged, axis=None) - total)
+        weighed[first, second] = log_odds, float(common[exchanged.max(axis=0).argmax()])
+    return weighed
 
 
 def _change(sensor: str | None, before: int, until: int, size: float, sd: float, prior: float) -> Change:
@@ -313,11 +405,11 @@ def _is_stated(change: Change) -> bool:
     return change.probability > 1 - NAMED and abs(float(np.log1p(change.value))) > least
 
 
-def changed_once(changes: Sequence[Change]) -> list[Change]:
-    """The changes, exchanges first, each of these by one of its two sensors."""
-    exchanges = [change for change in changes if change.exchanged_with is not None]
-    once = [change for change in exchanges if str(change.sensor) < str(change.exchanged_with)]
-    return [*once, *(change for change in changes if change.exchanged_with is None)]
+def exchanges(changes: Sequence[Change]) -> list[tuple[Change, Change]]:
+    """The changes of the two sensors of each exchange."""
+    found = {(change.since, change.sensor): change for change in changes if change.exchanged_with is not None}
+    pairs = [(change, found[since, change.exchanged_with]) for (since, _), change in found.items()]
+    return [pair for pair in pairs if str(pair[0].sensor) < str(pair[1].sensor)]
 
 
 def without_steps(campaign: Campaign, steps: Sequence[Change], number: int) -> Campaign:

@@ -296,7 +296,10 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
     if explanation.names and after.recordings and after.rmse_percent >= before.rmse_percent:
         arguments = {
             "groups": [group.group for group in groups],
-            "mechanisms": [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names],
+            "mechanisms": [
+                in_plain_words(problem.lines.mechanisms[name]).replace("_", " ") for name in explanation.names
+            ],
+            "shows": any(set(explanation.names) & set(group.chosen) for group in groups),
             "before_percent": before.rmse_percent,
             "after_percent": after.rmse_percent,
         }

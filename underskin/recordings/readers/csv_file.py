@@ -250,10 +250,14 @@ def _refuse_text_among_numbers(reader: RowReader, file: str) -> None:
 
 
 def _text_column_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
-    """Messages on columns of too many texts."""
+    """Messages on columns of too many texts, and of numbers with blank cells."""
     for column, seen in reader.texts.items():
+        name, numbers = found.names[column][0], reader.count - seen.count
         if seen.example and not seen.kept:
-            yield text_left_out(found.names[column][0], seen.example)
+            yield text_left_out(name, seen.example)
+        elif not seen.example and numbers and name != f"column {column + 1}":
+            of_rows = f"{numbers} of {reader.count} rows"
+            yield f"column {name!r} has a number in {of_rows}, and is left out: fill its blank cells"
 
 
 def _texts(reader: RowReader, found: Headings, rows: slice) -> tuple[TextColumn, ...]:

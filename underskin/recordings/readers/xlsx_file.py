@@ -2,19 +2,21 @@
 
 One sheet may be the campaign of csv_template.py, or its head, with the table on another sheet. Otherwise each sheet
 with a table of numbers is a block named after the sheet, read by csv_file.py; others are left out with a warning.
-Formulas count by their stored value; no macro or link is followed. Dates are in the lab's time zone. A workbook is a
+Formulas count by their stored value; cells that are merged down a column count in every row with numbers that they
+span; no macro or link is followed. Dates are in the lab's time zone. A workbook is a
 ZIP archive of XML: its unpacked size is limited, and XML that declares entities is rejected.
 """
 
 import re
 import warnings
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from datetime import date, datetime, time
 from typing import Any, BinaryIO
 
 import openpyxl
+from openpyxl.utils import column_index_from_string
 
 from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import Contents, Document
@@ -34,7 +36,8 @@ _OTHERS = {
 _SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
 _FORMULA = re.compile(rb"<(\w+:)?f[\s/>]")
 _DECLARATION = re.compile(rb"<!(DOCTYPE|ENTITY)|<\0!\0(D\0O\0C|E\0N\0T)|\0<\0!\0(D\0O\0C|E\0N\0T)")
-_BLOCK, _OVERLAP = 1 << 20, 32
+_MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s+ref="([A-Z]{1,3})(\d{1,7}):\1(\d{1,7})"')  # down one column
+_BLOCK, _OVERLAP = 1 << 20, 64
 _BLANKS = re.compile(r"\s+")
 
 
@@ -48,6 +51,7 @@ class WorkbookSheets:
         self._file = file
         self._zone = time_zone()
         self.notes: list[str] = []
+        self._merged: dict[str, set[tuple[int, int, int]]] = {}  # of each part: column, first and last row
         with damage_said(file, "", lambda error: f"is a damaged workbook or ZIP archive: {error}"):
             with zipfile.ZipFile(stream) as archive:
                 has_formulas = self._inspected(archive, stream.seek(0, 2))
@@ -80,7 +84,9 @@ class WorkbookSheets:
                     seen, end = end + data, data[-_OVERLAP:]
                     if _DECLARATION.search(seen):
                         raise FileError(self._file, name, "declares a document type or entities, as no workbook does")
-                    formulas = formulas or (bool(_SHEETS.fullmatch(name)) and bool(_FORMULA.search(seen)))
+                    if _SHEETS.fullmatch(name):
+                        formulas = formulas or bool(_FORMULA.search(seen))
+                        self._merged.setdefault(name, set()).update(map(_span, _MERGED.finditer(seen)))
         return formulas
 
     def texts(self) -> Iterator[tuple[str, str]]:
@@ -95,7 +101,9 @@ class WorkbookSheets:
             ):
                 warnings.simplefilter("ignore")
                 sheets = [book.worksheets[index] for book in self._books]
-                rows = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
+                merged = self._merged.get(sheet._worksheet_path.lstrip("/"), set())
+                filled = _filled(self._rows(sheets), merged) if merged else self._rows(sheets)
+                rows = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in filled]
             width = max((row.count(SEPARATOR) for row in rows), default=0)
             lines = [row + SEPARATOR * (width - row.count(SEPARATOR)) for row in rows]
             while lines and not lines[-1].strip():
@@ -141,6 +149,30 @@ class WorkbookSheets:
         if note not in self.notes:
             self.notes.append(note)
         return moment.replace(microsecond=0, tzinfo=self._zone).isoformat()
+
+
+def _span(merged: re.Match[bytes]) -> tuple[int, int, int]:
+    """Column, from 0, first and last row of cells that are merged down a column."""
+    column, first, last = merged.groups()
+    return column_index_from_string(column.decode()) - 1, int(first), int(last)
+
+
+def _filled(rows: Iterator[Sequence[Any]], merged: Collection[tuple[int, int, int]]) -> Iterator[Sequence[Any]]:
+    """The rows, where a merged cell counts in every row with numbers that it spans: a heading over two rows does not
+    count twice."""
+    begins: dict[int, list[tuple[int, int]]] = {}
+    for column, first, last in merged:
+        begins.setdefault(first, []).append((column, last))
+    spanning: dict[int, tuple[int, Any]] = {}
+    for number, row in enumerate(rows, 1):
+        cells = [*row, *[None] * (max([*spanning, -1]) + 1 - len(row))]
+        if any(isinstance(cell, int | float) for cell in cells):
+            for column, (last, value) in spanning.items():
+                if number <= last and cells[column] is None:
+                    cells[column] = value
+        for column, last in begins.get(number, ()):
+            spanning[column] = last, cells[column] if column < len(cells) else None
+        yield cells
 
 
 def read(stream: BinaryIO, file: str) -> Contents | Document:
