@@ -164,7 +164,7 @@ def find(lines: Sequence[str]) -> Table | None:
             continue
         run = filled[first : first + length]
         cells = [split(line, separator) for line in run]
-        rows = length * len(columns) / max(map(len, cells))
+        rows = length * len(columns) / max(map(_count_of_parts, cells))
         if rows > most:
             width = max(room(line, separator) for line in run)
             complex_ones = frozenset(
@@ -174,6 +174,12 @@ def find(lines: Sequence[str]) -> Table | None:
     if best is None:
         return None
     return replace(best, start=next(index for index, line in enumerate(lines) if best.row(line) is not None))
+
+
+def _count_of_parts(cells: Sequence[str]) -> int:
+    """The number of cells with those that a tab or a semicolon in them would make: commas between semicolons are
+    decimal."""
+    return len(cells) + sum(cell.count(mark) for cell in cells for mark in "\t;")
 
 
 def most_numbers(lines: Sequence[str]) -> tuple[int, int]:
@@ -189,16 +195,17 @@ def _count(line: str, separator: str, decimal: str) -> int:
 
 
 def _columns(line: str, separator: str, decimal: str) -> tuple[int, ...]:
-    """Which cells of a line are numbers, or overloads beside numbers; empty where fewer than two are numbers."""
+    """Which cells of a line are numbers, or overloads beside numbers; empty for fewer than two."""
     cells = split(line, separator)
     numbers = {
         index
         for index, cell in enumerate(cells)
         if text.number(cell, decimal) is not None or complex_number(cell, decimal) is not None
     }
-    if len(numbers) < _LEAST:
+    if not numbers:
         return ()
-    return tuple(index for index, cell in enumerate(cells) if index in numbers or _OVERLOAD.fullmatch(cell))
+    columns = tuple(index for index, cell in enumerate(cells) if index in numbers or _OVERLOAD.fullmatch(cell))
+    return columns if len(columns) >= _LEAST else ()
 
 
 def _longest_run(columns_of: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], int, int]:
