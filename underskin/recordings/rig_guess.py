@@ -71,19 +71,13 @@ OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius
 _ONE_SENSOR = {"id": "s01", "x_mm": 0, "y_mm": 0}
 _SENSORS = ("sensor", "taxel", "sensore", "capteur")
 _WHEN = ("time", "date", "zeit", "datum", "heure", "ora", "data")
-_ROW_FIELDS = (  # of columns beside an FRF: field, dimension, and a word of the name
-    ("dynamic_force_n", "force", re.compile(r"dyn|din[aá]mic", re.IGNORECASE)),
-    ("preload_n", "force", re.compile(r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precar", re.IGNORECASE)),
-    ("indenter_radius_mm", "length", re.compile(r"radius|rayon|raggio|radio", re.IGNORECASE)),
-)
-_SAMPLES = r"(?=.*(sample|specimen|probe|prüf|éprouvette|provino|probeta))"
-_SPHERES = r"(?=.*(tip|indenter|sphere|kugel|bille|sfera|esfera))"
-_STATED_FIELDS = (  # of properties: field, dimension, and words of the name in the languages of instruments
+_SAMPLES = "sample|specimen|probe|prüf|éprouvette|provino|probeta"
+_BY_WORDS = (  # of columns beside an FRF, and of properties: field, dimension, and words in instruments' languages
     ("dynamic_force_n", "force", r"dyn|din[aá]mic"),
-    ("preload_n", "force", r"pre-?load|vorlast|vorkraft|pr[ée]charge|precar"),
-    ("indenter_radius_mm", "length", _SPHERES + r"(?=.*(radi[ou]|rayon|raggio))"),
-    ("sample_height_mm", "length", _SAMPLES + r"(?=.*(height|höhe|hauteur|altezza|altura))"),
-    ("sample_diameter_mm", "length", _SAMPLES + r"(?=.*(diam|durchmesser|diám))"),
+    ("preload_n", "force", r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precar"),
+    ("indenter_radius_mm", "length", rf"^(?!.*(sensor|taxel|{_SAMPLES}))(?=.*(radi[ou]|rayon|raggio))"),
+    ("sample_height_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(height|höhe|hauteur|altezza|altura))"),
+    ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(dia|durchmesser|diá))"),
 )
 _DIAMETER = re.compile(r"dia\w*m|durchmesser|diamètre|[øØ⌀]", re.IGNORECASE)
 _RADIUS = "radius"  # the derived channel
@@ -296,10 +290,8 @@ def _row_fields(
             derived[_RADIUS] = f"'{column.name}' / 2"
         elif not dimension and any(word in column.name.lower() for word in _SENSORS):
             found.setdefault("sensor", {"channel": column.name})
-        for row_field, needed, word in _ROW_FIELDS:
-            if dimension == needed and word.search(column.name):
-                found.setdefault(row_field, {"channel": column.name})
-                break
+        elif (row_field := _field_by_words(column.name, dimension)) in _OF_RECORDING[kind]:
+            found.setdefault(row_field, {"channel": column.name})
     return found, derived
 
 
@@ -343,9 +335,13 @@ def _stated_field(name: str) -> str:
     if field != name or name in LAB:
         return "" if field == "indenter_radius_mm" and _DIAMETER.search(name) else field
     stated = unit(labelled_unit(name))
-    possible = (other for other, dimension, words in _STATED_FIELDS if stated is not None and
-                stated.dimension == dimension and re.search(words, name, re.IGNORECASE))  # fmt: skip
-    return field if stated is None else next(possible, "")
+    return field if stated is None else _field_by_words(name, stated.dimension)
+
+
+def _field_by_words(name: str, dimension: str) -> str:
+    """The field of a recording by words of a heading and the dimension of its unit; empty for none."""
+    fields = (field for field, needed, words in _BY_WORDS if dimension == needed and re.search(words, name.lower()))
+    return next(fields, "")
 
 
 def _of_skin(properties: Mapping[str, Any]) -> dict[str, Any]:
