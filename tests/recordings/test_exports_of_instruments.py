@@ -101,7 +101,7 @@ def numbers(columns: Columns) -> list[np.ndarray]:
     return [values for *_, values in columns]
 
 
-PRESSED = {"displacement_mm": TRAVEL, "force_n": FORCE}
+PRESSED: dict[str, float | np.ndarray] = {"displacement_mm": TRAVEL, "force_n": FORCE}
 
 
 def units_below_names(locale: Locale) -> Export:
@@ -119,7 +119,7 @@ def compression_machine(locale: Locale) -> Export:
     above = [f"{locale['height']} [mm]: {locale.number(10.0)}", f"{locale['diameter']} [mm]: {locale.number(20.0)}", ""]
     headings = [locale.joined(*(f'"{name}"' for name, *_ in columns))]
     headings += [locale.joined(*(f'"({label})"' for _, label, _ in columns))]
-    fields = {**PRESSED, "sample_height_mm": 10.0, "sample_diameter_mm": 20.0}
+    fields: dict[str, float | np.ndarray] = {**PRESSED, "sample_height_mm": 10.0, "sample_diameter_mm": 20.0}
     return Export([*above, *headings, *locale.rows(*numbers(columns), quoted=True)], columns, fields)
 
 

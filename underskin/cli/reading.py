@@ -34,7 +34,7 @@ def read(
     from underskin.recordings.reading import read_contents, understood
 
     description = None if rig is None else rig_description_in(rig)
-    contents = read_contents(file, str(file))
+    contents = read_contents(file, str(file), description)
     if isinstance(contents, Contents):
         _print(_columns(contents, None if description is None else description.document))
     if description is not None or not isinstance(contents, Contents):

@@ -319,7 +319,7 @@ def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str
 
 def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
     """The recording's fields that the file itself states."""
-    named = {field: stated for stated in reversed(properties) if (field := _stated_field(stated))}
+    named = {field: stated for stated in reversed(list(properties)) if (field := _stated_field(stated))}
     rate = next((stated for stated in properties if stated.lower().replace(" ", "_") in _RATES), None)
     if rate is not None:
         named[_RATE] = rate
