@@ -79,6 +79,7 @@ _BY_WORDS = (  # of columns beside an FRF, and of properties: field, dimension, 
     ("sample_height_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(height|höhe|hauteur|altezza|altura))"),
     ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(dia|durchmesser|diá))"),
 )
+_OF_ROWS = ("dynamic_force_n", "preload_n", "indenter_radius_mm")  # fields that may be columns
 _DIAMETER = re.compile(r"dia\w*m|durchmesser|diamètre|[øØ⌀]", re.IGNORECASE)
 _RADIUS = "radius"  # the derived channel
 _IMAGINARY = re.compile(r"imag|\bim\b")
@@ -290,7 +291,7 @@ def _row_fields(
             derived[_RADIUS] = f"'{column.name}' / 2"
         elif not dimension and any(word in column.name.lower() for word in _SENSORS):
             found.setdefault("sensor", {"channel": column.name})
-        elif (row_field := _field_by_words(column.name, dimension)) in _OF_RECORDING[kind]:
+        elif (row_field := _field_by_words(column.name, dimension)) in _OF_ROWS:
             found.setdefault(row_field, {"channel": column.name})
     return found, derived
 
