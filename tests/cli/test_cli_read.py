@@ -131,6 +131,19 @@ def test_the_table_says_what_each_column_is_taken_for(tmp_path: Path) -> None:
     assert rows["|H| [pC/N]"] == "frf_magnitude_pc_per_n"
 
 
+def test_a_file_that_says_enough_lists_its_recordings(tmp_path: Path) -> None:
+    """Beside the draft, by which it is read; `d33` reads it without."""
+    file = write_table(tmp_path, "curve")
+    file.write_text(f"Tip radius (mm): 4\n\n{file.read_text()}")
+    answer = run("read", str(file))
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert "campaign curve: 1 recordings\n  curve: indentation, indenter_radius_mm 4.0\n" in answer.stdout
+    assert "look at: read without a rig description" in answer.stdout
+    answer = run("d33", str(file))
+    assert answer.returncode == 0
+    assert "'Tip radius (mm)' as indenter_radius_mm, poisson_ratio 0.5 assumed" in " ".join(answer.stdout.split())
+
+
 def test_a_draft_is_never_overwritten(tmp_path: Path) -> None:
     rig = tmp_path / "rig.yaml"
     rig.write_text("mine")

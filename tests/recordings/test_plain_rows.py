@@ -42,6 +42,26 @@ def test_numbers_are_those_of_single_lines(lines: list[str], marks: tuple[str, s
         np.testing.assert_array_equal(at_once.reshape(-1, 2), np.array(single, float))
 
 
+ROWS = st.lists(st.lists(CELLS | st.sampled_from(['"1.5"', '"a"', ' "2" ', '"', '""']), max_size=4), max_size=8)
+
+
+@given(ROWS, st.sampled_from([",", ";", "\t", " "]))
+@example([['"1', '2"', "3"]], ";")
+@example([['""', '"', '""']], ";")
+@example([["1", "2", "approach"], ["1", "2"]], ",")
+def test_cells_are_those_of_single_lines(rows: list[list[str]], separator: str) -> None:
+    """The cells of lines that are split at once are those of each line alone, with the empty ones at its end."""
+    lines = [separator.join(row) for row in rows]
+    table = Table(0, separator, ".", (0, 1), 3)
+    at_once = table.cells_of_columns(lines) if lines else None
+    if at_once is not None:
+        single = [table.cells(line) for line in lines]
+        padded = [[*cells, *[""] * (3 - len(cells))] for cells in single]
+        several = [number for number, cells in enumerate(single) if cells]  # else too few numbers for a row
+        rows_at_once = list(zip(*at_once, strict=True))
+        assert [list(rows_at_once[number]) for number in several] == [padded[number] for number in several]
+
+
 @pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ",")])
 def test_plain_numbers_are_taken_at_once(separator: str, decimal: str) -> None:
     numbers = ["1", "-2.5", "+.5", "7.", "1e-3", "1E5", "0.1234567890123456789", "1e999"]
@@ -64,6 +84,17 @@ def test_lines_rows_hardly_cost_rows() -> None:
     rows = [f"{number * 1e-4:.4f},{number % 97 / 7:.6f}" for number in range(200_000)]
     parted = [line for number, row in enumerate(rows) for line in ((row, "") if number % 500 == 499 else (row,))]
     assert seconds(parted) < 3 * seconds(rows)
+
+
+@pytest.mark.slow
+def test_words_hardly_cost_numbers() -> None:
+    """A column of words, cells in quotes and overloads cost little more than numbers: five times as much, line by
+    line."""
+    rows = [(f"{number * 1e-4:.4f}", f"{number % 97 / 7:.6f}") for number in range(100_000)]
+    plain = seconds([",".join(row) for row in rows])
+    assert seconds([f"{time},{force},{'hold' if force < '5' else 'back'}" for time, force in rows]) < 4 * plain
+    assert seconds([f'"{time}","{force}"' for time, force in rows]) < 4 * plain
+    assert seconds([f"{time},{'OL' if force[0] == '3' else force}" for time, force in rows]) < 4 * plain
 
 
 def test_cells_end_lines_without_holding() -> None:

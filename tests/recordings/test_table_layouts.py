@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,29 +53,45 @@ class Layout:
     end: str
     encoding: str
     digits: int
+    exponents: bool
     quoted: bool
     trailing: bool
+    words: tuple[str, ...]  # of the column of words, repeated; none without one
+    words_at: int
+    parted: int  # rows before a blank line; 0 without one
 
     def cell(self, value: float) -> str:
-        written = self.overload if math.isnan(value) else f"{value:.{self.digits}f}".replace(".", self.decimal)
+        form = "e" if self.exponents else "f"
+        written = self.overload if math.isnan(value) else f"{value:.{self.digits}{form}}".replace(".", self.decimal)
         return f'"{written}"' if self.quoted else written
+
+    def line(self, cells: Sequence[str], word: str) -> str:
+        """A line with a word among its cells, where the table has words."""
+        if not self.words:
+            return self.separator.join(cells)
+        return self.separator.join([*cells[: self.words_at], word, *cells[self.words_at :]])
 
     def headings(self) -> list[str]:
         if self.units_in == "brackets":
             return [
-                self.separator.join(f"{name} [{label}]" for name, label in zip(self.names, self.units, strict=True))
+                self.line([f"{name} [{label}]" for name, label in zip(self.names, self.units, strict=True)], "Note")
             ]
-        lines = [self.separator.join(self.names)]
+        lines = [self.line(self.names, "Note")]
         if self.units_in == "a line":
-            lines.append(self.separator.join(self.units))
+            lines.append(self.line(self.units, ""))
         elif self.units_in == "a line in brackets":
-            lines.append(self.separator.join(f"({label})" for label in self.units))
+            lines.append(self.line([f"({label})" for label in self.units], ""))
         return lines
 
     def text(self) -> bytes:
         ending = self.separator if self.trailing else ""
         above = [line.format(self.separator) for line in self.above]
-        rows = [self.separator.join(map(self.cell, row)) + ending for row in self.values.tolist()]
+        rows = [
+            self.line([*map(self.cell, row)], self.words[number % len(self.words)] if self.words else "") + ending
+            for number, row in enumerate(self.values.tolist())
+        ]
+        if self.parted:
+            rows.insert(self.parted, "")
         lines = [*above, *self.headings(), *([self.marker] if self.marker else []), *rows]
         return (self.end.join(lines) + self.end).encode(self.encoding, "replace")
 
@@ -85,7 +102,7 @@ class Layout:
 @st.composite
 def layouts(draw: st.DrawFn) -> Layout:
     columns = draw(st.integers(2, 4))
-    rows = draw(st.integers(5, 12))
+    rows = draw(st.integers(5, 12) | st.integers(60, 140))  # more than are read at once
     random = np.random.default_rng(draw(st.integers(0, 2**32)))
     digits = draw(st.integers(1, 6))
     values = random.normal(size=(rows, columns)).round(digits) * 10.0 ** random.integers(-1, 3, size=columns)
@@ -106,8 +123,12 @@ def layouts(draw: st.DrawFn) -> Layout:
         end=draw(st.sampled_from(["\n", "\r\n", "\r"])),
         encoding=draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"])),
         digits=digits,
+        exponents=draw(st.booleans()),
         quoted=draw(st.booleans()),
         trailing=draw(st.booleans()),
+        words=draw(st.sampled_from([(), (), ("hold",), ("approach", "hold", "back"), ("", "event"), ("s01", "s02")])),
+        words_at=draw(st.integers(0, columns)),
+        parted=draw(st.sampled_from([0, 0, 2, rows - 2])),
     )
 
 
@@ -124,14 +145,16 @@ def wrong(layout: Layout, found: Contents) -> list[str]:
     for channel, name, label, column in zip(
         block.channels, layout.names, layout.labels(), layout.values.T, strict=True
     ):
-        written = [float(f"{value:.{layout.digits}f}") for value in column.tolist()]
+        written = [float(f"{value:.{layout.digits}{'e' if layout.exponents else 'f'}}") for value in column.tolist()]
         if not np.array_equal(channel.values, np.array(written), equal_nan=True):
             departures.append(f"values of {name}")
         if channel.name not in (name, f"{name} [{label}]"):
             departures.append(f"{channel.name!r} for {name!r}")
         if channel.label and not same_unit(channel.label, label):
             departures.append(f"{channel.label!r} for the unit {label!r} of {name}")
-    return departures
+    cells = [layout.words[number % len(layout.words)] for number in range(len(layout.values)) if layout.words]
+    read = [[column.texts[code] for code in column.codes] for column in block.texts]
+    return departures if all(column == cells for column in read) else [*departures, f"words {read}"]
 
 
 @given(layouts())
@@ -144,6 +167,17 @@ def test_layouts_of_instruments(layout: Layout) -> None:
         return
     event("read")
     assert wrong(layout, found) == []
+
+
+@pytest.mark.parametrize("words", [("hold",), ("hold", "cold"), ("∞",)])
+def test_decimal_commas_beside_words(words: tuple[str, ...]) -> None:
+    """Commas between semicolons are decimal, also where words or overloads stand beside few numbers."""
+    rows = [";".join([f"0,{number}", *words, f"{number},5"]) for number in range(5)]
+    text = "\n".join(["Probe;10;10", "Probe;10;10", ";".join(["t [s]", *words, "F [N]"]), *rows])
+    block = contents(text.encode(), "run.csv").blocks[0]
+    by_name = {channel.name: channel.values.tolist() for channel in block.channels}
+    assert by_name["t [s]"] == [number / 10 for number in range(5)]
+    assert by_name["F [N]"] == [number + 0.5 for number in range(5)]
 
 
 COMPLEX = {

@@ -2,13 +2,14 @@
 
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from underskin.cli.rigs import RigOption, reading_notes, rig_description_in
-from underskin.errors import UnderskinError
+from underskin.errors import FileError, UnderskinError
 
 if TYPE_CHECKING:
     from underskin.recordings.channels import Contents
@@ -28,13 +29,13 @@ def read(
     """Say what would be taken from a file for what, and draft a rig description of it.
 
     Nothing is sent or kept. With a rig description, and of files that describe themselves, the recordings are listed;
-    exit status 2 if any cannot be used.
+    exit status 2 if any cannot be used. So they are where headings and header say enough, beside the draft.
     """
     from underskin.recordings.channels import Contents
     from underskin.recordings.reading import read_contents, understood
 
     description = None if rig is None else rig_description_in(rig)
-    contents = read_contents(file, str(file))
+    contents = read_contents(file, str(file), description)
     if isinstance(contents, Contents):
         _print(_columns(contents, None if description is None else description.document))
     if description is not None or not isinstance(contents, Contents):
@@ -44,6 +45,8 @@ def read(
         _print(_recordings(reading))
         raise typer.Exit(2 if reading.problems else 0)
     text = _draft(contents, file.name)
+    with suppress(FileError):  # which says what the draft says
+        _print(_recordings(understood(contents, str(file))))
     if draft is None:
         print(f"\n{text}", end="")
     elif draft.exists():

@@ -7,7 +7,6 @@ campaigns.
 import csv
 import io
 import math
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +15,6 @@ import numpy as np
 
 from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement, wrong_type
 from underskin.recordings.readers import template_columns, text
-from underskin.recordings.readers import template_columns as polar_columns
-from underskin.recordings.readers import template_columns as template_lines
 from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE
 from underskin.units import Floats, Mask
 
@@ -78,7 +75,6 @@ def _cells(column: Floats | Sequence[Any]) -> Sequence[Any]:
 
 
 REAL = "frf_pc_per_n"  # which has no imaginary part
-_SAYS_NOTHING = re.compile(r'\s*(#|"?sep=.?"?\s*$)', re.IGNORECASE)
 _LABELS = ("id", "sensor", "name", "recorded_at")  # columns that only label rows, also by numbers
 
 
@@ -156,9 +152,6 @@ class _Table:
     separator: str
     notes: list[str]
 
-    def columns(self) -> list[list[str]]:
-        return [[row[index] for row in self.rows] for index in range(len(self.header))]
-
 
 def from_csv(data: bytes, field_names: Collection[str]) -> CsvColumns:
     """The columns of a text whose first line names the fields; `field_names` are those that there are.
@@ -174,14 +167,14 @@ def from_csv(data: bytes, field_names: Collection[str]) -> CsvColumns:
     """
     table = _table(data)
     result = CsvColumns({}, {}, {}, table.notes)
-    columns = table.columns()
+    columns = [[row[index] for row in table.rows] for index in range(len(table.header))]
     values = [cells for heading, cells in zip(table.header, columns, strict=True) if not _is_named_label(heading)]
     decimal = text.decimal_mark(values, table.separator)
     polar = (MAGNITUDE, PHASE) if REAL in field_names else ()
     parts: dict[str, CsvColumn] = {}
     meanings = template_columns.fields_of(table.header, field_names)
     for index, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
-        if meant is None and polar and polar_columns.is_phase_without_unit(heading):
+        if meant is None and polar and template_columns.is_phase_without_unit(heading):
             meant = PHASE, _angle(heading, cells, decimal, result.notes)
         if meant is not None and meant[0] in (*field_names, *polar):
             field, factor = meant
@@ -215,7 +208,7 @@ def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -
     """The factor to rad of a phase without a unit, by its values; adds a note."""
     numbers = [abs(number) for cell in cells if (number := _number(cell, decimal)) is not None]
     try:
-        factor = polar_columns.angle_by_values(heading, max(numbers, default=0.0))
+        factor = template_columns.angle_by_values(heading, max(numbers, default=0.0))
     except ValueError as error:
         raise CsvError(f"has a phase that is not clear: {error}") from None
     notes.append(f"{heading!r} {template_columns.READ_AS_DEGREES}")
@@ -226,7 +219,7 @@ def _real_part(parts: Mapping[str, CsvColumn]) -> RealPart:
     """The real part from magnitude and phase; raises CsvError where one is missing."""
     if len(parts) == 1:
         ((field, column),) = parts.items()
-        raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {polar_columns.lacking(field)}")
+        raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {template_columns.lacking(field)}")
     return RealPart(parts[MAGNITUDE], parts[PHASE])
 
 
@@ -235,49 +228,41 @@ def _table(data: bytes) -> _Table:
         content = text.decode(data, "the text")
     except FileError as error:
         raise CsvError(f"must be readable as CSV ({error.place}: {error.reason})") from None
-    numbered = [
-        (number, line)
-        for number, line in enumerate(text.lines(content), start=1)
-        if line.strip() and not _SAYS_NOTHING.match(line)
-    ]
+    written = enumerate(text.lines(content), start=1)
+    numbered = [(number, line) for number, line in written if not template_columns.is_empty_line(line)]
     separator = next((mark for mark in ";\t" if numbered and mark in numbered[0][1]), ",")
-    reader = csv.reader((line + "\n" for _, line in numbered), strict=True, delimiter=separator)
-    table, lines = [], []
-    try:
-        for row in reader:
-            cells = [cell.strip() for cell in row]
-            if any(cells):
-                table.append(cells)
-                lines.append(numbered[reader.line_num - 1][0])
-    except csv.Error as error:
-        raise CsvError(f"must be readable as CSV ({error})") from error
-    header = _without_empty_end(table[0], 1) if table else []
-    notes = _notes_under(table, lines) if len(header) > 1 else []
-    if len(table) < 2:
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    for number, line in numbered:
+        try:
+            cells = text.cells(line, separator)
+        except ValueError as error:
+            raise CsvError(f"must be readable as CSV (line {number}: {error})") from None
+        width = len(rows[0]) if rows else len(cells)
+        stated = max(len(cells), line.count(separator) + 1)  # with the empty ones at its end
+        if any(cells):
+            rows.append([*cells, *[""] * (min(stated, width) - len(cells))])
+            lines.append(number)
+    notes = _notes_under(rows, lines) if rows and len(rows[0]) > 1 else []
+    if len(rows) < 2:
         raise CsvError("must have a header of field names and at least one row")
-    for row, line in zip(table[1:], lines[1:], strict=True):
-        if len(_without_empty_end(row, len(header))) != len(header):
-            raise CsvError(f"must have as many cells in each row as in the header: {len(row)} on line {line}, "
-                           f"{len(header)} in the header")  # fmt: skip
-    return _Table(header, table[1:], lines[1:], separator, notes)
+    header, *rows = rows
+    for row, number in zip(rows, lines[1:], strict=True):
+        if len(row) != len(header):
+            counts = f"{len(row)} on line {number}, {len(header)} in the header"
+            raise CsvError(f"must have as many cells in each row as in the header: {counts}")
+    return _Table(header, rows, lines[1:], separator, notes)
 
 
 def _notes_under(table: list[list[str]], lines: list[int]) -> list[str]:
     """Remove rows of words below a blank line under a table; returns a message on each."""
     end = len(table)
-    while end > 2 and template_lines.is_note(table[end - 1]):
+    while end > 2 and template_columns.is_note(table[end - 1]):
         end -= 1
     start = next((row for row in range(end, len(table)) if lines[row] > lines[row - 1] + 1), len(table))
-    notes = [template_lines.note_message(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
+    notes = [template_columns.note_message(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
     del table[start:], lines[start:]
     return notes
-
-
-def _without_empty_end(cells: list[str], least: int) -> list[str]:
-    """The cells without empty ones at the end, as spreadsheets write them, but at least `least` of them."""
-    while len(cells) > least and not cells[-1]:
-        cells.pop()
-    return cells
 
 
 def _only_counts(index: int, heading: str, cells: Sequence[str]) -> bool:

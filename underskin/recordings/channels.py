@@ -1,6 +1,6 @@
 """The content of an instrument's file before a rig description maps its channels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -118,6 +118,27 @@ class Document:
 
     campaign: Any
     warnings: tuple[str, ...] = ()
+
+
+def together(tables: Mapping[str, Contents], place: str, warning: str) -> Contents:
+    """Several tables of a file as its contents: a block is called by its table and its name, and a property by its
+    block (`run 1.preload`); `place` and `warning` are the forms of a table's name, and of it and a warning."""
+    blocks = tuple(
+        replace(block, name=f"{name} {block.name}".strip()) for name, table in tables.items() for block in table.blocks
+    )
+    properties = {key: value for name, table in tables.items() for key, value in _by_block(name, table)}
+    warnings = [warning.format(name, text) for name, table in tables.items() for text in table.warnings]
+    layout = "; ".join(f"{place.format(name)}: {table.layout}" for name, table in tables.items())
+    return Contents(blocks, properties, tuple(dict.fromkeys(warnings)), layout)
+
+
+def _by_block(name: str, table: Contents) -> Iterator[tuple[str, str | float]]:
+    """The properties of a table, each under the names of the blocks that it is about."""
+    blocks = [f"{name} {block.name}".strip() for block in table.blocks]
+    numbered = tuple(f"{block.name}." for block in table.blocks if block.name)
+    for key, value in table.properties.items():
+        about = [f"{name} {key}"] if numbered and key.startswith(numbered) else [f"{block}.{key}" for block in blocks]
+        yield from ((by_block, value) for by_block in about)
 
 
 def with_distinct_names(channels: list[Channel]) -> tuple[Channel, ...]:

@@ -19,8 +19,8 @@ from typing import Any, BinaryIO
 import numpy as np
 import orjson
 
-from underskin.errors import FileError, conflicting, too_few
-from underskin.recordings import curve_preparation, rig_guess, rig_mapping, validation
+from underskin.errors import FileError, InvalidInput, conflicting, too_few
+from underskin.recordings import curve_preparation, files_beside, rig_description, rig_guess, rig_mapping, validation
 from underskin.recordings.campaign import (
     COLUMNS,
     Campaign,
@@ -125,10 +125,11 @@ def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None 
     """The campaign in a file; `source` is its path or its bytes, `name` its name in messages.
 
     The format follows from the content, for formats of other packages from the name. Files of channels need a rig
-    description. Raises FileError that names the file and the place, InvalidInput where the campaign itself or its skin
-    is invalid.
+    description, unless their headings and header say all of it. Raises FileError that names the file and the place,
+    InvalidInput where the campaign itself or its skin is invalid. Other files of a recording, which the rig description
+    names (`beside`), are read from the same folder.
     """
-    return understood(read_contents(source, name), name, rig)
+    return understood(read_contents(source, name, rig), name, rig)
 
 
 def understood(contents: Contents | Document, name: str, rig: RigDescription | None = None) -> Reading:
@@ -136,15 +137,48 @@ def understood(contents: Contents | Document, name: str, rig: RigDescription | N
     if isinstance(contents, Document):
         return Reading(*from_dict(contents.campaign), list(contents.warnings))
     if rig is None:
-        layout = f" ({contents.layout})" if contents.layout else ""
-        reason = f"a rig description must say what its channels are ({_DRAFT}); it has {contents.described()}{layout}"
-        raise FileError(name, "", f"{reason}{_TEMPLATE}" if rig_guess.holds_frfs(contents) else reason)
+        return _by_guess(contents, name)
     mapped = rig_mapping.apply(rig, contents, name)
     return Reading(*from_dict(mapped.document), mapped.warnings, mapped.taken)
 
 
-def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
-    """A file's channels, or its campaign document, before a rig description is applied; raises FileError."""
+def _by_guess(contents: Contents, name: str) -> Reading:
+    """The campaign of channels that a file describes well enough itself, with a warning that says how it was read.
+
+    Raises FileError that names what the file does not say.
+    """
+    document = rig_guess.of_contents(contents)
+    lacking, unclear = rig_guess.missing(document), rig_guess.unclear(contents)
+    doubt = f"more than one column may be {', '.join(unclear)}" if unclear else ""
+    if lacking:
+        doubt = f"the file does not say {', '.join(lacking)}"
+    if not doubt:
+        try:
+            mapped = rig_mapping.apply(rig_description.from_dict(document), contents, name)
+            return Reading(*from_dict(mapped.document), [rig_guess.said(document), *mapped.warnings], mapped.taken)
+        except FileError as error:
+            doubt = ": ".join(filter(None, (error.place, str(error.reason))))
+        except InvalidInput as error:
+            doubt = str(error)
+    layout = f" ({contents.layout})" if contents.layout else ""
+    reason = f"a rig description must say what its channels are ({_DRAFT}); it has {contents.described()}{layout}"
+    raise FileError(name, "", f"{reason}; {doubt}{_TEMPLATE if rig_guess.holds_frfs(document) else ''}")
+
+
+def read_contents(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Contents | Document:
+    """A file's channels, or its campaign document, before a rig description is applied, with the channels of the files
+    that it names `beside`; raises FileError."""
+    contents = _parsed(source, name)
+    if rig is None or rig.beside is None or isinstance(contents, Document):
+        return contents
+    if isinstance(source, bytes):
+        raise FileError(name, "", "is no file with others in its folder, which the rig description names (beside)")
+    others = {file.name: _parsed(file, file.name) for file in files_beside.files_beside(Path(source), rig.beside)}
+    channels = {file: held for file, held in others.items() if isinstance(held, Contents)}
+    return files_beside.with_beside(contents, channels, name)
+
+
+def _parsed(source: Path | str | bytes, name: str) -> Contents | Document:
     with _opened(source, name) as stream:
         file_format = formats.detect(stream, name)
         size = stream.seek(0, io.SEEK_END)

@@ -14,8 +14,16 @@ import numpy as np
 
 from underskin.recordings.channels import Block, Contents
 from underskin.recordings.readers.text import time_zone, with_zone
-from underskin.recordings.readers.unit_labels import decibel_reference, in_brackets, lab_field, labelled_unit, unit
+from underskin.recordings.readers.unit_labels import (
+    DECIBEL,
+    decibel_reference,
+    in_brackets,
+    lab_field,
+    labelled_unit,
+    unit,
+)
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, SCHEMA, channel_fields
+from underskin.units import LAB
 
 _RATE = "sample_rate_hz"
 _RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
@@ -26,6 +34,7 @@ _BY_DIMENSION = {
         "frequency": "frequency_hz",
         "charge/force": "frf_re_pc_per_n",
         "time": "time_s",
+        "angle": PHASE,
     },
     "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
     "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
@@ -38,6 +47,8 @@ _BY_WORD = {
     "charge": "charge_pc",
     "amplifier": "charge_pc",
     "coh": "coherence",
+    "koh": "coherence",
+    "coer": "coherence",
     "frequency": "frequency_hz",
     "phase": PHASE,
     "displacement": "displacement_mm",
@@ -60,11 +71,15 @@ OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius
 _ONE_SENSOR = {"id": "s01", "x_mm": 0, "y_mm": 0}
 _SENSORS = ("sensor", "taxel", "sensore", "capteur")
 _WHEN = ("time", "date", "zeit", "datum", "heure", "ora", "data")
-_ROW_FIELDS = (  # of columns beside an FRF: field, dimension, and a word of the name
-    ("dynamic_force_n", "force", re.compile(r"dyn", re.IGNORECASE)),
-    ("preload_n", "force", re.compile(r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precarico", re.IGNORECASE)),
-    ("indenter_radius_mm", "length", re.compile(r"radius|rayon|raggio|radio", re.IGNORECASE)),
+_SAMPLES = "sample|specimen|probe|prüf|éprouvette|provino|probeta"
+_BY_WORDS = (  # of columns beside an FRF, and of properties: field, dimension, and words in instruments' languages
+    ("dynamic_force_n", "force", r"dyn|din[aá]mic"),
+    ("preload_n", "force", r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precar"),
+    ("indenter_radius_mm", "length", rf"^(?!.*(sensor|taxel|{_SAMPLES}))(?=.*(radi[ou]|rayon|raggio))"),
+    ("sample_height_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(height|höhe|hauteur|altezza|altura))"),
+    ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(dia|durchmesser|diá))"),
 )
+_OF_ROWS = ("dynamic_force_n", "preload_n", "indenter_radius_mm")  # fields that may be columns
 _DIAMETER = re.compile(r"dia\w*m|durchmesser|diamètre|[øØ⌀]", re.IGNORECASE)
 _RADIUS = "radius"  # the derived channel
 _IMAGINARY = re.compile(r"imag|\bim\b")
@@ -133,6 +148,7 @@ def of_contents(contents: Contents) -> dict[str, Any]:
         **document,
         "skin": {
             **{name: document["skin"].get(name) for name in skin},
+            **_of_skin(contents.properties),
             **({"sensors": sensors or [dict(_ONE_SENSOR)]} if kind == "frf" else {}),
         },
         "recording": {**dict.fromkeys(needed), **document["recording"]},
@@ -149,7 +165,52 @@ def _sensors(contents: Contents, document: Mapping[str, Any]) -> list[dict[str, 
         words, channel = block.words(column), block.headed(column)
         names += list(words.texts) if words is not None else []
         names += [f"{number:g}" for number in np.unique(channel.values.real)] if words is None and channel else []
-    return [{"id": name, "x_mm": None, "y_mm": None} for name in dict.fromkeys(filter(None, names))]
+    places = _places(contents, column) if column else {}
+    return [
+        {"id": name, **dict(zip(("x_mm", "y_mm"), places.get(name, (None, None)), strict=True))}
+        for name in dict.fromkeys(filter(None, names))
+    ]
+
+
+def _places(contents: Contents, sensor: str) -> dict[str, tuple[float, float]]:
+    """The positions [mm] of sensors in columns `x` and `y` with a unit of length that have one value for each."""
+    found: dict[str, set[tuple[float, float]]] = {}
+    for block in contents.blocks:
+        words, axes = block.words(sensor), [block.headed(axis) for axis in ("x", "y")]
+        lengths = [unit(axis.label) for axis in axes if axis is not None]
+        to_mm = [1e3 * length.to_si for length in lengths if length is not None and length.dimension == "length"]
+        if words is None or len(to_mm) < 2:
+            continue
+        columns = [axis.values.real * scale for axis, scale in zip(axes, to_mm, strict=True) if axis is not None]
+        for code, *place in zip(words.codes.tolist(), *(column.tolist() for column in columns), strict=False):
+            found.setdefault(words.texts[code], set()).add((round(place[0], 9), round(place[1], 9)))
+    return {name: next(iter(places)) for name, places in found.items() if len(places) == 1}
+
+
+def unclear(contents: Contents) -> list[str]:
+    """Fields that several columns of a file may be, each with these columns, in words."""
+    columns = [
+        Heading(channel.name, channel.label, np.iscomplexobj(channel.values))
+        for block in main_blocks(contents)[:1]
+        for channel in block.channels
+    ]
+    by_field: dict[str, list[str]] = {}
+    if not _entries(columns, guessed(columns, {}, {})):
+        for column, field in zip(columns, likely(columns)[1], strict=True):
+            by_field.setdefault(field, []).append(column.name)
+    return [f"{field} ({' or '.join(map(repr, names))})" for field, names in by_field.items() if field and names[1:]]
+
+
+def said(document: Mapping[str, Any]) -> str:
+    """What a guessed rig description takes for what, in words."""
+    columns = ", ".join(f"{column!r} as {field}" for column, field in taken(document).items())
+    both = {**document["skin"], **document["recording"]}
+    stated = [
+        f"{one['property']!r} as {name}" for name, one in both.items() if isinstance(one, Mapping) and "property" in one
+    ]
+    assumed = [f"{name} {one:g}" for name, one in both.items() if isinstance(one, float)]
+    parts = [columns, *stated, *(f"{one} assumed" for one in assumed)]
+    return f"read without a rig description, by headings and units: {', '.join(parts)}"
 
 
 def guessed(
@@ -191,14 +252,14 @@ def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
         kind = "compression" if named else "indentation"
     elif not charged and any(word in column.name.lower() for column in columns for word in _OF_SPRINGS):
         kind = "indentation"
-    phases = any("phase" in column.name.lower() for column in columns)
+    phases = "angle" in dimensions or any("phase" in column.name.lower() for column in columns)
     is_spectrum = "frequency" in dimensions
     fields = []
     for column, dimension in zip(columns, dimensions, strict=True):
         name = column.name.lower()
         word = next((field for word, field in _BY_WORD.items() if word in name), "")
         field = COMPLEX_FRF if column.is_complex else _BY_DIMENSION[kind].get(dimension) or word
-        if decibel_reference(column.unit) is not None:
+        if decibel_reference(column.unit) is not None or (dimension == DECIBEL and is_spectrum and phases):
             field = MAGNITUDE
         if field == "frf_re_pc_per_n" and _IMAGINARY.search(name):
             field = "frf_im_pc_per_n"
@@ -232,10 +293,8 @@ def _row_fields(
             derived[_RADIUS] = f"'{column.name}' / 2"
         elif not dimension and any(word in column.name.lower() for word in _SENSORS):
             found.setdefault("sensor", {"channel": column.name})
-        for row_field, needed, word in _ROW_FIELDS:
-            if dimension == needed and word.search(column.name):
-                found.setdefault(row_field, {"channel": column.name})
-                break
+        elif (row_field := _field_by_words(column.name, dimension)) in _OF_ROWS:
+            found.setdefault(row_field, {"channel": column.name})
     return found, derived
 
 
@@ -262,9 +321,9 @@ def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str
 
 
 def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
-    """The recording's fields that the file itself states under their own names."""
+    """The recording's fields that the file itself states."""
     bare = {(in_brackets(stated) or (stated,))[0].lower().replace(" ", "_"): stated for stated in properties}
-    named = bare | {field: stated for stated in properties for field in (stated, *(lab_field(stated) or ())[:1])}
+    named = bare | {field: stated for stated in reversed(list(properties)) if (field := _stated_field(stated))}
     rate = next((stated for name, stated in bare.items() if name in _RATES), None)
     if rate is not None:
         named[_RATE] = rate
@@ -272,6 +331,28 @@ def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[st
     named = {name: stated for name, stated in named.items() if name != RECORDED_AT}
     named |= {} if when is None else {RECORDED_AT: when}
     return {name: {"property": named[name]} for name in _OF_RECORDING[kind] if name in named}
+
+
+def _stated_field(name: str) -> str:
+    """The field that a property states; empty for none, and for the diameter of a sphere, of which it is half."""
+    field = (lab_field(name) or (name,))[0]
+    if field != name or name in LAB:
+        return "" if field == "indenter_radius_mm" and _DIAMETER.search(name) else field
+    stated = unit(labelled_unit(name))
+    return field if stated is None else _field_by_words(name, stated.dimension)
+
+
+def _field_by_words(name: str, dimension: str) -> str:
+    """The field of a recording by words of a heading and the dimension of its unit; empty for none."""
+    fields = (field for field, needed, words in _BY_WORDS if dimension == needed and re.search(words, name.lower()))
+    return next(fields, "")
+
+
+def _of_skin(properties: Mapping[str, Any]) -> dict[str, Any]:
+    """The skin's fields that the file states under their own names, `skin.thickness_mm` or `Thickness [mm]`."""
+    names = {name: name.removeprefix("skin.") for name in properties}
+    fields = {(lab_field(bare) or (bare,))[0]: name for name, bare in names.items()}
+    return {name: {"property": fields[name]} for name in OF_SKIN if name in fields}
 
 
 def _time_stated(properties: Mapping[str, Any]) -> str | None:
@@ -333,6 +414,6 @@ def taken(document: Mapping[str, Any]) -> dict[str, str]:
     return by_channel
 
 
-def holds_frfs(contents: Contents) -> bool:
-    """Whether a table seems to hold FRFs."""
-    return any(field.startswith("frf_") for field in taken(of_contents(contents)).values())
+def holds_frfs(document: Mapping[str, Any]) -> bool:
+    """Whether a guessed rig description is one of a table of FRFs."""
+    return any(field.startswith("frf_") for field in taken(document).values())

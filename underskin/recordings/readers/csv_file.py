@@ -15,7 +15,15 @@ from typing import BinaryIO
 import numpy as np
 
 from underskin.errors import FileError
-from underskin.recordings.channels import Block, Channel, Contents, TextColumn, text_left_out, with_distinct_names
+from underskin.recordings.channels import (
+    Block,
+    Channel,
+    Contents,
+    TextColumn,
+    text_left_out,
+    together,
+    with_distinct_names,
+)
 from underskin.recordings.readers import headings, text
 from underskin.recordings.readers import table as tables
 from underskin.recordings.readers.clock_column import seconds_of
@@ -137,15 +145,9 @@ def _together(tables_read: Sequence[tuple[str, Contents]]) -> Contents:
     names = [
         title if title and titles.count(title) == 1 else str(number) for number, title in enumerate(titles, start=1)
     ]
-    blocks: list[Block] = []
-    properties: dict[str, str | float] = {}
-    for name, (_, contents) in zip(names, tables_read, strict=True):
-        blocks += [replace(block, name=f"{name} {block.name}".strip()) for block in contents.blocks]
-        properties |= {f"{name}.{key}": value for key, value in contents.properties.items()}
-        properties |= {key: value for key, value in contents.properties.items() if key not in properties}
-    warnings = [warning for _, contents in tables_read for warning in contents.warnings]
-    layout = "; ".join(f"{name}: {contents.layout}" for name, (_, contents) in zip(names, tables_read, strict=True))
-    return Contents(tuple(blocks), properties, tuple(dict.fromkeys(warnings)), layout)
+    of_first = {key: value for _, contents in reversed(tables_read) for key, value in contents.properties.items()}
+    held = together(dict(zip(names, (contents for _, contents in tables_read), strict=True)), "{}", "{1}")
+    return replace(held, properties={**held.properties, **of_first})
 
 
 def _reader(written: str, file: str) -> tuple[RowReader, Sequence[str], Headings]:

@@ -231,7 +231,12 @@ class _Template:
         if tolerances:
             skin["tolerances"] = {name.removeprefix(_TOLERANCE): value for name, value in tolerances.items()}
         skin |= {"sensors": sensors} if sensors else {}
-        return {"schema": SCHEMA, **parts["campaign"], "skin": skin, "recordings": self._recordings()}
+        return {
+            "schema": SCHEMA,
+            **parts["campaign"],
+            "skin": skin,
+            "recordings": _Rows(self, self._columns()).recordings(),
+        }
 
     def _read_line_above(self, row: list[str], index: int) -> tuple[str, str, Any]:
         """A line above the table: its subject (campaign, skin or sensor), its field and its value."""
@@ -277,9 +282,6 @@ class _Template:
             return
         hint = f"{cell} {labelled_unit(heading)} is {converted:g} {quantity.unit}: was {cell} {quantity.unit} meant?"
         raise self.error(index, f"{heading} = {cell}: {hint} (if not, units_checked,true)")
-
-    def _recordings(self) -> list[dict[str, Any]]:
-        return _Rows(self, self._columns()).recordings()
 
     def _columns(self) -> list[Column]:
         """The columns that hold fields, each field once."""

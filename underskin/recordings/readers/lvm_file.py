@@ -6,9 +6,9 @@ File (.lvm)", National Instruments.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import BinaryIO
 
 import numpy as np
@@ -25,20 +25,30 @@ _SAME_START_S = 1e-6
 _LATEST_S = 1e10  # LabVIEW counts seconds from 1904
 _MOST_EMPTY = 10  # parts of channels for each number that there is
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
+_COUNT = re.compile(r"\d{1,9}", re.ASCII)
 
 
 @dataclass
 class _Segment:
-    """A segment being read: its header's rows and its data rows, with their line numbers."""
+    """The rows of a segment's header by their names, the headings, and the rows of data with their lines."""
 
+    file: str
     header: dict[str, list[str]] = field(default_factory=dict)
     names: list[str] = field(default_factory=list)
     rows: list[tuple[int, list[str]]] = field(default_factory=list)
 
+    def cells(self, name: str, count: int) -> list[str]:
+        """The cells of a row of the header, one a channel."""
+        return [*self.header.get(name, []), *[""] * count][:count]
+
+    def error(self, reason: str) -> FileError:
+        """What is wrong with the segment, at its first row."""
+        return FileError(self.file, f"line {self.rows[0][0]}" if self.rows else "a segment", reason)
+
 
 def read(stream: BinaryIO, file: str) -> Contents:
     """The channels of an LVM file; raises FileError that names the line."""
-    lines = text.lines(text.content(stream, file))
+    lines = text.content(stream, file).split("\n")
     if not lines[0].startswith(MAGIC):
         raise FileError(file, "line 1", f"must be {MAGIC}")
     header, start = _file_header(lines, file)
@@ -49,13 +59,12 @@ def read(stream: BinaryIO, file: str) -> Contents:
     if not segments:
         raise FileError(file, f"line {len(lines)}", "holds no segment with data")
     warnings: list[str] = []
-    reader = _Reader(file, header, separator, warnings)
-    blocks = [block for segment in segments for block in reader.blocks(segment)]
+    blocks = [block for segment in segments for block in _acquisitions(segment, header, separator, warnings)]
     numbered = tuple(replace(block, name=str(number)) for number, block in enumerate(blocks, start=1))
     return Contents(numbered, dict(header), tuple(warnings))
 
 
-def _file_header(lines: list[str], file: str) -> tuple[dict[str, str], int]:
+def _file_header(lines: Sequence[str], file: str) -> tuple[dict[str, str], int]:
     header: dict[str, str] = {}
     for index, line in enumerate(lines[1:], start=1):
         if line.startswith(_END_OF_HEADER):
@@ -66,138 +75,103 @@ def _file_header(lines: list[str], file: str) -> tuple[dict[str, str], int]:
     raise FileError(file, f"line {len(lines)}", f"the header has no end, {_END_OF_HEADER}")
 
 
-def _segments(lines: list[str], start: int, separator: str, file: str) -> Iterator[_Segment]:
-    segment = _Segment()
+def _segments(lines: Sequence[str], start: int, separator: str, file: str) -> Iterator[_Segment]:
+    segment = _Segment(file)
     for index in range(start, len(lines)):
-        cells = lines[index].split(separator)
-        first = cells[0].strip()
+        cells = [cell.strip() for cell in lines[index].split(separator)]
         if segment.names and not lines[index].strip():
             yield segment
-            segment = _Segment()
+            segment = _Segment(file)
         elif segment.names:
             segment.rows.append((index + 1, cells))
-        elif first == "X_Value":
+        elif cells[0] == "X_Value":
             if "Channels" not in segment.header:
                 raise FileError(file, f"line {index + 1}", "the segment's header does not say how many Channels")
-            segment.names = [cell.strip() for cell in cells]
-        elif first and first != _END_OF_HEADER:
-            segment.header[first] = [cell.strip() for cell in cells[1:]]
+            segment.names = cells
+        elif cells[0] not in ("", _END_OF_HEADER):
+            segment.header[cells[0]] = cells[1:]
     if segment.names:
         yield segment
 
 
-class _Reader:
-    def __init__(self, file: str, header: dict[str, str], separator: str, warnings: list[str]) -> None:
-        self.file = file
-        self.separator = separator
-        self.decimal = header.get("Decimal_Separator")
-        self.start_time = _moment(header.get("Date", ""), header.get("Time", ""))
-        self.x_columns = header.get("X_Columns", "One")
-        self.warnings = warnings
+def _acquisitions(segment: _Segment, header: Mapping[str, str], separator: str, warnings: list[str]) -> Iterator[Block]:
+    """The channels of a segment, cut into runs of the stated number of samples; adds a warning on the last of them."""
+    channels = _channels(segment, header, separator)
+    samples, date, time = (segment.cells(name, len(channels)) for name in ("Samples", "Date", "Time"))
+    length = max(len(channel.values) for channel in channels)
+    run = int(samples[0]) if len({*samples}) == 1 and _COUNT.fullmatch(samples[0]) else 0
+    run = run or length
+    present = sum(len(channel.values) for channel in channels)
+    if run and length // run * len(channels) > _MOST_EMPTY * present:
+        parts = f"{present} numbers of {len(channels)} channels into {length // run} parts"
+        raise segment.error(f"Samples = {run} cuts {parts}")
+    if run and length % run:
+        warnings.append(f"the last acquisition was interrupted after {length % run} of {run} samples")
+    rates = {channel.sample_rate_hz for channel in channels}
+    rate = rates.pop() if len(rates) == 1 else None
+    when = _moment(date[0], time[0]) or _moment(header.get("Date", ""), header.get("Time", ""))
+    for start in range(0, length, run or 1):
+        parts_of_run = (replace(channel, values=channel.values[start : start + run]) for channel in channels)
+        yield Block("", tuple(parts_of_run), rate, when)
 
-    def blocks(self, segment: _Segment) -> list[Block]:
-        """The acquisitions of a segment."""
-        count = self._count(segment)
-        decimal = self.decimal or ("," if self._has_decimal_commas(segment) else ".")
-        step = 2 if self.x_columns == "Multi" else 1
-        if step == 2:
-            segment.header = _without_gaps(segment.header)
-        names = [*segment.names, *[""] * (1 + step * count)]
-        starts = self._starts(segment, count)
-        channels = [
-            Channel(
-                names[1 + step * channel] or f"channel {channel + 1}",
-                _header_cell(segment, "Y_Unit_Label", channel),
-                np.array(values, dtype=np.float64),
-                self._rate(segment, channel),
-                starts[channel],
-            )
-            for channel, values in enumerate(self._columns(segment, count, step, decimal))
+
+def _channels(segment: _Segment, header: Mapping[str, str], separator: str) -> tuple[Channel, ...]:
+    """The channels of all rows; a channel with fewer samples ends with empty or missing cells."""
+    stated = segment.cells("Channels", 1)[0]
+    widest = max((len(cells) for _, cells in segment.rows), default=0)
+    if not _COUNT.fullmatch(stated) or not 0 < int(stated) < max(widest, 1):
+        raise segment.error(f"Channels = {stated!r}, but the rows hold {max(widest - 1, 0)}")
+    count, step = int(stated), 1
+    if header.get("X_Columns") == "Multi":
+        step, segment.header = 2, _without_gaps(segment.header)
+    has_commas = separator != "," and any("," in cell for cell in segment.rows[0][1][:-1])
+    decimal = header.get("Decimal_Separator") or ("," if has_commas else ".")
+    columns: list[list[float]] = [[] for _ in range(count)]
+    for index, (line, cells) in enumerate(segment.rows):
+        for channel, cell in enumerate(cells[1 : 1 + step * count : step]):
+            value, values = text.number(cell, decimal), columns[channel]
+            if value is not None and len(values) == index:
+                values.append(value)
+            elif cell:
+                raise FileError(
+                    segment.file, f"line {line}, column {2 + step * channel}", f"{cell[:40]!r} is no number here"
+                )
+    names = [*segment.names, *[""] * (1 + step * count)][1::step]
+    steps, starts = (_numbers(segment.cells(name, count), header) for name in ("Delta_X", "X0"))
+    of_channels = zip(
+        segment.cells("Y_Unit_Label", count), segment.cells("X_Dimension", count), steps, _starts(segment, starts),
+        columns, strict=True,
+    )  # fmt: skip
+    return with_distinct_names(
+        [
+            Channel(names[number] or f"channel {number + 1}", label, np.array(values, float), _rate(delta, axis), start)
+            for number, (label, axis, delta, start, values) in enumerate(of_channels)
         ]
-        return self._acquisitions(segment, with_distinct_names(channels))
+    )
 
-    def _rate(self, segment: _Segment, channel: int) -> float | None:
-        """1/Delta_X of a channel over time."""
-        step = self._number(_header_cell(segment, "Delta_X", channel))
-        is_time = _header_cell(segment, "X_Dimension", channel) in ("Time", "")
-        return 1 / step if step is not None and _LEAST_STEP_S < step < _LATEST_S and is_time else None
 
-    def _starts(self, segment: _Segment, count: int) -> list[float]:
-        """The start of each channel after the first of them [s]: by X0, the first abscissa, or by Date and Time.
+def _numbers(cells: Sequence[str], header: Mapping[str, str]) -> list[float | None]:
+    """Numbers of a header, each with its own decimal mark where the header states none."""
+    return [text.number(cell, header.get("Decimal_Separator") or ("," if "," in cell else ".")) for cell in cells]
 
-        Raises FileError where both differ between channels and disagree.
-        """
-        channels = range(count)
-        by_abscissa = _after_first([self._number(_header_cell(segment, "X0", channel)) for channel in channels])
-        moments = [
-            _moment(_header_cell(segment, "Date", channel), _header_cell(segment, "Time", channel))
-            for channel in channels
-        ]
-        stamps = [
-            None if moment is None else datetime.fromisoformat(moment).replace(tzinfo=UTC).timestamp()
-            for moment in moments
-        ]
-        by_clock = _after_first(stamps)
-        if any(by_abscissa) and any(by_clock) and not np.allclose(by_abscissa, by_clock, atol=_SAME_START_S):
-            worst = int(np.argmax(np.abs(np.subtract(by_abscissa, by_clock))))
-            by_x, by_time = by_abscissa[worst], by_clock[worst]
-            reason = f"channel {worst + 1} begins {by_x:g} s after the first by X0, and {by_time:g} s by Date and Time"
-            raise FileError(self.file, f"line {segment.rows[0][0]}" if segment.rows else "a segment", reason)
-        return by_abscissa if any(by_abscissa) else by_clock
 
-    def _count(self, segment: _Segment) -> int:
-        stated = _header_cell(segment, "Channels", 0)
-        widest = max((len(cells) for _, cells in segment.rows), default=0)
-        if not stated.isascii() or not stated.isdigit() or not 0 < int(stated[:9]) < max(widest, 1):
-            place = f"line {segment.rows[0][0]}" if segment.rows else "a segment"
-            raise FileError(self.file, place, f"Channels = {stated!r}, but the rows hold {max(widest - 1, 0)}")
-        return int(stated)
+def _rate(step: float | None, dimension: str) -> float | None:
+    """The samples a second of a channel over time."""
+    return 1 / step if step is not None and _LEAST_STEP_S < step < _LATEST_S and dimension in ("Time", "") else None
 
-    def _has_decimal_commas(self, segment: _Segment) -> bool:
-        return self.separator != "," and any("," in cell for cell in segment.rows[0][1][:-1])
 
-    def _columns(self, segment: _Segment, count: int, step: int, decimal: str) -> list[list[float]]:
-        """The channels' numbers; a channel with fewer samples ends with empty or missing cells."""
-        columns: list[list[float]] = [[] for _ in range(count)]
-        for index, (line, cells) in enumerate(segment.rows):
-            for channel, written in enumerate(cells[1 : 1 + step * count : step]):
-                cell, values = written.strip(), columns[channel]
-                value = text.number(cell, decimal)
-                if value is not None and len(values) == index:
-                    values.append(value)
-                elif cell:
-                    place = f"line {line}, column {2 + step * channel}"
-                    raise FileError(self.file, place, f"{cell[:40]!r} is no number here")
-        return columns
-
-    def _number(self, cell: str) -> float | None:
-        """A number of the header, with its own decimal mark where the header states none."""
-        return text.number(cell, self.decimal or ("," if "," in cell else "."))
-
-    def _acquisitions(self, segment: _Segment, channels: tuple[Channel, ...]) -> list[Block]:
-        """The channels cut into runs of the stated number of samples."""
-        rates = {channel.sample_rate_hz for channel in channels}
-        rate = rates.pop() if len(rates) == 1 else None
-        samples = {_header_cell(segment, "Samples", channel) for channel in range(len(channels))}
-        stated = samples.pop() if len(samples) == 1 else ""
-        length = max(len(channel.values) for channel in channels)
-        run = int(stated) if stated.isascii() and stated.isdigit() and 0 < len(stated) < 10 and int(stated) else length
-        present = sum(len(channel.values) for channel in channels)
-        if run and length // run * len(channels) > _MOST_EMPTY * present:
-            reason = f"Samples = {run} cuts {present} numbers of {len(channels)} channels into {length // run} parts"
-            raise FileError(self.file, f"line {segment.rows[0][0]}", reason)
-        if run and length % run:
-            self.warnings.append(f"the last acquisition was interrupted after {length % run} of {run} samples")
-        start_time = _moment(_header_cell(segment, "Date", 0), _header_cell(segment, "Time", 0)) or self.start_time
-        return [
-            Block(
-                "",
-                tuple(replace(channel, values=channel.values[start : start + run]) for channel in channels),
-                rate,
-                start_time,
-            )
-            for start in range(0, length, run or 1)
-        ]
+def _starts(segment: _Segment, abscissae: Sequence[float | None]) -> list[float]:
+    """The start of each channel after the first of them [s]: by X0, the first abscissa, or by Date and Time; raises
+    FileError where both differ between channels and disagree."""
+    dates, times = (segment.cells(name, len(abscissae)) for name in ("Date", "Time"))
+    moments = [_moment(date, time) for date, time in zip(dates, times, strict=True)]
+    stamps = [when if when is None else datetime.fromisoformat(f"{when}+00:00").timestamp() for when in moments]
+    by_x, by_clock = _after_first(abscissae), _after_first(stamps)
+    if any(by_x) and any(by_clock) and not np.allclose(by_x, by_clock, atol=_SAME_START_S):
+        worst = int(np.argmax(np.abs(np.subtract(by_x, by_clock))))
+        both = f"{by_x[worst]:g} s after the first by X0, and {by_clock[worst]:g} s by Date and Time"
+        raise segment.error(f"channel {worst + 1} begins {both}")
+    return by_x if any(by_x) else by_clock
 
 
 def _without_gaps(header: dict[str, list[str]]) -> dict[str, list[str]]:
@@ -211,11 +185,6 @@ def _after_first(times: Sequence[float | None]) -> list[float]:
     """Times after the earliest; 0 for an unknown one."""
     valid = [time for time in times if time is not None and abs(time) < _LATEST_S]
     return [time - min(valid) if time is not None and abs(time) < _LATEST_S else 0.0 for time in times]
-
-
-def _header_cell(segment: _Segment, name: str, channel: int) -> str:
-    cells_of_row = segment.header.get(name, [])
-    return cells_of_row[channel] if channel < len(cells_of_row) else ""
 
 
 def _moment(date: str, time: str) -> str | None:

@@ -11,7 +11,8 @@ import cmath
 import math
 import re
 from array import array
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 
@@ -24,6 +25,8 @@ from underskin.units import Floats
 
 BLANKS = " "
 _STYLES = (("\t", "."), (";", "."), (",", "."), ("\t", ","), (";", ","), (BLANKS, "."), (BLANKS, ","))
+_BLANKS_ALONE = re.compile(r'[^\t;"]* [^\t;"]*')  # lines of which blanks part the cells
+_BARE_OR_QUOTED = re.compile(r'[^"]*| *"[^"]*"')
 _TOKEN = re.compile(r'"[^"]*"|\S+')
 _COMMENT = re.compile(r"\s*(#|%|//|!)+\s*")
 _LEAST = 2  # columns of numbers, rows of a table, rows of a group
@@ -66,12 +69,37 @@ class Table:
             cells = [*cells, *[""] * (self.width - len(cells))]
         if len(cells) <= max(self.columns):
             return None
-        row = [self._number(cells[column], column) for column in self.columns]
+        row = [self.number(cells[column], column) for column in self.columns]
         numbers = sum(number is not None for number in row)
         empty = sum(not cells[column] for column in self.columns)
         return row if numbers + empty == len(row) and numbers >= min(_LEAST, len(row)) else None
 
-    def _number(self, cell: str, column: int) -> float | complex | None:
+    def cells_of_columns(self, lines: Sequence[str]) -> list[Sequence[str]] | None:
+        """The cells of lines by column; None where a line may be no row, or has quotes within a cell."""
+        least, separator = max(self.columns), self.separator
+        if separator == BLANKS:
+            if not all(map(_BLANKS_ALONE.fullmatch, lines)):
+                return None
+            rows = [line.split() for line in lines]
+            if not all(least < len(row) <= self.width for row in rows):
+                return None
+            return list(zip(*(row + [""] * (self.width - len(row)) for row in rows), strict=True))
+        counts = [line.count(separator) for line in lines]
+        if not least <= min(counts) <= max(counts) < self.width:
+            return None
+        if min(counts) < self.width - 1:
+            lines = [line + separator * (self.width - 1 - count) for line, count in zip(lines, counts, strict=True)]
+        joined = separator.join(lines)
+        cells = joined.split(separator)
+        if '"' in joined:
+            if not all(map(_BARE_OR_QUOTED.fullmatch, cells)):
+                return None
+            cells = [cell.replace('"', "") for cell in cells]
+        cells = list(map(str.strip, cells))
+        return [cells[column :: self.width] for column in range(self.width)]
+
+    def number(self, cell: str, column: int) -> float | complex | None:
+        """The number in a cell of a column, NaN for an overload; None where it holds something else."""
         number = text.number(cell, self.decimal)
         if number is None and column in self.complex_ones:
             return complex_number(cell, self.decimal)
@@ -136,7 +164,7 @@ def find(lines: Sequence[str]) -> Table | None:
             continue
         run = filled[first : first + length]
         cells = [split(line, separator) for line in run]
-        rows = length * len(columns) / max(map(len, cells))
+        rows = length * len(columns) / max(map(_count_of_parts, cells))
         if rows > most:
             width = max(room(line, separator) for line in run)
             complex_ones = frozenset(
@@ -146,6 +174,12 @@ def find(lines: Sequence[str]) -> Table | None:
     if best is None:
         return None
     return replace(best, start=next(index for index, line in enumerate(lines) if best.row(line) is not None))
+
+
+def _count_of_parts(cells: Sequence[str]) -> int:
+    """The number of cells with those that a tab or a semicolon in them would make: commas between semicolons are
+    decimal."""
+    return len(cells) + sum(cell.count(mark) for cell in cells for mark in "\t;")
 
 
 def most_numbers(lines: Sequence[str]) -> tuple[int, int]:
@@ -161,16 +195,17 @@ def _count(line: str, separator: str, decimal: str) -> int:
 
 
 def _columns(line: str, separator: str, decimal: str) -> tuple[int, ...]:
-    """Which cells of a line are numbers, or overloads beside numbers; empty where fewer than two are numbers."""
+    """Which cells of a line are numbers, or overloads beside numbers; empty for fewer than two."""
     cells = split(line, separator)
     numbers = {
         index
         for index, cell in enumerate(cells)
         if text.number(cell, decimal) is not None or complex_number(cell, decimal) is not None
     }
-    if len(numbers) < _LEAST:
+    if not numbers:
         return ()
-    return tuple(index for index, cell in enumerate(cells) if index in numbers or _OVERLOAD.fullmatch(cell))
+    columns = tuple(index for index, cell in enumerate(cells) if index in numbers or _OVERLOAD.fullmatch(cell))
+    return columns if len(columns) >= _LEAST else ()
 
 
 def _longest_run(columns_of: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], int, int]:
@@ -242,14 +277,11 @@ class Section:
         """Let the next row start a group."""
         self._starts.append(self.count)
 
-    def add(self, last: int, count: int, numbers: Sequence[float] | Floats) -> None:
+    def add(self, last: int, count: int, numbers: Floats) -> None:
         """Add the numbers of rows, the last of them on line `last`."""
         self.last = last
         self.count += count
-        if isinstance(numbers, np.ndarray):
-            self._numbers.frombytes(numbers.tobytes())
-        else:
-            self._numbers.extend(numbers)
+        self._numbers.frombytes(numbers.tobytes())
 
     def columns(self, table: Table) -> list[Values]:
         """The columns of numbers."""
@@ -273,9 +305,9 @@ class OtherCells:
     first: tuple[int, str] | None = None
     example: str = ""
 
-    def see(self, cell: str, index: int, line: str) -> None:
-        """Add a cell."""
-        self.count += 1
+    def see(self, cell: str, index: int, line: str, count: int = 1) -> None:
+        """Add a cell, which stands in so many rows, first on the line at an index."""
+        self.count += count
         self.example = self.example or cell.strip()
         self.first = self.first or (index, line)
 
@@ -287,12 +319,17 @@ class Words(OtherCells):
     texts: dict[str, int] = field(default_factory=dict)
     codes: "array[int]" = field(default_factory=lambda: array("q"))
 
-    def add(self, cell: str, index: int, line: str, *, is_number: bool) -> None:
-        """Add the cell of the next row; of too many different ones none is kept."""
-        if not is_number:
-            self.see(cell, index, line)
+    def add(self, cells: Sequence[str], decimal: str, first: int, lines: Sequence[str]) -> None:
+        """Add the cells of the next rows, one in each of the lines from `first` on; of too many different ones none is
+        kept."""
+        for cell, count in Counter(cells).items():
+            if text.number(cell, decimal) is None:
+                row = cells.index(cell) if self.first is None else 0
+                self.see(cell, first + row, lines[row], count)
+            if self.kept:
+                self.texts.setdefault(cell, len(self.texts))
         if self.kept:
-            self.codes.append(self.texts.setdefault(cell.strip(), len(self.texts)))
+            self.codes.extend(map(self.texts.__getitem__, cells))
         else:
             self.codes = array("q")
 
@@ -332,48 +369,77 @@ class RowReader:
                     raise no_row(index, line, self.table, self._file)
 
     def _take(self, first: int, lines: Sequence[str]) -> None:
-        """Read lines, the first of which has the index `first`."""
-        table = self.table
+        """Read lines, the first of which has the index `first`: many at once, or one by one where one is no plain
+        row."""
+        table, ended = self.table, self.sections[-1].ended if self.sections else {}
         numbers = plain_numbers(lines, table.separator, table.decimal, table.width) if self._is_plain else None
-        if numbers is not None and not (self.sections and self.sections[-1].ended):
-            self.count += len(lines)
+        if numbers is not None and not ended:
             self._section(first).add(first + len(lines) - 1, len(lines), numbers)
-        elif len(lines) > _FEW and self._is_plain:
-            for start in range(0, len(lines), _FEW):
-                self._take(first + start, lines[start : start + _FEW])
+            self.count += len(lines)
+            return
+        cells = table.cells_of_columns(lines)
+        columns = self._numbers(cells, ended) if cells is not None and not (ended and self.under) else None
+        if cells is not None and columns is not None:
+            self._add(first, lines, cells, columns)
+        elif len(parts := self._parts(lines)) > 1:
+            for part in parts:
+                self._take(first, part)
+                first += len(part)
         else:
             for index, line in enumerate(lines, start=first):
                 self._take_line(index, line)
 
+    def _parts(self, lines: Sequence[str]) -> list[Sequence[str]]:
+        """A few lines each of many; those with cells apart from those without, such as blank ones."""
+        if len(lines) > _FEW:
+            return [lines[start : start + _FEW] for start in range(0, len(lines), _FEW)]
+        return [list(part) for _, part in groupby(lines, key=lambda line: self.table.separator in line)]
+
+    def _numbers(self, cells: Sequence[Sequence[str]], ended: Collection[int]) -> list[Values] | None:
+        """The columns of numbers of some rows, NaN for overloads and below the end of a column; None where a cell is
+        something else."""
+        columns: list[Values] = []
+        for column in self.table.columns:
+            is_complex = column in self.table.complex_ones
+            plain = None if is_complex else plain_numbers(cells[column], ";", self.table.decimal, 1)
+            found = [self.table.number(cell, column) for cell in cells[column]] if plain is None else []
+            if column in ended and not any(cells[column]):
+                plain = np.full(len(cells[column]), math.nan)
+            elif column in ended or None in found:
+                return None
+            columns.append(np.array(found, complex if is_complex else float) if plain is None else plain)
+        return columns if len(columns) - len(ended) >= _LEAST else None
+
     def _take_line(self, index: int, line: str) -> None:
+        """Read a line, which may end columns; raises FileError where a number follows the end of its column."""
         cells = self.table.cells(line)
         row = self.table.row_of(cells, line)
         if row is None:
             self.under.append((index, line))
             return
         section = self._section(index)
-        self.count += 1
-        self._check(section, index, line, row)
-        numbers: list[float] = []
-        for column, number in zip(self.table.columns, row, strict=True):
-            value = math.nan if number is None else number
-            numbers += [value.real, value.imag] if column in self.table.complex_ones else [value.real]
-        section.add(index, 1, numbers)
-        for column, words in self.texts.items():
-            cell = cells[column] if column < len(cells) else ""
-            words.add(cell, index, line, is_number=text.number(cell, self.table.decimal) is not None)
-
-    def _check(self, section: Section, index: int, line: str, row: Sequence[float | complex | None]) -> None:
-        """Note overloads and the ends of columns; raises FileError where a number follows the end of its column."""
         for column, number in zip(self.table.columns, row, strict=True):
             if number is None:
                 section.ended.setdefault(column, (section.count, index, line))
             elif column in section.ended:
                 raise no_row(*section.ended[column][1:], self.table, self._file)
-            elif number != number:
-                cell = self.table.cells(line)[column]
-                if text.number(cell, self.table.decimal) is None:
-                    self.overloads.setdefault(column, OtherCells()).see(cell, index, line)
+        padded = [*cells, *[""] * (self.table.width - len(cells))]
+        columns = [np.asarray([math.nan if number is None else number]) for number in row]
+        self._add(index, [line], [[cell] for cell in padded], columns)
+
+    def _add(self, first: int, lines: Sequence[str], cells: Sequence[Sequence[str]], columns: Sequence[Values]) -> None:
+        """Add rows: their cells by column, and the numbers of the columns of numbers."""
+        parts: list[Floats] = []
+        for column, values in zip(self.table.columns, columns, strict=True):
+            parts += [values.real, values.imag] if column in self.table.complex_ones else [values.real]
+            for row in np.flatnonzero(np.isnan(values)).tolist():
+                cell = cells[column][row]
+                if cell and text.number(cell, self.table.decimal) is None:
+                    self.overloads.setdefault(column, OtherCells()).see(cell, first + row, lines[row])
+        self._section(first).add(first + len(lines) - 1, len(lines), np.stack(parts, axis=1))
+        self.count += len(lines)
+        for column, words in self.texts.items():
+            words.add(cells[column], self.table.decimal, first, lines)
 
     def _section(self, index: int) -> Section:
         """The section of the row at an index."""

@@ -25,40 +25,20 @@ _EITHER = f"{IN_DEGREES} or {PHASE}"
 Meaning = tuple[str, float] | None  # a field, and the factor to its unit
 
 
-def polar_field(heading: str) -> Meaning:
+def _polar_field(heading: str, phases: Collection[str] = (_NAME,)) -> Meaning:
     """Magnitude or phase, and the factor to its unit, where a heading names one with its unit."""
     name, label = _name_and_unit(heading)
-    if name == _NAME and label in _ANGLES:
+    if name in phases and label in _ANGLES:
         return PHASE, _ANGLES[label]
-    if heading.lower().replace(" ", "_") == MAGNITUDE:
-        return MAGNITUDE, 1.0
     given = unit(label)
     if name == "frf_magnitude" and given is not None and given.dimension == "charge/force":
         return MAGNITUDE, given.to_si / 1e-12
-    return None
-
-
-def with_short_phase(headings: Sequence[str], meanings: Sequence[Meaning]) -> list[Meaning]:
-    """The meanings; next to a magnitude without its phase, a heading such as `Phase [deg]` is that phase."""
-    fields = {meaning[0] for meaning in meanings if meaning is not None}
-    if MAGNITUDE not in fields or PHASE in fields:
-        return list(meanings)
-    completed: list[Meaning] = []
-    for heading, meaning in zip(headings, meanings, strict=True):
-        name, label = _name_and_unit(heading)
-        is_phase = meaning is None and name == _SHORT_NAME and label in _ANGLES
-        completed.append((PHASE, _ANGLES[label]) if is_phase else meaning)
-    return completed
-
-
-def phase_in(label: str) -> str:
-    """The heading of a phase in a unit; empty where the unit is no angle."""
-    return "" if label not in _ANGLES else PHASE if label == "rad" else IN_DEGREES
+    return (MAGNITUDE, 1.0) if _plain(heading) == MAGNITUDE else None
 
 
 def is_phase_without_unit(heading: str) -> bool:
     """Whether a heading is a phase without its unit."""
-    return heading.strip().lower().replace(" ", "_") == _NAME
+    return _plain(heading) == _NAME
 
 
 def angle_by_values(heading: str, largest: float) -> float:
@@ -79,9 +59,8 @@ def _name_and_unit(heading: str) -> tuple[str, str]:
     bracketed = in_brackets(heading)
     if bracketed is not None:
         return bracketed[0].lower().replace(" ", "_"), bracketed[1]
-    name_with_unit = heading.strip().lower().replace(" ", "_")
-    name, _, label = name_with_unit.rpartition("_")
-    return (name, label) if label in _ANGLES else (name_with_unit, "")
+    name, _, label = _plain(heading).rpartition("_")
+    return (name, label) if label in _ANGLES else (_plain(heading), "")
 
 
 FURTHER = "conditions."  # prefix of a lab's own columns
@@ -184,24 +163,27 @@ def columns(
 
 
 def fields_of(headings: Sequence[str], field_names: Collection[str]) -> list[Meaning]:
-    """The field of each heading and the factor to its unit; a phase is also recognised by its magnitude."""
-    return with_short_phase(headings, [field_of(heading, field_names) for heading in headings])
+    """The field of each heading and the factor to its unit; `Phase [deg]` beside a magnitude without one is its
+    phase."""
+    meanings = [field_of(heading, field_names) for heading in headings]
+    fields = {meaning[0] for meaning in meanings if meaning is not None}
+    if MAGNITUDE not in fields or PHASE in fields:
+        return meanings
+    both = zip(headings, meanings, strict=True)
+    return [meaning or _polar_field(heading, (_SHORT_NAME,)) for heading, meaning in both]
 
 
 def field_of(heading: str, field_names: Collection[str]) -> Meaning:
     """The field of a heading and the factor to its unit; None where it names none."""
     heading = heading.strip()
-    if heading.lower().startswith(FURTHER):
-        return FURTHER + heading[len(FURTHER) :], 1.0
     lower = heading.lower()
-    if (name := lower.replace(" ", "_")) in field_names:
+    if lower.startswith(FURTHER):
+        return FURTHER + heading[len(FURTHER) :], 1.0
+    if (name := _plain(heading)) in field_names:
         return name, 1.0
-    return polar_field(heading) or lab_field(heading) or lab_field(lower) or _share(heading)
-
-
-def _share(heading: str) -> Meaning:
-    """The coherence in percent."""
-    return ("coherence", 0.01) if in_brackets(heading.lower()) == ("coherence", "%") else None
+    if in_brackets(lower) == ("coherence", "%"):
+        return "coherence", 0.01
+    return _polar_field(heading) or lab_field(heading) or lab_field(lower)
 
 
 def misspelt(heading: str, fields: Iterable[str]) -> str | None:
@@ -270,9 +252,8 @@ def _lacking(heading: str, present: Collection[str]) -> list[str]:
     bracketed = in_brackets(heading)
     if bracketed is None or "displacement_mm" in present:
         return []
-    phase = phase_in(bracketed[1])
-    if phase and not {PHASE, PARTS[1]} & {*present}:
-        return [phase]
+    if bracketed[1] in _ANGLES and not {PHASE, PARTS[1]} & {*present}:
+        return [PHASE if bracketed[1] == "rad" else IN_DEGREES]
     has = {*present, *([MAGNITUDE] if PARTS[0] in present else [])}
     return [
         field

@@ -19,7 +19,7 @@ import openpyxl
 from openpyxl.utils import column_index_from_string
 
 from underskin.errors import FileError, damage_said
-from underskin.recordings.channels import Contents, Document
+from underskin.recordings.channels import Contents, Document, together
 from underskin.recordings.readers import csv_file, csv_template, text
 from underskin.recordings.readers.parsing_limits import EXPANSION, ParsingLimits
 from underskin.recordings.readers.text import time_zone
@@ -251,26 +251,7 @@ def _tables(sheets: dict[str, str], file: str) -> Contents:
             raise _on_sheet(name, error) from None
     if not tables:
         raise FileError(file, "", "; ".join(f"{error.place} {error.reason}" for error in errors))
-    blocks = tuple(
-        replace(block, name=f"{name} {block.name}".strip()) for name, table in tables.items() for block in table.blocks
-    )
-    properties = {key: value for name, table in tables.items() for key, value in _about(name, table, len(tables))}
-    messages = [f"sheet {name!r}: {warning}" for name, table in tables.items() for warning in table.warnings]
+    held = together(tables, "sheet {!r}", "sheet {!r}: {}")
+    of_only = next(iter(tables.values())).properties if len(tables) == 1 else {}
     omitted = [f"{error.place} is left out: it {error.reason}" for error in errors]
-    layout = "; ".join(f"sheet {name!r}: {table.layout}" for name, table in tables.items())
-    return Contents(blocks, properties, (*messages, *omitted), layout)
-
-
-def _about(name: str, table: Contents, sheets: int) -> list[tuple[str, str | float]]:
-    """The properties of a sheet, prefixed by the names of its blocks; those of an only sheet also without prefix."""
-    parts = [f"{name} {block.name}".strip() for block in table.blocks]
-    numbered = tuple(f"{block.name}." for block in table.blocks if block.name)
-    about = []
-    for key, value in table.properties.items():
-        if numbered and key.startswith(numbered):
-            about.append((f"{name} {key}", value))
-            continue
-        about += [(f"{part}.{key}", value) for part in parts]
-        if sheets == 1:
-            about.append((key, value))
-    return about
+    return replace(held, properties={**held.properties, **of_only}, warnings=(*held.warnings, *omitted))

@@ -1,0 +1,113 @@
+"""Channels of one recording in several files, such as the force in one and the charge in another.
+
+A rig description says how the names of the files belong together: `beside: {_force: [_charge]}` reads `a_charge.csv`
+with `a_force.csv`. Their clocks align them: the stated starts of both, and the first value of a column of times in
+each; `regular_samples.aligned` cuts the channels to the samples in common.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from underskin.errors import FileError
+from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
+from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.regular_samples import mean_step
+
+_EVEN = 0.05  # of a step: as for channels that start at parts of a sample
+
+
+def files_beside(file: Path, beside: tuple[str, tuple[str, ...]]) -> Iterator[Path]:
+    """The other files of a recording, by the name of the first; raises FileError where its name has not the part."""
+    part, others = beside
+    if part not in file.name:
+        raise FileError(str(file), "", f"has no {part!r} in its name, which says what files belong to it (beside)")
+    for other in others:
+        yield file.with_name(other.join(file.name.rsplit(part, 1)))
+
+
+def with_beside(contents: Contents, others: Mapping[str, Contents], file: str) -> Contents:
+    """The contents with the channels of the `others`, part by part; a repeated name is numbered (`Value (2)`).
+
+    Raises FileError that names the files where they have other parts, or no clock by which they could be aligned.
+    """
+    for name, other in others.items():
+        if len(other.blocks) != len(contents.blocks):
+            raise FileError(file, "", f"has {len(contents.blocks)} parts, and {name} beside it {len(other.blocks)}")
+        pairs = zip(contents.blocks, other.blocks, strict=True)
+        blocks, notes = zip(*(_joined(first, second, file, name) for first, second in pairs), strict=True)
+        warnings = (*contents.warnings, *(f"{name}: {warning}" for warning in other.warnings), *filter(None, notes))
+        properties = {**other.properties, **contents.properties}
+        contents = replace(contents, blocks=blocks, properties=properties, warnings=tuple(dict.fromkeys(warnings)))
+    return contents
+
+
+def _joined(first: Block, second: Block, file: str, other: str) -> tuple[Block, str]:
+    """A part with the channels of that beside it, each with its start and rate unless both have one clock; and a note
+    where they are taken to begin together."""
+    clocks = [_clock(block) for block in (first, second)]
+    times = [np.zeros(0) if clock is None else clock.values.real * _seconds(clock) for clock in clocks]
+    added = [channel for channel in second.channels if channel is not clocks[1]]
+    texts = (*first.texts, *(words for words in second.texts if first.words(words.name) is None))
+    lengths = [max((len(channel.values) for channel in block.channels), default=0) for block in (first, second)]
+    rates = [_rate(block, time) for block, time in zip((first, second), times, strict=True)]
+    delay = _delay(first, second, file, other)
+    is_one_clock = np.array_equal(times[0], times[1]) and rates[0] == rates[1] and not delay
+    if is_one_clock and lengths[0] == lengths[1]:
+        note = "" if len(times[0]) else f"{file} and {other} state no clock: their rows are taken to be of one time"
+        return replace(first, channels=with_distinct_names([*first.channels, *added]), texts=texts), note
+    if rates[0] is not None and rates[1] is not None and abs(rates[1] / rates[0] - 1) * max(lengths) < _EVEN:
+        rates[1] = rates[0]  # but for rounding
+    if None in rates:
+        both = " and ".join(name for name, rate in zip((file, other), rates, strict=True) if rate is None)
+        raise FileError(file, "", f"{both}: no rate and no even clock, by which they could be aligned")
+    starts = [time[0] if len(time) else 0.0 for time in times]
+    together = starts[0] == starts[1] + delay
+    timed = [
+        replace(
+            channel,
+            values=channel.values[: min(lengths)] if together else channel.values,
+            sample_rate_hz=rate,
+            starts_s=channel.starts_s + start,
+        )
+        for channels, rate, start in zip((first.channels, added), rates, (starts[0], starts[1] + delay), strict=True)
+        for channel in channels
+    ]
+    note = f"{file} and {other} begin together, and are cut to {min(lengths)} samples" if together else ""
+    return replace(first, channels=with_distinct_names(timed), texts=texts, sample_rate_hz=None), note
+
+
+def _clock(block: Block) -> Channel | None:
+    """The column of times of a part, of which there is one."""
+    times = [channel for channel in block.channels if (label := unit(channel.label)) and label.dimension == "time"]
+    return times[0] if len(times) == 1 and len(times[0].values) > 1 else None
+
+
+def _seconds(clock: Channel) -> float:
+    label = unit(clock.label)
+    assert label is not None
+    return label.to_si
+
+
+def _rate(block: Block, time: np.ndarray) -> float | None:
+    """Samples a second, as stated or by times in even steps."""
+    if not len(time):
+        return block.sample_rate_hz
+    step = mean_step(time)
+    even = time[0] + step * np.arange(len(time))
+    return 1 / step if step > 0 and np.abs(time - even).max() <= _EVEN * step else None
+
+
+def _delay(first: Block, second: Block, file: str, other: str) -> float:
+    """The start of the second part after the first [s]; 0 where neither states one."""
+    if first.recorded_at is None and second.recorded_at is None:
+        return 0.0
+    try:
+        moments = [datetime.fromisoformat(block.recorded_at or "") for block in (first, second)]
+        return (moments[1] - moments[0]).total_seconds()
+    except (ValueError, TypeError):
+        stated = f"{file} at {first.recorded_at or '?'}, {other} at {second.recorded_at or '?'}"
+        raise FileError(file, "", f"the starts of the files cannot be compared: {stated}") from None
