@@ -8,8 +8,8 @@ import pytest
 
 from tests.support.shaken_series import D33, delayed, high_pass, low_pass, shaken
 from underskin.findings.codes import FindingCode
-from underskin.inversion.invert import Inversion, invert
-from underskin.recordings.campaign import FrfRecording
+from underskin.inversion.invert import Inversion, NoD33, invert
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import broadband
 from underskin.recordings.frf.line_choice import without_noise_bias
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -83,6 +83,26 @@ def test_noise_in_the_force_biases_no_estimator(share: float, estimator: str, ta
         assert inversion.zone.high_hz < 190
 
 
+def struck(seed: int, blows: int, milliseconds: float, noise_n: float, rail: float = np.inf) -> Campaign:
+    """One recording of blows under 1 N; the charge is clipped at `rail` of its largest, then 0.1 pC of noise added."""
+    random, rate, seconds = np.random.default_rng(seed), 10240.0, 7.0
+    time = np.arange(int(rate * seconds)) / rate
+    after = time[:, None] - (0.4 + (seconds - 0.5) / blows * np.arange(blows) + random.uniform(-0.05, 0.05, blows))
+    during = (after > 0) & (after < milliseconds / 1000)
+    force = (during * np.sin(np.pi * after / (milliseconds / 1000)) ** 2 @ random.uniform(10, 30, blows)).astype(float)
+    campaign = shaken(samples=8192)
+    (recording, *_) = campaign.of(FrfRecording)
+    charge = 7.3958 * force  # of D33 at the preload of 1 N
+    series = replace(
+        recording,
+        preload_n=1.0,
+        sample_rate_hz=rate,
+        force_n=force + random.normal(0, noise_n, len(time)),
+        charge_pc=np.minimum(charge, rail * charge.max()) + random.normal(0, 0.1, len(time)),
+    )
+    return replace(campaign, recordings=(series,))
+
+
 @pytest.mark.parametrize(
     ("seed", "blows", "milliseconds", "noise_n"), [(1, 5, 6.0, 1.0), (3, 3, 6.0, 2.0), (1, 5, 2.0, 2.0)]
 )
@@ -93,26 +113,35 @@ def test_blows_with_a_noisy_force_tell_their_bias(
 
     The bias is stated, and the interval holds d33, however little of it the noise leaves certain.
     """
-    random, rate, seconds = np.random.default_rng(seed), 10240.0, 7.0
-    time = np.arange(int(rate * seconds)) / rate
-    after = time[:, None] - (0.4 + (seconds - 0.5) / blows * np.arange(blows) + random.uniform(-0.05, 0.05, blows))
-    struck = (after > 0) & (after < milliseconds / 1000)
-    force = (struck * np.sin(np.pi * after / (milliseconds / 1000)) ** 2 @ random.uniform(10, 30, blows)).astype(float)
-    campaign = shaken(samples=8192)
-    (recording, *_) = campaign.of(FrfRecording)
-    gain_pc_per_n = 7.3958  # of D33 at the preload of 1 N
-    series = replace(
-        recording,
-        preload_n=1.0,
-        sample_rate_hz=rate,
-        force_n=force + random.normal(0, noise_n, len(time)),
-        charge_pc=gain_pc_per_n * force + random.normal(0, 0.1, len(time)),
-    )
-    inversion = invert(replace(campaign, recordings=(series,)), table)
+    inversion = invert(struck(seed, blows, milliseconds, noise_n), table)
     _, low, high = array_d33(inversion)
     assert low < D33 < high
     assert inversion.zone.low_hz > 2.0
     assert FindingCode.NOISE_IN_FRF in codes(inversion)
+
+
+def test_blows_clipped_before_noise_leave_d33(table: SigmaTable) -> None:
+    """What reaches the end of the range is left out; where every blow does, the sensor is not called dead."""
+    value, low, high = array_d33(invert(struck(2, 5, 6.0, 0.02, rail=0.6), table))
+    assert low < D33 < high
+    assert value == pytest.approx(D33, rel=0.02)
+    with pytest.raises(NoD33, match="overload"):
+        invert(struck(2, 5, 6.0, 0.02, rail=0.3), table)
+
+
+@pytest.mark.parametrize("rail", [1.0, 1.55, 2.0])
+def test_shaken_charge_clipped_before_noise_is_refused(rail: float, table: SigmaTable) -> None:
+    """A charge clipped at so many standard deviations, with 0.5 % of noise behind, gives no d33: every block is hit."""
+    random, campaign = np.random.default_rng(3), shaken(charge_noise=0.0)
+    clipped = [rail * np.std(recording.charge_pc) for recording in campaign.of(FrfRecording)]
+    recordings = tuple(
+        replace(
+            recording, charge_pc=np.clip(recording.charge_pc, -end, end) + random.normal(0, 0.005 * end, 4096)
+        )
+        for recording, end in zip(campaign.of(FrfRecording), clipped, strict=True)
+    )  # fmt: skip
+    with pytest.raises(NoD33, match="overload"):
+        invert(replace(campaign, recordings=recordings), table)
 
 
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.08, 0.01), (0.0, 0.2)])

@@ -528,6 +528,9 @@ def _measured(
     for name, mains_hz in [(name, lines.all_spoilt_by_hz) for name, lines in chosen.items() if lines.all_spoilt_by_hz]:
         left_out.append(Finding(Reason.MAINS_SPOIL_ALL, name, "charge_pc", {"mains_hz": mains_hz}))
         del chosen[name]
+    for name, defect in [(name, lines.overload) for name, lines in chosen.items() if lines.overload is not None]:
+        left_out.append(Finding(Reason.DEFECT, name, defect.channel, asdict(defect)))
+        del chosen[name]
     findings += excited_at_mains(chosen)
     used = [recording for recording in recordings if recording.id in chosen]
     return [lines.frf for lines in chosen.values()], used, left_out, findings
