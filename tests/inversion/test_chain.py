@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.shaken_series import D33, delayed, high_pass, low_pass, shaken
+from underskin.diagnosis.slips.inspection import inspect
 from underskin.findings.codes import FindingCode
 from underskin.inversion.invert import Inversion, NoD33, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -55,13 +56,10 @@ def test_a_delay_of_either_channel_leaves_d33(chain: dict[str, Any], table: Sigm
 
 
 def test_turn_filter_not_stated_delay(table: SigmaTable) -> None:
-    """A turn by a filter is not stated as a delay.
-
-    Phases behind a high-pass of two poles turn as by a delay: it is one of the causes that are named.
-    """
-    reason = invert(shaken(charge=lambda f: high_pass(150.0)(f) ** 2), table).zone.reason
-    assert "the phases turn as if the charge came" in reason
-    assert "(a delay, a filter or a resonance)" in reason
+    """A turn by a filter is not stated as a delay: phases behind a high-pass of two poles turn as by one."""
+    inversion = invert(shaken(charge=lambda f: high_pass(150.0)(f) ** 2), table)
+    assert "late" not in inversion.zone.reason
+    assert FindingCode.BEHIND_FILTER in codes(inversion)
 
 
 def test_inverted_sensor_told_whatever_delay(table: SigmaTable) -> None:
@@ -194,14 +192,19 @@ def test_band_behind_filter_told_beside_d33(chain: Any, named: str, table: Sigma
 
 
 @pytest.mark.parametrize("corner_hz", [60.0, 80.0, 120.0])
-def test_two_poles_hide_no_sign(corner_hz: float, table: SigmaTable) -> None:
-    """Behind a high-pass of two poles the filter is named, and no reversed sign.
+@pytest.mark.parametrize("polarity", [1.0, -1.0])
+def test_two_poles_hide_no_sign(corner_hz: float, polarity: float, table: SigmaTable) -> None:
+    """Behind a high-pass of two poles the filter is named, and the sign is that of the plateau.
 
-    The phase goes from a half turn to nothing over the band, so that it says nothing of the sign.
+    The phase goes from a half turn to nothing over the band, so that Re FRF has the opposite sign at its low end.
     """
-    inversion = invert(shaken(charge=lambda f: 1 / (1 - (corner_hz / f) ** 2 - 1j * np.sqrt(2) * corner_hz / f)), table)
+    filtered = shaken(charge=lambda f: polarity / (1 - (corner_hz / f) ** 2 - 1j * np.sqrt(2) * corner_hz / f))
+    inversion = invert(filtered, table)
     assert FindingCode.BEHIND_FILTER in codes(inversion)
-    assert not any("sign" in finding.sentence for finding in inversion.findings)
+    assert any("negative" in finding.sentence for finding in inversion.findings) == (polarity < 0)
+    assert polarity * array_d33(inversion)[0] > 0.7 * D33
+    inspected = inspect(filtered, table)
+    assert ("sign_flipped" in {finding.code for finding in inspected.findings}) == (polarity < 0)
 
 
 def test_a_quiet_chain_has_no_findings(table: SigmaTable) -> None:
