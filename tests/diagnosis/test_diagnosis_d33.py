@@ -125,6 +125,7 @@ def test_thickness_centred_presses_not_show(table: SigmaTable) -> None:
     assert found["verdict"] == "no_mismatch"
     assert not found["d33"]["low"] < D33 < found["d33"]["high"]
     assert not found["d33"]["quotable"]
+    assert "would change it without showing" in found["d33"]["why_not"]
     assert "d33 is not to be quoted" in found["statement"]
     assert "thickness error by " in found["statement"]
     (entry,) = [one for one in found["not_identifiable"] if one["mechanism"] == "thickness_error"]
@@ -138,6 +139,7 @@ def test_presses_beside_sensors_tell_thickness(factor: float, table: SigmaTable)
     assert [entry["name"] for entry in found["mechanisms"]] == (["thickness_error"] if factor != 1.0 else [])
     assert found["d33"]["low"] < D33 < found["d33"]["high"]
     assert found["d33"]["quotable"]
+    assert "why_not" not in found["d33"]
 
 
 def test_physics_not_show_stands_beside_value(table: SigmaTable) -> None:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from tests.support.shaken_series import D33, delayed, high_pass, low_pass, shaken
+from underskin.diagnosis.slips.inspection import inspect
 from underskin.findings.codes import FindingCode
-from underskin.inversion.invert import Inversion, invert
-from underskin.recordings.campaign import FrfRecording
+from underskin.inversion.invert import Inversion, NoD33, invert
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import broadband
 from underskin.recordings.frf.line_choice import without_noise_bias
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -55,13 +56,10 @@ def test_a_delay_of_either_channel_leaves_d33(chain: dict[str, Any], table: Sigm
 
 
 def test_turn_filter_not_stated_delay(table: SigmaTable) -> None:
-    """A turn by a filter is not stated as a delay.
-
-    Phases behind a high-pass of two poles turn as by a delay: it is one of the causes that are named.
-    """
-    reason = invert(shaken(charge=lambda f: high_pass(150.0)(f) ** 2), table).zone.reason
-    assert "the phases turn as if the charge came" in reason
-    assert "(a delay, a filter or a resonance)" in reason
+    """A turn by a filter is not stated as a delay: phases behind a high-pass of two poles turn as by one."""
+    inversion = invert(shaken(charge=lambda f: high_pass(150.0)(f) ** 2), table)
+    assert "late" not in inversion.zone.reason
+    assert FindingCode.BEHIND_FILTER in codes(inversion)
 
 
 def test_inverted_sensor_told_whatever_delay(table: SigmaTable) -> None:
@@ -83,6 +81,26 @@ def test_noise_in_the_force_biases_no_estimator(share: float, estimator: str, ta
         assert inversion.zone.high_hz < 190
 
 
+def struck(seed: int, blows: int, milliseconds: float, noise_n: float, rail: float = np.inf) -> Campaign:
+    """One recording of blows under 1 N; the charge is clipped at `rail` of its largest, then 0.1 pC of noise added."""
+    random, rate, seconds = np.random.default_rng(seed), 10240.0, 7.0
+    time = np.arange(int(rate * seconds)) / rate
+    after = time[:, None] - (0.4 + (seconds - 0.5) / blows * np.arange(blows) + random.uniform(-0.05, 0.05, blows))
+    during = (after > 0) & (after < milliseconds / 1000)
+    force = (during * np.sin(np.pi * after / (milliseconds / 1000)) ** 2 @ random.uniform(10, 30, blows)).astype(float)
+    campaign = shaken(samples=8192)
+    (recording, *_) = campaign.of(FrfRecording)
+    charge = 7.3958 * force  # of D33 at the preload of 1 N
+    series = replace(
+        recording,
+        preload_n=1.0,
+        sample_rate_hz=rate,
+        force_n=force + random.normal(0, noise_n, len(time)),
+        charge_pc=np.minimum(charge, rail * charge.max()) + random.normal(0, 0.1, len(time)),
+    )
+    return replace(campaign, recordings=(series,))
+
+
 @pytest.mark.parametrize(
     ("seed", "blows", "milliseconds", "noise_n"), [(1, 5, 6.0, 1.0), (3, 3, 6.0, 2.0), (1, 5, 2.0, 2.0)]
 )
@@ -93,26 +111,35 @@ def test_blows_with_a_noisy_force_tell_their_bias(
 
     The bias is stated, and the interval holds d33, however little of it the noise leaves certain.
     """
-    random, rate, seconds = np.random.default_rng(seed), 10240.0, 7.0
-    time = np.arange(int(rate * seconds)) / rate
-    after = time[:, None] - (0.4 + (seconds - 0.5) / blows * np.arange(blows) + random.uniform(-0.05, 0.05, blows))
-    struck = (after > 0) & (after < milliseconds / 1000)
-    force = (struck * np.sin(np.pi * after / (milliseconds / 1000)) ** 2 @ random.uniform(10, 30, blows)).astype(float)
-    campaign = shaken(samples=8192)
-    (recording, *_) = campaign.of(FrfRecording)
-    gain_pc_per_n = 7.3958  # of D33 at the preload of 1 N
-    series = replace(
-        recording,
-        preload_n=1.0,
-        sample_rate_hz=rate,
-        force_n=force + random.normal(0, noise_n, len(time)),
-        charge_pc=gain_pc_per_n * force + random.normal(0, 0.1, len(time)),
-    )
-    inversion = invert(replace(campaign, recordings=(series,)), table)
+    inversion = invert(struck(seed, blows, milliseconds, noise_n), table)
     _, low, high = array_d33(inversion)
     assert low < D33 < high
     assert inversion.zone.low_hz > 2.0
     assert FindingCode.NOISE_IN_FRF in codes(inversion)
+
+
+def test_blows_clipped_before_noise_leave_d33(table: SigmaTable) -> None:
+    """What reaches the end of the range is left out; where every blow does, the sensor is not called dead."""
+    value, low, high = array_d33(invert(struck(2, 5, 6.0, 0.02, rail=0.6), table))
+    assert low < D33 < high
+    assert value == pytest.approx(D33, rel=0.02)
+    with pytest.raises(NoD33, match="overload"):
+        invert(struck(2, 5, 6.0, 0.02, rail=0.3), table)
+
+
+@pytest.mark.parametrize("rail", [1.0, 1.55, 2.0])
+def test_shaken_charge_clipped_before_noise_is_refused(rail: float, table: SigmaTable) -> None:
+    """A charge clipped at so many standard deviations, with 0.5 % of noise behind, gives no d33: every block is hit."""
+    random, campaign = np.random.default_rng(3), shaken(charge_noise=0.0)
+    clipped = [rail * np.std(recording.charge_pc) for recording in campaign.of(FrfRecording)]
+    recordings = tuple(
+        replace(
+            recording, charge_pc=np.clip(recording.charge_pc, -end, end) + random.normal(0, 0.005 * end, 4096)
+        )
+        for recording, end in zip(campaign.of(FrfRecording), clipped, strict=True)
+    )  # fmt: skip
+    with pytest.raises(NoD33, match="overload"):
+        invert(replace(campaign, recordings=recordings), table)
 
 
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.08, 0.01), (0.0, 0.2)])
@@ -165,14 +192,19 @@ def test_band_behind_filter_told_beside_d33(chain: Any, named: str, table: Sigma
 
 
 @pytest.mark.parametrize("corner_hz", [60.0, 80.0, 120.0])
-def test_two_poles_hide_no_sign(corner_hz: float, table: SigmaTable) -> None:
-    """Behind a high-pass of two poles the filter is named, and no reversed sign.
+@pytest.mark.parametrize("polarity", [1.0, -1.0])
+def test_two_poles_hide_no_sign(corner_hz: float, polarity: float, table: SigmaTable) -> None:
+    """Behind a high-pass of two poles the filter is named, and the sign is that of the plateau.
 
-    The phase goes from a half turn to nothing over the band, so that it says nothing of the sign.
+    The phase goes from a half turn to nothing over the band, so that Re FRF has the opposite sign at its low end.
     """
-    inversion = invert(shaken(charge=lambda f: 1 / (1 - (corner_hz / f) ** 2 - 1j * np.sqrt(2) * corner_hz / f)), table)
+    filtered = shaken(charge=lambda f: polarity / (1 - (corner_hz / f) ** 2 - 1j * np.sqrt(2) * corner_hz / f))
+    inversion = invert(filtered, table)
     assert FindingCode.BEHIND_FILTER in codes(inversion)
-    assert not any("sign" in finding.sentence for finding in inversion.findings)
+    assert any("negative" in finding.sentence for finding in inversion.findings) == (polarity < 0)
+    assert polarity * array_d33(inversion)[0] > 0.7 * D33
+    inspected = inspect(filtered, table)
+    assert ("sign_flipped" in {finding.code for finding in inspected.findings}) == (polarity < 0)
 
 
 def test_a_quiet_chain_has_no_findings(table: SigmaTable) -> None:

@@ -13,7 +13,7 @@ import pytest
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording, parse
 from underskin.recordings.frf import thinned_lines
-from underskin.recordings.frf.estimation import common_delay, lines_of, without_delay
+from underskin.recordings.frf.estimation import common_delay, estimate, lines_of, without_delay
 from underskin.recordings.frf.flat_zone import (
     Condition,
     FlatZone,
@@ -325,3 +325,21 @@ def test_a_flat_band_has_halves_alike() -> None:
         zone = flat_zone(stacks, conditions)
         level, noise, _ = band_average(stacks, zone)
         assert lower_half(stacks, zone, level, noise) == ""
+
+
+def _struck(seed: int) -> Frf:
+    """The used lines of eight short blows of 6 to 20 N with 2 N of noise on the force, and no mains anywhere."""
+    random, rate = np.random.default_rng(seed), 2000.0
+    time = np.arange(16_000) / rate
+    after = time[:, None] - (0.3 + 0.925 * np.arange(8) + random.uniform(-0.05, 0.05, 8))
+    pulses = ((after > 0) & (after < 3e-3)) * np.sin(np.pi * after / 3e-3)
+    force = np.asarray(pulses @ random.uniform(6.0, 20.0, 8), dtype=np.float64)
+    charge = 7.4e-12 * (force + random.normal(0.0, 0.2, len(time)))
+    (lines,) = usable_lines([estimate(force + random.normal(0.0, 2.0, len(time)), charge, rate)])
+    return lines.frf.at(np.flatnonzero(lines.frf.used_or_all))
+
+
+def test_noise_of_blows_is_not_called_mains() -> None:
+    """Lines that depart no further than others of the same FRFs are not left out as pick-up."""
+    named = [bool(mains_lines(stacked([_struck(3 * seed + part) for part in range(3)]))) for seed in range(20)]
+    assert sum(named) <= 3

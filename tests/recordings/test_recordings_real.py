@@ -114,7 +114,10 @@ def test_hammers_wrong_label_not_accepted() -> None:
     assert first.sample_rate_hz == pytest.approx(1 / 0.000977)
     document = example_rig("impact-hammer").document
     for trusting, message in (
-        ({"channel": "F"}, "'g' is one of acceleration; force_n needs one of force, such as N"),
+        (
+            {"channel": "F"},
+            "'g' is one of acceleration; force_n needs one of force.*for gram-force, which balances print.*, write gf",
+        ),
         ({"channel": "F", "unit": "N"}, "add labelled: g"),
     ):
         channels = {**document["channels"], "force_n": trusting}

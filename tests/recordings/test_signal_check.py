@@ -6,6 +6,7 @@ import pytest
 from tests.recordings.known_signals import RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
 from underskin.recordings.frf.estimation import broadband, stepped_sine
 from underskin.recordings.frf.spectra import Frf, defects, defects_of_pair
+from underskin.units import Floats
 
 
 def test_overload_seen_nowhere_else() -> None:
@@ -139,3 +140,43 @@ def test_force_window_between_blows_is_no_overload() -> None:
     assert defects_of_pair(force, charge) == []
     assert defects_of_pair(-force, charge) == []
     assert {found.kind for found in defects_of_pair(np.minimum(force, 1.2), charge)} == {"overload"}
+
+
+def _whole(kind: str, random: np.random.Generator, samples: int) -> Floats:
+    """A force of that kind, of magnitude about 1."""
+    time = np.arange(samples) / RATE
+    if kind == "sine":
+        return np.sin(2 * np.pi * RATE / random.uniform(5.0, 300.0) * time)
+    if kind == "sweep":
+        return swept(samples) / 0.09
+    if kind == "noise":
+        spectrum = np.fft.rfft(random.standard_normal(samples))
+        spectrum[int(random.uniform(0.1, 0.9) * len(spectrum)) :] = 0.0
+        return np.fft.irfft(spectrum, samples) * 0.5
+    if kind == "square":
+        harmonics = np.arange(1, 2 * random.integers(2, 8), 2)
+        turns = 2 * np.pi * np.outer(harmonics, time * RATE / (samples // 8))
+        return np.asarray((np.sin(turns) / harmonics[:, None]).sum(axis=0))
+    blows, length = np.zeros(samples), int(random.integers(8, 60))
+    for first in np.linspace(100, samples - 200, 6).astype(int) + random.integers(0, 90, 6):
+        blows[first : first + length] += random.uniform(0.3, 1.0) * np.hanning(length)
+    return blows
+
+
+@pytest.mark.parametrize("kind", ["sine", "sweep", "noise", "square", "blows"])
+def test_clipped_before_noise_was_added(kind: str) -> None:
+    """A rail with noise behind it is overload in either channel; signals that dwell at their extremes are whole."""
+    clipped_pairs = seen = 0
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        force, gain = _whole(kind, random, 8192), 7.4
+        noise = random.normal(0.0, 10 ** random.uniform(-3.0, -1.5), (2, len(force)))
+        assert [d for d in defects_of_pair(force + noise[0], gain * (force + noise[1])) if d.kind == "overload"] == []
+        rail = 0.6 * np.abs(force).max()
+        clipped = np.clip(force, -rail, rail) + 0.005 * rail * random.standard_normal(len(force))
+        for channel, pair in (("force_n", (clipped, gain * force)), ("charge_pc", (force, gain * clipped))):
+            found = {d.channel for d in defects_of_pair(*pair) if d.kind == "overload"}
+            assert found <= {channel}
+            clipped_pairs += 1
+            seen += bool(found)
+    assert kind == "square" or seen >= 0.9 * clipped_pairs

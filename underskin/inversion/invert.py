@@ -22,7 +22,7 @@ from scipy.special import chdtrc, stdtr
 
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
-from underskin.findings.finding import Finding, ImplausibleD33, statement
+from underskin.findings.finding import Finding, statement
 from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
 from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
@@ -39,15 +39,15 @@ from underskin.prediction.pressed_skin import (
 )
 from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
-from underskin.recordings.frf.estimation import common_delay, exchanged_channels, lines_of, without_delay
+from underskin.recordings.frf.estimation import exchanged_channels, lines_of
 from underskin.recordings.frf.flat_zone import (
     FlatZone,
     RollOff,
     band_average,
     flat_zone,
+    in_phase,
     lower_half,
     roll_off,
-    without_mains,
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
@@ -299,8 +299,8 @@ def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
     """A finding where the band of d33 lies behind a filter."""
     if behind is None:
         return []
-    arguments = {**asdict(behind), "percent": 100 * behind.share, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
-    arguments.pop("share")
+    corners = {"high_pass_hz": behind.filters.high_hz, "low_pass_hz": behind.filters.low_hz}
+    arguments = {**corners, "percent": 100 * behind.share, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
     return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
 
 
@@ -431,10 +431,9 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     measured, recorded, left_out, of_recordings = _measured(recorded, units_checked=campaign.units_checked)
     if not recorded:
         raise _none_usable(campaign, left_out)
-    frfs = stacked(measured)
-    delay = common_delay(without_mains(frfs))
-    frfs = without_delay(frfs, delay)
-    zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
+    conditions = [(item.indenter_radius_mm, item.preload_n) for item in recorded]
+    frfs, delay = in_phase(stacked(measured), conditions)
+    zone = flat_zone(frfs, conditions, band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
     unusual_values = unlikely(campaign, recorded, [frf.frequency for frf in measured])
@@ -473,8 +472,6 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     inversion = _estimated(ids, rows, contact, zone).wider(common_uncertainty)
     filtered = of_roll_off(roll_off(frfs, zone, level), zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33, units_checked=campaign.units_checked)
-    if filtered:  # whose phase hides the sign
-        others = tuple(finding for finding in others if finding.arguments.get("kind") != ImplausibleD33.NEGATIVE)
     findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
@@ -527,6 +524,9 @@ def _measured(
     chosen = dict(zip((recording.id for recording in recordings), usable_lines(frfs), strict=True))
     for name, mains_hz in [(name, lines.all_spoilt_by_hz) for name, lines in chosen.items() if lines.all_spoilt_by_hz]:
         left_out.append(Finding(Reason.MAINS_SPOIL_ALL, name, "charge_pc", {"mains_hz": mains_hz}))
+        del chosen[name]
+    for name, defect in [(name, lines.overload) for name, lines in chosen.items() if lines.overload is not None]:
+        left_out.append(Finding(Reason.DEFECT, name, defect.channel, asdict(defect)))
         del chosen[name]
     findings += excited_at_mains(chosen)
     used = [recording for recording in recordings if recording.id in chosen]

@@ -20,6 +20,7 @@ Also here: the values of properties, converted to the unit of their campaign fie
 """
 
 import dataclasses
+import re
 import tempfile
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -565,11 +566,19 @@ def _property_value(value: Property, stated: Stated, file: str) -> str | float:
     return stated[value.property]
 
 
+def in_gram_force(label: str, field: str) -> str:
+    """A hint for an error: the unit with gram-force, of which balances print `g`; empty where the field needs none."""
+    meant = re.sub(r"\bg\b", "gf", label)
+    meant_unit = unit(meant)
+    is_meant = meant != label and meant_unit is not None and meant_unit.dimension == field_unit(field).dimension
+    return f"; for gram-force, which balances print as g, write {meant}" if is_meant else ""
+
+
 def factor(label: str, field: str, file: str, place: str, hint: str = "") -> float:
     """The conversion factor from a unit to the field's; `hint` is appended to the error."""
     label_unit, needed_unit = unit(label), field_unit(field)
     if label_unit is None or label_unit.dimension != needed_unit.dimension:
         what = "is not known here" if label_unit is None else f"is one of {label_unit.dimension}"
-        needs = f" needs one of {needed_unit.dimension}, such as {LAB[field].unit}{hint}"
+        needs = f" needs one of {needed_unit.dimension}, such as {LAB[field].unit}{in_gram_force(label, field)}{hint}"
         raise FileError(file, place, Requirement(f"its unit {label!r} {what}; ", Mention(field), needs))
     return label_unit.to_si / LAB[field].to_si

@@ -123,8 +123,12 @@ class StatedD33:
 
     @property
     def document(self) -> dict[str, Any] | None:
-        """The report's `d33`."""
-        return None if self.number is None else {**self.number, "quotable": not (self.why_not or self.deciding)}
+        """The report's `d33`, with the reasons where it is not to be quoted."""
+        if self.number is None:
+            return None
+        reasons = self.reasons
+        why_not = {"why_not": " and ".join(reasons)} if reasons else {}
+        return {**self.number, "quotable": not reasons, **why_not}
 
     def clause(self) -> str:
         """A clause on the value to quote, or on why none is quoted; empty where there is no d33."""

@@ -107,6 +107,9 @@ class Fleet:
     quantities: Sequence[PooledQuantity]
 
 
+_UNQUOTED = {"quotable": False, "why_not": "it is of several campaigns: quote that of one"}
+
+
 def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
     """The report on campaigns of one skin, which are called `name` together."""
     leader, names = skin.histories[0], skin.dates.names
@@ -149,7 +152,7 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
         **_of_kinds(skin.reports),
         "fit": None,
         "power": [],
-        "d33": {**(last.document or {}), "quotable": False, "per_sensor": _per_sensor(skin), **_per_campaign(skin)},
+        "d33": {**(last.document or {}), **_UNQUOTED, "per_sensor": _per_sensor(skin), **_per_campaign(skin)},
         "next_experiment": None,
         "provenance": {**skin.provenance, "each": _each("campaign", skin.reports)},
     }
@@ -187,7 +190,7 @@ def fleet_document(name: str, campaigns: Sequence[str], fleet: Fleet) -> dict[st
         "fit": None,
         "power": [],
         "population": quantities,
-        "d33": {"name": D33, "unit": d33["unit"], "value": d33["mean"], "quotable": False, "per_skin": d33["skins"]},
+        "d33": {"name": D33, "unit": d33["unit"], "value": d33["mean"], **_UNQUOTED, "per_skin": d33["skins"]},
         "next_experiment": None,
         "provenance": {**fleet.provenance, "each": _each("skin", fleet.reports)},
     }

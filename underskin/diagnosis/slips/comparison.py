@@ -1,8 +1,8 @@
 """Each recording beside what the base model and the other recordings let expect of it.
 
-The common delay of the chain is removed first. A recording's ratio is the median of its lines in the flat zone over the
-base model's response; recordings for which little is predicted, near a zero crossing, have none. The level expected of
-a recording is the base model's response times the median ratio.
+The common delay of the chain, or the phase of its filters, is removed first. A recording's ratio is the median of its
+lines in the flat zone over the base model's response; recordings for which little is predicted, near a zero crossing,
+have none. The level expected of a recording is the base model's response times the median ratio.
 
 The noise of a line is estimated from differences of neighbouring lines, σ² = median |z_j+1 − z_j|²/(2 ln 2), which a
 resonance between a few lines does not affect. A recording shows no response where its mean over n lines is within
@@ -16,7 +16,8 @@ import numpy as np
 
 from underskin.mechanisms.models.composed import Model
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import advanced, common_delay, lines_of
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.flat_zone import in_phase
 from underskin.recordings.frf.spectra import stacked
 from underskin.units import Complexes, Floats, Mask
 
@@ -28,10 +29,11 @@ LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a zero crossin
 
 
 def aligned_lines(recordings: Sequence[FrfRecording]) -> list[Complexes]:
-    """The values [C/N] of each recording's lines without the delay common to all."""
-    measured = [lines_of(recording) for recording in recordings]
-    delay = common_delay(stacked(measured))
-    return [advanced(frf.values, frf.frequency, delay) if delay else frf.values for frf in measured]
+    """The values [C/N] of each recording's lines `in_phase`."""
+    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
+    aligned, _ = in_phase(stacked([lines_of(recording) for recording in recordings]), conditions)
+    rows = {int(row): values for stack in aligned for row, values in zip(stack.rows, stack.values, strict=True)}
+    return [rows[row] for row in range(len(rows))]
 
 
 def flat_level(recording: FrfRecording) -> float:

@@ -168,6 +168,8 @@ def _measured(recordings: Sequence[FrfRecording]) -> tuple[dict[str, Frf], list[
 
 def _unusable(recording: FrfRecording, lines: Usable) -> Finding:
     """Why no line of a time series can be used."""
+    if lines.overload is not None:
+        return Finding(Reason.DEFECT, recording.id, lines.overload.channel, asdict(lines.overload))
     if lines.all_spoilt_by_hz is None:
         return Finding(Reason.INCOHERENT, recording.id, "charge_pc")
     return Finding(Reason.MAINS_SPOIL_ALL, recording.id, "charge_pc", {"mains_hz": lines.all_spoilt_by_hz})

@@ -22,6 +22,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
+from underskin.recordings.frf.estimation import common_delay, without_delay
 from underskin.recordings.frf.line_choice import (
     HARMONIC_WIDTH_HZ,
     bin_of,
@@ -287,17 +288,32 @@ def mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
     freedom and D that of the line's departures over n recordings, each over its own variance for one noise, a noise of
     the line's own gains
         (ν + n) ln((R + D)/(ν + n)) − ν ln(R/ν) − n ln(D/n)
-    nats of likelihood (complex normal); more than those of a choice among all such lines leave it out.
+    nats of likelihood (complex normal). One of m lines gains ln m by chance; where the lines near no harmonic gain
+    more than that, as those of blows do, whose noise is neither even over frequency nor normal, all gains are reduced
+    alike. More than those of a choice among all lines near a harmonic leave a line out.
     """
     lines_hz: set[float] = set()
     for stack in stacks:
         near = near_mains(stack.frequency)
         required = SUPPORTED_NATS + np.log(max(int(near.sum()), 1))
-        for line in np.flatnonzero(near).tolist():
-            around = _around(stack.frequency, line, ~near)
-            if around is not None and _departure_nats(stack, line, around) > required:
-                lines_hz.add(round(float(stack.frequency[line]), 6))
+        gains = _gains(stack, np.flatnonzero(near), ~near)
+        if max(gains.values(), default=0.0) > required:
+            plain = list(_gains(stack, np.flatnonzero(~near), ~near).values())
+            required *= max(max(plain, default=0.0) / np.log(len(plain) + 2.0), 1.0)
+        lines_hz |= {round(float(stack.frequency[line]), 6) for line, gain in gains.items() if gain > required}
     return tuple(sorted(lines_hz))
+
+
+def _gains(stack: Stack, lines: Indices, plain: Mask) -> dict[int, float]:
+    """`_departure_nats` of each of the lines that has enough plain ones around it, a harmonic's width away: the noise
+    of neighbouring lines may be the same."""
+    gains = {}
+    for line in lines.tolist():
+        away = np.abs(stack.frequency - stack.frequency[line]) > HARMONIC_WIDTH_HZ
+        around = _around(stack.frequency, line, plain & away)
+        if around is not None:
+            gains[line] = _departure_nats(stack, line, around)
+    return gains
 
 
 def without_mains(stacks: Sequence[Stack]) -> list[Stack]:
@@ -443,11 +459,9 @@ _EXPLAINED = 0.2  # largest remaining rms, of that about a plateau
 
 @dataclass(frozen=True)
 class RollOff:
-    """The corner frequencies [Hz] of the filters, 0 and ∞ without one, and the loss of the band's level relative to
-    the plateau."""
+    """The filters, and the loss of the band's level relative to the plateau."""
 
-    high_pass_hz: float
-    low_pass_hz: float
+    filters: "Filters"
     share: float
 
 
@@ -478,7 +492,28 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
     misfit, plateau = curve.fitted(best)
     share = 1 - float(np.exp(-plateau))
     is_explained = plain - misfit >= _SPEAKS and misfit <= _EXPLAINED**2 * plain + len(curve.x)
-    return RollOff(best.high_hz, best.low_hz, share) if is_explained and share >= _LEAST_SHARE else None
+    return RollOff(best, share) if is_explained and share >= _LEAST_SHARE else None
+
+
+def in_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> tuple[list[Stack], float]:
+    """The FRFs without the phase of the charge's chain, and the delay [s] that was removed.
+
+    Where the phases turn over frequency, they are those of the filters that `roll_off` finds, if any: two poles of a
+    high-pass make half a turn from the plateau to the lowest lines, which resembles a delay of the force and would hide
+    the polarity. Otherwise, and for what the filters leave, they are those of the common delay.
+    """
+    delay = common_delay(without_mains(stacks))
+    if delay:
+        undelayed = without_delay(stacks, delay)
+        level = np.zeros(len(conditions))
+        for stack in stacks:
+            level[stack.rows] = _medians(np.abs(stack.values), stack.used)[:, 0]
+        behind = roll_off(undelayed, flat_zone(undelayed, conditions), level)
+        if behind is not None:
+            turns = [np.exp(-1j * behind.filters.phase(stack.frequency)) for stack in stacks]
+            stacks = [replace(stack, values=stack.values * turn) for stack, turn in zip(stacks, turns, strict=True)]
+            delay = common_delay(without_mains(stacks))
+    return without_delay(stacks, delay), delay
 
 
 def _falls_after(magnitude: Floats, index: int) -> bool:
@@ -502,6 +537,16 @@ class Filters:
             high_times * np.log1p((self.high_hz / frequency) ** (2 * high_order))
             + low_times * np.log1p((frequency / self.low_hz) ** (2 * low_order))
         )
+
+    def phase(self, frequency: Floats) -> Floats:
+        """The filters' phase [rad] at these frequencies [Hz], 0 on the plateau."""
+        return _lag(self.high_hz / frequency, *self.high_pass) - _lag(frequency / self.low_hz, *self.low_pass)
+
+
+def _lag(ratio: Floats, order: int, times: int) -> Floats:
+    """The lag [rad] of Butterworth's low-pass, so many times in a row, at these multiples of its corner."""
+    poles = np.exp(0.5j * np.pi * (2 * np.arange(order) + order + 1) / order)
+    return np.asarray(times * np.angle(1j * ratio[:, None] - poles).sum(axis=1))
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from underskin.findings.codes import Reason
-from underskin.findings.finding import Finding
-from underskin.recordings.frf.spectra import AROUND, Frf, Stack, expected_coherence, information, stacked
+from underskin.findings.finding import DefectKind, Finding
+from underskin.recordings.frf.spectra import AROUND, Defect, Frf, Stack, expected_coherence, information, stacked
 from underskin.units import Floats, Indices, Mask
 
 MAINS_HZ = (50.0, 60.0)
@@ -423,6 +423,12 @@ class Usable:
     def all_spoilt_by_hz(self) -> float | None:
         """The mains frequency that may spoil all lines where the force has its power; None where others remain."""
         return None if self.choice.mains is None or len(self.choice.lines) else self.choice.mains.mains_hz
+
+    @property
+    def overload(self) -> Defect | None:
+        """The first overload, where charge follows force at no line of what is left beside it; None otherwise."""
+        overloads = [defect for defect in self.frf.defects if defect.kind == DefectKind.OVERLOAD]
+        return overloads[0] if overloads and not len(self.choice.lines) else None
 
 
 def usable_lines(measured: Sequence[Frf]) -> list[Usable]:

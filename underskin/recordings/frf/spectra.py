@@ -104,7 +104,19 @@ def mean_of(force: Floats) -> float | None:
 
 
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
-    """Every defect of force and charge.
+    """Every defect of force and charge: those of each by itself that are not physical, and clipping that shows beside
+    the other channel alone."""
+    every = _unphysical(force, charge)
+    for channel, signal, other in (("force_n", force, charge), ("charge_pc", charge, force)):
+        known = [defect for defect in every if defect.channel == channel]
+        if all(defect.kind != DefectKind.OVERLOAD for defect in known):
+            clipped = _clipped_in_noise(np.where(damaged(known, len(signal)), np.median(signal), signal), other)
+            every += [Defect(DefectKind.OVERLOAD, channel, count, first) for first, count in _runs(clipped)]
+    return every
+
+
+def _unphysical(force: Floats, charge: Floats) -> list[Defect]:
+    """The defects of either by itself.
 
     Jumps are no defects where the force is a blow that the charge follows, nor where a periodic force, such as a sweep,
     restarts: these recur in each period. In noise that hides the blows of one channel those of the other are no defects
@@ -195,6 +207,97 @@ def _overload(signal: Floats, rest: Mask) -> Mask:
                 if samples >= _CLIPPED_RUN:
                     mask[first : first + samples] = True
     return mask
+
+
+_FEWEST_PILED_UP = 16  # samples
+_WIDTHS = np.geomspace(1e-4, 0.2, 45)  # of the range: bands that hold noise of 0.002 to 4 % of it
+_TURNING = 1 / (np.sqrt(2.0) - 1)  # within d of its top a turning signal spends √d, and (√2 − 1) √d in the next d
+_DWELLS = 2.4  # kurtosis: 1 of a square wave, 1.5 of a sine or sweep, 1.8 of even levels; 3 of noise
+_PROPORTIONAL = 0.5  # of the largest expected value: up to it a channel is taken to be proportional
+_COMPARED = 0.25  # of the level at the end of the range, from which on the usual error is taken
+_WEAKEST = 1e-4  # of the strongest line's power: weaker ones are leakage or noise
+_GOES_ON = 3.0  # least excess at the end of the range, in usual errors
+
+
+@dataclass(frozen=True)
+class _End:
+    """An end of a signal's range: where it is (`sign`), the `width` of the band that holds most samples relative to the
+    next band as wide, and that `ratio`; 0 where the band is the rest of a signal of blows."""
+
+    sign: float
+    width: float
+    ratio: float
+
+
+def _ends(level: Floats) -> list[_End]:
+    ends = []
+    for sign in (1.0, -1.0):
+        below = np.sort((sign * level).max() - sign * level)
+        widths = _WIDTHS * below[-1]
+        within = np.searchsorted(below, widths, side="right")
+        beside = np.searchsorted(below, 2 * widths, side="right") - within
+        counts = (within >= _FEWEST_PILED_UP) & (2 * within < len(level))
+        ratio = np.where(counts, within / (beside + 1), 0.0)
+        best = int(np.argmax(ratio))
+        ends.append(_End(sign, float(widths[best]), float(ratio[best])))
+    return ends
+
+
+def _clipped_in_noise(signal: Floats, other: Floats) -> Mask:
+    """The samples at either end of the range of a signal clipped before noise was added, as before a converter.
+
+    There more of them accumulate within a band than of any signal that turns there, and the other channel goes on: it
+    neither dwells on any level nor accumulates as well, or the linear response to it goes on beyond all that was
+    recorded. A square wave, and a sine that is sampled at few of its phases, accumulate too, but the other channel
+    tells that they do not go on.
+    """
+    mask = np.zeros(len(signal), dtype=bool)
+    level = signal - np.median(signal)
+    ends = _ends(level)
+    if max(end.ratio for end in ends) <= _TURNING:
+        return mask
+    free = (
+        _kurtosis(other) > _DWELLS
+        and not (period_of(signal) or period_of(other))
+        and max(end.ratio for end in _ends(other)) <= _TURNING
+    )
+    expected = _expected(level, other)
+    for end in ends:
+        top, reached = end.sign * level, end.sign * expected
+        piled = top >= top.max() - end.width
+        if free and end.ratio > _CLIPPED_RATIO:
+            mask |= piled
+        elif end.ratio > _TURNING:
+            away = (level < level.max() - end.width) & (level > level.min() + end.width)
+            compared = away & (np.abs(level) > _COMPARED * np.median(top[piled]))
+            usual = float(np.sqrt(np.mean((expected - level)[compared] ** 2))) if compared.any() else np.inf
+            if np.median(reached[piled]) > top.max() and np.median((reached - top)[piled]) > _GOES_ON * usual:
+                mask |= piled
+    return mask
+
+
+def _expected(level: Floats, other: Floats) -> Floats:
+    """The linear response to the other channel, scaled to the signal where that is small: there it is not clipped."""
+    expected = _linear_response(other - other.mean(), level - level.mean())
+    small = np.abs(expected) < _PROPORTIONAL * np.abs(expected).max()
+    if small.sum() < _FEWEST_PILED_UP:
+        return np.zeros_like(level)
+    slope, offset = np.polyfit(expected[small], level[small], 1)
+    return np.asarray(offset + slope * expected)
+
+
+def _linear_response(cause: Floats, effect: Floats) -> Floats:
+    """The part of an effect (samples,) that follows its cause linearly, by their spectra averaged over blocks."""
+    from scipy.signal import fftconvolve  # takes 0.3 s to load, which few need
+
+    size = max(len(cause) // _PARTS, 2)
+    blocks = Blocks(np.hanning(size), max(size // 2, 1), slice(None), without_line)
+    cause_spectra, effect_spectra = blocks.spectra(cause), blocks.spectra(effect)
+    power = np.mean(np.abs(cause_spectra) ** 2, axis=0)
+    cross = np.mean(np.conj(cause_spectra) * effect_spectra, axis=0)
+    transfer = cross / np.maximum(power + _WEAKEST * power.max(), _TINY)
+    impulse = np.fft.fftshift(np.fft.irfft(transfer, size))
+    return np.asarray(fftconvolve(cause, impulse)[size // 2 : size // 2 + len(cause)])
 
 
 def _held(signal: Floats) -> Mask:
