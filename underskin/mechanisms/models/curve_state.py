@@ -19,17 +19,22 @@ from underskin.autodiff import Differentiated, contiguous
 from underskin.mechanisms.models.sphere_kernels import memory_rows
 from underskin.units import Floats
 
-_POWER_STEP = 1.5  # of ln τ
+_POWER_STEP = float(np.log(4.0))  # of ln τ, as compiled functions take it: τ falls by a factor of 4 each
 _SLOWER, _FASTER = 30.0, 0.2  # times the longest and the shortest time of a recording: the range of τ
 
 
 @dataclass(frozen=True)
 class Relaxation:
-    """The Prony pairs: g and τ [s], (points, 1, 1, pairs); `at_rest`, E(0) over the stated modulus (points, 1, 1)."""
+    """The Prony pairs: g and τ [s], (points, 1, 1, pairs); `at_rest`, E(0) over the stated modulus (points, 1, 1).
+
+    `series`: how many pairs are those of a power law, whose times fall by a factor of 4 each; single pairs are before
+    them, their products with every single pair after them.
+    """
 
     fraction: Floats
     time: Floats
     at_rest: Floats | float = 1.0
+    series: int = 0
 
     @classmethod
     def of_power_law(cls, exponent: Floats, times: tuple[float, float]) -> "Relaxation":
@@ -46,7 +51,7 @@ class Relaxation:
         step = n * _POWER_STEP
         slower = density[..., :1] * np.where(step > 0, step / np.expm1(np.maximum(step, 1e-300)), 1.0)
         at_rest = (slower + weight.sum(axis=-1, keepdims=True))[..., 0]
-        return cls(weight / at_rest[..., None], np.exp(log_time) + np.zeros_like(weight), at_rest)
+        return cls(weight / at_rest[..., None], np.exp(log_time) + np.zeros_like(weight), at_rest, count)
 
     def times(self, other: "Relaxation") -> "Relaxation":
         """The product of two relaxations."""
@@ -58,6 +63,7 @@ class Relaxation:
             np.concatenate([*fractions, (mine * others).reshape(shape)], axis=-1),
             np.concatenate([self.time, other.time, both.reshape(shape)], axis=-1),
             self.at_rest * other.at_rest,
+            0 if self.series else other.series,
         )
 
     @property
@@ -74,21 +80,21 @@ class Relaxation:
         """∫ e(t−s) du(s) from u(t) and its memories."""
         return np.asarray(self.unrelaxed * history + (self.fraction * memory).sum(axis=-1))
 
-    def of_points(self, count: int) -> tuple[Floats, Floats]:
-        """g and τ broadcast to `count` points, (points, pairs)."""
+    def of_points(self, count: int) -> tuple[Floats, Floats, int]:
+        """g and τ broadcast to `count` points, (points, pairs), and the length of the series."""
         pairs = self.fraction.shape[-1]
         fraction, time = (
             np.broadcast_to(values.reshape(-1, pairs), (count, pairs)) for values in (self.fraction, self.time)
         )
-        return contiguous(fraction), contiguous(time)
+        return contiguous(fraction), contiguous(time), self.series
 
 
 def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
     """Y (points, curves, samples, pairs) of histories u (points, curves, samples) at times [s]; u at the first
     sample is a step."""
-    _, times = relaxation.of_points(len(history))
-    memory = np.empty((*history.shape, times.shape[-1]))
-    memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), times, memory)
+    pairs = relaxation.of_points(len(history))
+    memory = np.empty((*history.shape, pairs[0].shape[-1]))
+    memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), *pairs, memory)
     return memory
 
 
