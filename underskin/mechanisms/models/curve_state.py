@@ -196,12 +196,6 @@ class Curve:
             return pairs
         return pairs.times(Relaxation.of_power_law(numbers(self.power_exponent), self.times))
 
-    @property
-    def modulus_at_rest(self) -> Floats:
-        """E(0) [Pa] (points, 1, 1)."""
-        relaxation = self.relaxes
-        return numbers(self.modulus) * (1.0 if relaxation is None else relaxation.at_rest)
-
 
 def numbers(quantity: Differentiated) -> Floats:
     """A quantity's value at each point, with axes for curves and samples: (points, 1, 1)."""

@@ -188,9 +188,10 @@ class CompressionModel(CurveModel):
     def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
         strain = (self.displacement - contact) / self._height
         strain = np.where(self._loaded * strain < 0, 0.0, strain)  # slack
-        force = curve.modulus_at_rest * self._area * self._relative_stress(curve, strain)
+        force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
         relaxation = curve.relaxes
         if relaxation is not None:
+            force = relaxation.at_rest * force
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
         return force, np.ones(force.shape, dtype=bool)
 

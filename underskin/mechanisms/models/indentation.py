@@ -116,8 +116,8 @@ class IndentationModel(CurveModel):
         return force, inside
 
     def _force_at(self, curve: Curve, travel: Floats, alike: bool) -> tuple[Floats, Mask]:
-        sphere, adhesion = self._sphere(curve), _adhesion(curve)
-        relaxation = curve.relaxes
+        relaxation, adhesion = curve.relaxes, _adhesion(curve)
+        sphere = self._sphere(curve, 1.0 if relaxation is None else relaxation.at_rest)
         if relaxation is not None:
             relaxing_force = relaxing if curve.stage_stiffness is None else relaxing_on_stage
             return self._relaxing(
@@ -171,7 +171,8 @@ class IndentationModel(CurveModel):
         a = sphere.radius_at(np.maximum(path.travel, 0.0), None, least)
         return force, sphere.inside(a) | ~contact_mask
 
-    def _sphere(self, curve: Curve) -> Sphere:
+    def _sphere(self, curve: Curve, at_rest: Floats | float) -> Sphere:
+        """With E(0), which is `at_rest` times the stated modulus."""
         poisson_ratio = numbers(curve.poisson_ratio)
         layers = None
         if curve.layered:
@@ -181,7 +182,7 @@ class IndentationModel(CurveModel):
             layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in distinct])
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
         compliance = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
-        reduced = curve.modulus_at_rest / (1 - poisson_ratio**2)
+        reduced = at_rest * numbers(curve.modulus) / (1 - poisson_ratio**2)
         assert curve.strain_share is not None
         return Sphere(reduced, self._radius, layers, stiffening, compliance, self._deep, numbers(curve.strain_share))
 
