@@ -123,7 +123,7 @@ def _slopes(displacement: Floats, time: Floats, count: int) -> Floats:
 @dataclass(frozen=True)
 class Samples:
     """The samples before any law: `travel` from the contact point [m] (points, curves, samples), `time` [s] and
-    `speed` of the travel [m/s] (curves, samples), and the recordings' `ids`."""
+    `speed` of what holds the sphere [m/s] (curves, samples), and the recordings' `ids`."""
 
     ids: Sequence[str]
     travel: Floats
