@@ -228,16 +228,12 @@ class Whitening:
             size, turn = np.linalg.eigh(relative[:, None] * _correlation(error.path_fraction[span]) * relative)
             self._turns.append(turn.T)
             sizes.append(np.maximum(size, 0.0))
-        self._size = np.concatenate(sizes)
+        self.size = np.concatenate(sizes)  # (rows,) η² B over κ² D, at η = κ
         self.columns = self.turned(error.columns.T)  # (columns, rows)
-
-    def log_determinant(self, ratio: Floats) -> Floats:
-        """log|I + (η/κ)² D^(−½) B D^(−½)| at ratios η/κ (…, 1)."""
-        return np.asarray(np.log1p(ratio**2 * self._size).sum(axis=-1, keepdims=True))
 
     def weight(self, ratio: Floats) -> Floats:
         """Weights of products of transformed rows at ratios η/κ (…, 1): (…, rows)."""
-        return np.asarray(1 / (1 + ratio**2 * self._size))
+        return np.asarray(1 / (1 + ratio**2 * self.size))
 
     def turned(self, rows: Floats) -> Floats:
         """The rows (…, rows), forces, transformed so that their covariance is κ² diag(1/weight)."""

@@ -431,7 +431,9 @@ class IndentationBlock(MappedBlock):
         """`stage_stiffness_n_per_mm`, where a deflection was subtracted."""
         force = self.rig.channels.get("force_n", ChannelMapping(""))
         displacement = self.rig.channels.get("displacement_mm", ChannelMapping(""))
-        spring = force.spring_constant_n_per_m
+        spring, stiffness = force.spring_constant_n_per_m, displacement.stiffness_n_per_mm
+        if stiffness is not None:
+            return {"stage_stiffness_n_per_mm": spring_constant(stiffness, self.stated, self.file, "N/mm")}
         if displacement.deflection is None or spring is None:
             return {}
         return {"stage_stiffness_n_per_mm": 1e-3 * spring_constant(spring, self.stated, self.file)}

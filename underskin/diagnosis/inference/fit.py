@@ -421,11 +421,17 @@ class Fitter:
         if cost_to_beat is not None and is_near and not self._may_beat(from_starts, cost_to_beat):
             return from_starts
         initial = by_least_squares(self, start)
-        if from_starts.cost.min() < initial.cost[0]:
-            initial = from_starts.best
-        if cost_to_beat is not None and initial.cost[0] > cost_to_beat(initial)[0] + _MAY_GAIN:
-            return initial
-        return self.update_noise_levels(self._between_samples(initial).descend(initial, 1), _CURVE_SETTLING)
+        lowest = from_starts.best if from_starts.cost.min() < initial.cost[0] else initial
+        if cost_to_beat is not None and lowest.cost[0] > cost_to_beat(lowest)[0] + _MAY_GAIN:
+            return lowest
+        # The prior, or an error of the law, may lead elsewhere than least squares; and so may starts that are as low
+        alike = from_starts[np.flatnonzero(from_starts.cost < lowest.cost[0] + _MARGIN)]
+        ends = [self._descended(at) for at in (initial, *(alike[np.array([number])] for number in range(len(alike))))]
+        return min(ends, key=lambda end: float(end.cost[0]))
+
+    def _descended(self, at: Evaluated) -> Evaluated:
+        """One point of curves after steps on the likelihood."""
+        return self.update_noise_levels(self._between_samples(at).descend(at, 1), _CURVE_SETTLING)
 
     def _may_beat(self, at: Evaluated, cost_to_beat: CostToBeat) -> bool:
         """Whether some point may get below the cost, by twice what its tangent, a Gauss–Newton step, promises to gain:

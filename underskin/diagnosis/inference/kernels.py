@@ -126,6 +126,99 @@ def log_likelihoods(
 
 
 @compiled()
+def _factorise(matrix: Floats) -> float:
+    """Replace a positive definite matrix by its Cholesky factor; the logarithm of its determinant."""
+    log_determinant = 0.0
+    for row in range(len(matrix)):
+        for column in range(row + 1):
+            value = matrix[row, column]
+            for before in range(column):
+                value -= matrix[row, before] * matrix[column, before]
+            matrix[row, column] = value / matrix[column, column] if column < row else np.sqrt(max(value, _NONE))
+        log_determinant += 2.0 * np.log(matrix[row, row])
+    return log_determinant
+
+
+@compiled()
+def _whiten(factor: Floats, values: Floats) -> None:
+    """Multiply by the inverse of a Cholesky factor."""
+    for row in range(len(values)):
+        for before in range(row):
+            values[row] -= factor[row, before] * values[before]
+        values[row] /= factor[row, row]
+
+
+@compiled(
+    "void(float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], int64[::1], float64[:, ::1], float64[:, ::1], "
+    "float64[:, :, :, ::1], float64[:, ::1])"
+)
+def curve_sums(
+    force: Floats,
+    measured: Floats,
+    columns: Floats,
+    size: Floats,
+    edges: NDArray[np.int64],
+    ratio: Floats,
+    level: Floats,
+    sums: Floats,
+    log_determinant: Floats,
+) -> None:
+    """Fill Re u*u, Re u*y, |y|² and the square of y across u (4, points, sets, recordings) of curves, and log|C|.
+
+    C/κ² = diag(1 + (η/κ)² size) + P Pᵀ/κ² on transformed rows, by Woodbury's identity for each recording, whose rows
+    end at the `edges`; `ratio` is η/κ, `level` κ (points, sets).
+    """
+    points, sets = ratio.shape
+    count, rows = columns.shape
+    factor, weight = np.empty((count, count)), np.empty(rows)
+    of_force, of_measured, of_rest = np.empty(count), np.empty(count), np.empty(count)
+    for point in range(points):
+        u = force[point]
+        for number in range(sets):
+            k2, ratio2, total = level[point, number] ** 2, ratio[point, number] ** 2, 0.0
+            for row in range(rows):
+                larger = 1.0 + ratio2 * size[row]
+                weight[row] = 1.0 / larger
+                total += np.log(larger)
+            for recording in range(len(edges) - 1):
+                uu = uy = yy = rest2 = 0.0
+                of_force[:], of_measured[:], of_rest[:], factor[:] = 0.0, 0.0, 0.0, 0.0
+                for row in range(edges[recording], edges[recording + 1]):
+                    by_force, by_measured = weight[row] * u[row], weight[row] * measured[row]
+                    uu += by_force * u[row]
+                    uy += by_force * measured[row]
+                    yy += by_measured * measured[row]
+                    for column in range(count):
+                        of_force[column] += by_force * columns[column, row]
+                        of_measured[column] += by_measured * columns[column, row]
+                        weighed = weight[row] * columns[column, row]
+                        for other in range(column + 1):
+                            factor[column, other] += weighed * columns[other, row]
+                for column in range(count):
+                    factor[column, column] += k2
+                total += _factorise(factor) - count * np.log(k2)
+                _whiten(factor, of_force)
+                _whiten(factor, of_measured)
+                for column in range(count):
+                    uu -= of_force[column] ** 2
+                    uy -= of_force[column] * of_measured[column]
+                    yy -= of_measured[column] ** 2
+                share = uy / max(uu, _NONE)
+                for row in range(edges[recording], edges[recording + 1]):
+                    rest = measured[row] - share * u[row]
+                    weighed = weight[row] * rest
+                    rest2 += weighed * rest
+                    for column in range(count):
+                        of_rest[column] += weighed * columns[column, row]
+                _whiten(factor, of_rest)
+                for column in range(count):
+                    rest2 -= of_rest[column] ** 2
+                sums[0, point, number, recording], sums[1, point, number, recording] = uu, uy
+                sums[2, point, number, recording], sums[3, point, number, recording] = yy, rest2
+            log_determinant[point, number] = total
+
+
+@compiled()
 def log_plateaus(covariance: Floats, plateaus: Floats) -> float:
     """The log prior density of covariance parameters (parameters,)."""
     total = 0.0

@@ -100,14 +100,11 @@ class CurveLines:
         self.first = lines.first
         self.measured = self.whitening.turned(lines.value.real)
         self.columns = self.whitening.columns
+        self.edges = np.append(lines.first, len(self.measured))
 
     def sums(self, products: Floats) -> Floats:
         """Over the samples of each recording (…, samples) to (…, recordings)."""
         return np.add.reduceat(products, self.first, axis=-1)
-
-    def on_samples(self, values: Floats) -> Floats:
-        """Values of recordings (…, recordings), at their samples (…, samples)."""
-        return np.repeat(values, np.diff(np.append(self.first, len(self.measured))), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -146,16 +143,17 @@ class CurveProducts:
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
-        woodbury = _WoodburyProducts(self.lines, levels)
-        force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
-        by_force, by_measured = woodbury.projections(force), woodbury.projections(measured)
-        uu = woodbury.products(force, force, by_force, by_force)
-        uy = woodbury.products(force, measured, by_force, by_measured)
-        yy = woodbury.products(measured, measured, by_measured, by_measured)
-        across = measured - self.lines.on_samples(uy / np.maximum(uu, _TINY)) * force
-        by_across = woodbury.projections(across)
-        departure = woodbury.products(across, across, by_across, by_across)
-        return Sums(uu, uy, yy, woodbury.log_determinant, departure)
+        from underskin.diagnosis.inference.kernels import curve_sums
+
+        lines, force = self.lines, contiguous(self.force)
+        ratio, level = (levels.smooth / levels.level)[..., 0], levels.level[..., 0]
+        shape = np.broadcast_shapes((len(force), 1), ratio.shape)
+        sums, log_determinant = np.empty((4, *shape, len(lines.first))), np.empty(shape)
+        wide = (contiguous(np.broadcast_to(values, shape)) for values in (ratio, level))
+        curve_sums(
+            force, lines.measured, lines.columns, lines.whitening.size, lines.edges, *wide, sums, log_determinant
+        )
+        return Sums(sums[0], sums[1], sums[2], log_determinant[..., None], sums[3])
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives, at the first of the sets of noise levels."""
@@ -194,8 +192,6 @@ class _WoodburyProducts:
         level = levels.level[..., None, None] ** 2
         capacitance = matrix + level * np.eye(count)
         self.inverse = np.linalg.inv(capacitance)  # (points, sets, recordings, columns, columns)
-        _, log = np.linalg.slogdet(capacitance / level)
-        self.log_determinant = lines.whitening.log_determinant(ratio) + log.sum(axis=-1, keepdims=True)
 
     def projections(self, rows: Floats) -> Floats:
         """Pᵀ times transformed rows (points, sets, rows): (points, sets, recordings, columns)."""

@@ -180,8 +180,11 @@ class Facts:
         after = self._errors(self.shown, self.scores[1], outside[1])
         if self.problem.lines.curves:
             before["youngs_modulus"] = modulus_under(self.problem, self.base)
+            # An unlisted law that predicts held-out parts no better is no description, under which E would hold
+            is_no_better = outside[1].recordings and outside[1].rmse_percent >= outside[0].rmse_percent
             modulus = modulus_over_answers(self.search, self.problem, self.shown)
-            after |= {} if modulus is None else {"youngs_modulus": modulus}
+            if modulus is not None and not (self.leading is not None and is_no_better):
+                after["youngs_modulus"] = modulus
         return {
             "before": before,
             "after": after,

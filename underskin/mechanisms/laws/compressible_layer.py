@@ -24,15 +24,18 @@ class CompressibleLayer(Mechanism):
     order = 10
     kinds = ("frf", "indentation")
     axes = ("position_mm", "preload_n", "indenter_radius_mm")
-    needs = "a skin declared with poisson_ratio 0.5"
+    needs = "a skin declared with poisson_ratio 0.5; of indentations alone also a declared modulus or thickness"
     parameters_stated = (
         Parameter("poisson_ratio", "-", 0.30, 0.5, Uniform(), "linear", limit=0.5, shown=0.4, reason=_REASON),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
-        """A skin that is declared compressible has its ν in the base model."""
-        if conditions.skin.poisson_ratio != INCOMPRESSIBLE:
-            return f"the skin is declared compressible already (poisson_ratio {conditions.skin.poisson_ratio:g})"
+        """A skin that is declared compressible has its ν in the base model; a free E of indentations takes up any ν."""
+        skin = conditions.skin
+        if skin.poisson_ratio != INCOMPRESSIBLE:
+            return f"the skin is declared compressible already (poisson_ratio {skin.poisson_ratio:g})"
+        if kind == "indentation" and skin.youngs_modulus_mpa is None and skin.thickness_mm is None:
+            return "neither youngs_modulus_mpa nor thickness_mm is declared: E/(1 − ν²) is all that the curves tell"
         return None
 
     def act(self, state: Contacts | Curve, values: Values) -> None:

@@ -10,6 +10,7 @@ Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for wh
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -17,19 +18,25 @@ from scipy.special import gamma
 
 from underskin.autodiff import Differentiated, contiguous
 from underskin.mechanisms.models.sphere_kernels import memory_rows
+from underskin.recordings.curve_course import turning_points
 from underskin.units import Floats
 
-_POWER_STEP = 1.5  # of ln τ
+_POWER_STEP = float(np.log(4.0))  # of ln τ, as compiled functions take it: τ falls by a factor of 4 each
 _SLOWER, _FASTER = 30.0, 0.2  # times the longest and the shortest time of a recording: the range of τ
 
 
 @dataclass(frozen=True)
 class Relaxation:
-    """The Prony pairs: g and τ [s], (points, 1, 1, pairs); `at_rest`, E(0) over the stated modulus (points, 1, 1)."""
+    """The Prony pairs: g and τ [s], (points, 1, 1, pairs); `at_rest`, E(0) over the stated modulus (points, 1, 1).
+
+    `series`: how many pairs are those of a power law, whose times fall by a factor of 4 each; single pairs are before
+    them, their products with every single pair after them.
+    """
 
     fraction: Floats
     time: Floats
     at_rest: Floats | float = 1.0
+    series: int = 0
 
     @classmethod
     def of_power_law(cls, exponent: Floats, times: tuple[float, float]) -> "Relaxation":
@@ -46,7 +53,7 @@ class Relaxation:
         step = n * _POWER_STEP
         slower = density[..., :1] * np.where(step > 0, step / np.expm1(np.maximum(step, 1e-300)), 1.0)
         at_rest = (slower + weight.sum(axis=-1, keepdims=True))[..., 0]
-        return cls(weight / at_rest[..., None], np.exp(log_time) + np.zeros_like(weight), at_rest)
+        return cls(weight / at_rest[..., None], np.exp(log_time) + np.zeros_like(weight), at_rest, count)
 
     def times(self, other: "Relaxation") -> "Relaxation":
         """The product of two relaxations."""
@@ -58,6 +65,7 @@ class Relaxation:
             np.concatenate([*fractions, (mine * others).reshape(shape)], axis=-1),
             np.concatenate([self.time, other.time, both.reshape(shape)], axis=-1),
             self.at_rest * other.at_rest,
+            0 if self.series else other.series,
         )
 
     @property
@@ -74,50 +82,66 @@ class Relaxation:
         """∫ e(t−s) du(s) from u(t) and its memories."""
         return np.asarray(self.unrelaxed * history + (self.fraction * memory).sum(axis=-1))
 
-    def of_points(self, count: int) -> tuple[Floats, Floats]:
-        """g and τ broadcast to `count` points, (points, pairs)."""
+    def of_points(self, count: int) -> tuple[Floats, Floats, int]:
+        """g and τ broadcast to `count` points, (points, pairs), and the length of the series."""
         pairs = self.fraction.shape[-1]
         fraction, time = (
             np.broadcast_to(values.reshape(-1, pairs), (count, pairs)) for values in (self.fraction, self.time)
         )
-        return contiguous(fraction), contiguous(time)
+        return contiguous(fraction), contiguous(time), self.series
 
 
 def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
     """Y (points, curves, samples, pairs) of histories u (points, curves, samples) at times [s]; u at the first
     sample is a step."""
-    _, times = relaxation.of_points(len(history))
-    memory = np.empty((*history.shape, times.shape[-1]))
-    memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), times, memory)
+    pairs = relaxation.of_points(len(history))
+    memory = np.empty((*history.shape, pairs[0].shape[-1]))
+    memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), *pairs, memory)
     return memory
 
 
-_FEW, _MORE = 3, 7  # samples whose straight line gives a speed; more where the displacement is noisy
-_STEADY = 0.05  # of the largest speed: scatter of a steady speed, by noise of the displacement
+_COUNTS = (3, 7, 15, 31)  # samples whose straight line gives a speed; more where the displacement is noisy
+_STEADY = 0.05  # of the speed: its deviation by noise of the displacement, above which more samples are taken
 
 
 def speeds(displacement: Floats, time: Floats) -> Floats:
     """The speed at each sample (curves, samples) of displacements at times: the slope of the straight line through it
-    and its neighbours, few so that it turns as fast as the motion does."""
-    few, more = _slopes(displacement, time, _FEW), _slopes(displacement, time, _MORE)
-    scatter = np.median(np.abs(few - more), axis=-1, keepdims=True)
-    return np.where(scatter > _STEADY * np.abs(more).max(axis=-1, keepdims=True), more, few)
+    and its neighbours, as few as noise allows, so that it changes as fast as the motion does; more than the nearest
+    ones only from the same way."""
+    return np.stack([_speeds(*columns) for columns in zip(displacement, time, strict=True)])
 
 
-def _slopes(displacement: Floats, time: Floats, count: int) -> Floats:
-    """Slopes of the lines through `count` samples around each, fewer where there are no more."""
-    count = min(count, displacement.shape[-1])
-    places, times = (sliding_window_view(column, count, axis=-1) for column in (displacement, time))
+def _speeds(displacement: Floats, time: Floats) -> Floats:
+    ways = [slice(low, high) for low, high in pairwise((*turning_points(displacement)[:-1].tolist(), len(time)))]
+    nearest, *further = [
+        [_lines(displacement[way], time[way], count) for way in ([slice(None)] if count == _COUNTS[0] else ways)]
+        for count in _COUNTS
+    ]
+    speed, _, scatter = (np.concatenate(columns) for columns in zip(*further[-1], strict=True))
+    steady = np.abs(speed)
+    for lines in (*further[-2::-1], nearest):
+        slope, extent, _ = (np.concatenate(columns) for columns in zip(*lines, strict=True))
+        speed = np.where(scatter <= _STEADY * steady * extent, slope, speed)
+    return speed
+
+
+def _lines(displacement: Floats, time: Floats, count: int) -> tuple[Floats, Floats, Floats]:
+    """Of the lines through `count` samples around each, fewer where there are no more: the slopes, √Σ(t − t̄)², and the
+    deviation of the displacement about them."""
+    count = min(count, len(displacement))
+    places, times = (sliding_window_view(column, count) for column in (displacement, time))
     places, times = (part - part.mean(axis=-1, keepdims=True) for part in (places, times))
-    slope = (times * places).sum(axis=-1) / np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny)
-    first = np.clip(np.arange(displacement.shape[-1]) - count // 2, 0, slope.shape[-1] - 1)
-    return np.asarray(slope[..., first])
+    extent = np.sqrt(np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny))
+    slope = (times * places).sum(axis=-1) / extent**2
+    scatter = np.sqrt(((places - slope[:, None] * times) ** 2).sum(axis=-1) / max(count - 2, 1))
+    window = np.clip(np.arange(len(displacement)) - count // 2, 0, len(slope) - 1)
+    return slope[window], extent[window], scatter[window]
 
 
 @dataclass(frozen=True)
 class Samples:
     """The samples before any law: `travel` from the contact point [m] (points, curves, samples), `time` [s] and
-    `speed` of the travel [m/s] (curves, samples), and the recordings' `ids`."""
+    `speed` of what holds the sphere [m/s] (curves, samples), and the recordings' `ids`."""
 
     ids: Sequence[str]
     travel: Floats
@@ -189,12 +213,6 @@ class Curve:
         if self.power_exponent is None:
             return pairs
         return pairs.times(Relaxation.of_power_law(numbers(self.power_exponent), self.times))
-
-    @property
-    def modulus_at_rest(self) -> Floats:
-        """E(0) [Pa] (points, 1, 1)."""
-        relaxation = self.relaxes
-        return numbers(self.modulus) * (1.0 if relaxation is None else relaxation.at_rest)
 
 
 def numbers(quantity: Differentiated) -> Floats:

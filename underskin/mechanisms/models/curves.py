@@ -1,8 +1,8 @@
 """Models of force curves: what all share, and the compression (or tension) of cylinders.
 
 Arrays are (points, curves, samples): points of the fit coordinates; shorter curves are padded with their last value.
-Derivatives are central differences, exact to about 1e-8: the shifted points are computed together, with the contact of
-the central one. Contact points are shifted all at once, since each moves one curve only.
+Derivatives are differences, exact to about 1e-5: the shifted points are computed together with the point itself, with
+its contact. Contact points are shifted all at once, since each moves one curve only.
 
 Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
 platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. A sample that is only compressed or only
@@ -82,18 +82,18 @@ class CurveModel(ABC):
         self._moved = [np.array([index]) for index in range(count)] + [self.contact_points]
         bounds = np.array([parameter.bounds for parameter in self.parameters]).reshape(-1, 2)
         logarithmic = np.array([parameter.scale == "log" for parameter in self.parameters])
-        self._low, self._high = bounds.T
-        self._step = np.where(logarithmic, _STEP, _STEP * np.minimum(1.0, self._high - self._low))
+        self._high = bounds[:, 1]
+        self._step = np.where(logarithmic, _STEP, _STEP * np.minimum(1.0, bounds[:, 1] - bounds[:, 0]))
 
     @abstractmethod
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         """The quantities that govern the curves, numbers (points, 1), as changed by the mechanisms."""
 
     @abstractmethod
-    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
-        """F (points, curves, samples) [N], which samples are in contact, and which are inside the tables.
+    def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
+        """F (points, curves, samples) [N], and which samples are inside the tables.
 
-        `contact` (points, curves, 1) [m]; `contact_mask`: the contact to be used, where given.
+        `contact` (points, curves, 1) [m]; `alike`: the same samples are in contact at all points as at the first.
         """
 
     def forces(self, fit: Floats) -> Floats:
@@ -112,31 +112,27 @@ class CurveModel(ABC):
         value, slopes, inside = self._differentiated(np.asarray(fit, dtype=float))
         return Prediction(value, slopes, None, None, None, inside)
 
-    def _forces(self, fit: Floats, contact_mask: Mask | None = None) -> tuple[Floats, Mask, Mask]:
+    def _forces(self, fit: Floats, *, alike: bool = False) -> tuple[Floats, Mask]:
         values, nuisances = self._composition.values(fit)
         contact = 1e-3 * fit[:, self.contact_points, None]
-        return self._force(self._curve(values, nuisances), contact, contact_mask)
+        return self._force(self._curve(values, nuisances), contact, alike)
 
     def _differentiated(self, fit: Floats) -> tuple[Floats, Floats, Mask]:
         """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside."""
-        middle, contact_mask, inside = self._forces(fit[None])
-        points = np.tile(fit, (2 * len(self._moved), 1))
-        for number, indices in enumerate(self._moved):
-            points[2 * number, indices] += self._step[indices]
-            points[2 * number + 1, indices] -= self._step[indices]
-        # One-sided where the other side is out of bounds
-        points = np.clip(points, np.minimum(self._low, fit), np.maximum(self._high, fit))
-        shifted, _, _ = self._forces(points, np.broadcast_to(contact_mask, (len(points), *contact_mask.shape[1:])))
+        points = np.tile(fit, (1 + len(self._moved), 1))
+        steps = np.where(fit + self._step <= self._high, self._step, -self._step)
+        for number, indices in enumerate(self._moved, start=1):
+            points[number, indices] += steps[indices]
+        force, inside = self._forces(points, alike=True)
         rows = self.recording, self._sample
-        slopes = np.zeros((len(self.parameters), len(self.recording)))
-        for number, indices in enumerate(self._moved):
-            change = (shifted[2 * number] - shifted[2 * number + 1])[rows]
-            distance = points[2 * number, indices] - points[2 * number + 1, indices]
+        value, slopes = force[0][rows], np.zeros((len(self.parameters), len(self.recording)))
+        for number, indices in enumerate(self._moved, start=1):
+            change = force[number][rows] - value
             if indices is self.contact_points:
-                slopes[indices[self.recording], np.arange(len(self.recording))] = change / distance[self.recording]
+                slopes[indices[self.recording], np.arange(len(self.recording))] = change / steps[indices[self.recording]]
             else:
-                slopes[indices[0]] = change / distance[0]
-        return middle[0][rows], slopes, inside[0][rows]
+                slopes[indices[0]] = change / steps[indices[0]]
+        return value, slopes, inside[0][rows]
 
     def _arranged(self, columns: Sequence[Floats]) -> Floats:
         """Columns of the curves as one array (curves, samples), padded with their last values."""
@@ -189,15 +185,15 @@ class CompressionModel(CurveModel):
             mechanism.act(curve, values[mechanism.name])
         return curve
 
-    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
         strain = (self.displacement - contact) / self._height
         strain = np.where(self._loaded * strain < 0, 0.0, strain)  # slack
-        force = curve.modulus_at_rest * self._area * self._relative_stress(curve, strain)
+        force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
         relaxation = curve.relaxes
         if relaxation is not None:
+            force = relaxation.at_rest * force
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
-        all_samples = np.ones(force.shape, dtype=bool)
-        return force, all_samples, all_samples
+        return force, np.ones(force.shape, dtype=bool)
 
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
         """Nominal stress over E, compression positive: of the material, and as cycles soften it."""

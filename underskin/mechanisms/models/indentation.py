@@ -71,11 +71,13 @@ class IndentationModel(CurveModel):
         nuisances = _nuisances(recordings, conditions.skin, sticks)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
         self._ids = [recording.id for recording in recordings]
-        self._speed = speeds(self.displacement, self.time)
         stiffnesses = [recording.stage_stiffness_n_per_mm for recording in recordings]
         self._stage_compliance = np.array([0.0 if stage is None else 1e-3 / stage for stage in stiffnesses])[
             :, None
         ]  # m/N
+        # That of what holds the sphere, which moves on while the sphere is held back
+        held = self.displacement + self._stage_compliance * self._arranged([_forces(curve) for curve in recordings])
+        self._speed = speeds(held, self.time)
         self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
         contacts = [_visible_contact(recording, sticks) for recording in recordings]
         self._seen, self._seen_contact = (
@@ -105,41 +107,41 @@ class IndentationModel(CurveModel):
             mechanism.act(curve, values[mechanism.name])
         return curve
 
-    def _force(self, curve: Curve, contact: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
+    def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
         travel = self.displacement - contact
         samples = Samples(self._ids, travel, self.time, self._speed)
         for law in curve.laws:
             travel = law.pressed_travel(samples, travel)
-        force, contact_mask, inside = self._force_at(curve, travel, contact_mask)
+        force, inside = self._force_at(curve, travel, alike)
         for law in curve.laws:
             force = law.measured_force(samples, force)
-        return force, contact_mask, inside
+        return force, inside
 
-    def _force_at(self, curve: Curve, travel: Floats, contact_mask: Mask | None) -> tuple[Floats, Mask, Mask]:
-        sphere, adhesion = self._sphere(curve), _adhesion(curve)
-        relaxation = curve.relaxes
+    def _force_at(self, curve: Curve, travel: Floats, alike: bool) -> tuple[Floats, Mask]:
+        relaxation, adhesion = curve.relaxes, _adhesion(curve)
+        sphere = self._sphere(curve, 1.0 if relaxation is None else relaxation.at_rest)
         if relaxation is not None:
             relaxing_force = relaxing if curve.stage_stiffness is None else relaxing_on_stage
             return self._relaxing(
-                sphere, partial(relaxing_force, sphere, relaxation, adhesion), adhesion, travel, contact_mask
+                sphere, partial(relaxing_force, sphere, relaxation, adhesion), adhesion, travel, alike
             )
         if adhesion is None:
             depth = np.maximum(travel, 0.0)
             a = sphere.radius_at(depth, None)
             force = np.where(travel > 0, sphere.at(a)[0], 0.0)
-            return force, travel > 0, sphere.inside(a) | (travel <= 0)
-        if contact_mask is None:
-            contact_mask = self._as_seen(in_contact(travel, self._last_travel(sphere, adhesion.separation)))
+            return force, sphere.inside(a) | (travel <= 0)
+        contact_mask = self._as_seen(in_contact(travel, self._last_travel(sphere, adhesion.separation)), alike)
         a = edges(
             sphere, travel, contact_mask, adhesion.work, adhesion.separation if curve.work_of_separation else None
         )
         force = np.where(contact_mask, sphere.force_at(travel, a), 0.0)
-        return force, contact_mask, sphere.inside(a) | ~contact_mask
+        return force, sphere.inside(a) | ~contact_mask
 
-    def _as_seen(self, contact_mask: Mask) -> Mask:
+    def _as_seen(self, contact_mask: Mask, alike: bool) -> Mask:
         """The contact as snap-in and pull-off show it: they are events, whose place no law of equilibrium predicts to a
-        sample."""
-        return np.where(self._seen, self._seen_contact, contact_mask)
+        sample. Of points that are `alike`, the first one's, for all."""
+        seen = np.where(self._seen, self._seen_contact, contact_mask[:1] if alike else contact_mask)
+        return np.broadcast_to(seen, contact_mask.shape)
 
     def _last_travel(self, sphere: Sphere, work: Floats) -> Floats:
         """The travel at which contact ends (points, curves, 1): where δ + F/k is least under the stage known to be
@@ -157,22 +159,22 @@ class IndentationModel(CurveModel):
         force_on: Callable[[Path], tuple[Floats, Mask]],
         adhesion: Adhesion | None,
         travel: Floats,
-        contact_mask: Mask | None,
-    ) -> tuple[Floats, Mask, Mask]:
+        alike: bool,
+    ) -> tuple[Floats, Mask]:
         """As `_force_at` through the history, which begins at the touch of a recording, between two samples."""
         path = _with_touch(travel, self.time, self._again)
         force, own_contact = force_on(path)
         own_contact = own_contact & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
-        if contact_mask is None:
-            contact_mask = own_contact if adhesion is None else self._as_seen(own_contact)
+        contact_mask = self._as_seen(own_contact, alike)
         force = np.where(contact_mask, force, 0.0)
         if sphere.layers is None:  # a half space, which has no tables to leave
-            return force, contact_mask, np.ones_like(contact_mask)
+            return force, np.ones_like(contact_mask)
         least = sphere.pull_off(None if adhesion is None else adhesion.work)[0]
         a = sphere.radius_at(np.maximum(path.travel, 0.0), None, least)
-        return force, contact_mask, sphere.inside(a) | ~contact_mask
+        return force, sphere.inside(a) | ~contact_mask
 
-    def _sphere(self, curve: Curve) -> Sphere:
+    def _sphere(self, curve: Curve, at_rest: Floats | float) -> Sphere:
+        """With E(0), which is `at_rest` times the stated modulus."""
         poisson_ratio = numbers(curve.poisson_ratio)
         layers = None
         if curve.layered:
@@ -182,7 +184,7 @@ class IndentationModel(CurveModel):
             layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in distinct])
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
         compliance = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
-        reduced = curve.modulus_at_rest / (1 - poisson_ratio**2)
+        reduced = at_rest * numbers(curve.modulus) / (1 - poisson_ratio**2)
         assert curve.strain_share is not None
         return Sphere(reduced, self._radius, layers, stiffening, compliance, self._deep, numbers(curve.strain_share))
 
@@ -208,6 +210,13 @@ def _with_touch(travel: Floats, time: Floats, again: Mask) -> Path:
     travel[point, curve, then - 1] = 0.0
     first_contact = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
     return Path(travel, time, first_contact, again)
+
+
+def _forces(recording: IndentationConditions) -> Floats:
+    """The measured force [N] (samples,); 0 of conditions alone."""
+    if isinstance(recording, IndentationRecording):
+        return np.asarray(recording.force_n)
+    return np.zeros(len(recording.displacement_mm))
 
 
 def _visible_contact(recording: IndentationConditions, sticks: bool) -> tuple[Mask, Mask]:

@@ -345,9 +345,13 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     answer[columns] = np.where(returning[columns], receding, answer[columns])
     contact_mask = np.where(returning, stuck, contact_mask)
     touch = returning & ~contact_mask
-    if touch.any() and adhesion is not None:
-        of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
-        answer, contact_mask = np.where(touch, of_touch, answer), np.where(touch, holds, contact_mask)
+    rows = np.flatnonzero(touch.any(axis=(0, 1)))
+    if len(rows) and adhesion is not None:
+        age, at_touch = time - time[..., :1], np.s_[..., rows]
+        samples = (np.take(column, rows, axis=2) for column in (depth, depth_memory, age))
+        of_touch, holds = _first_touch(sphere, relaxation, adhesion, *samples)
+        answer[at_touch] = np.where(touch[at_touch], of_touch, answer[at_touch])
+        contact_mask[at_touch] = np.where(touch[at_touch], holds, contact_mask[at_touch])
     return np.where(contact_mask, answer, 0.0), contact_mask
 
 
@@ -446,10 +450,10 @@ def _first_touch(
     adhesion: Adhesion,
     depth: Floats,
     memory: Floats,
-    time: Floats,
+    age: Floats,
 ) -> tuple[Floats, Mask]:
-    """F of the remaining first touch, from the first of the times on, and whether it holds."""
-    remaining = relaxation.remaining(time - time[..., :1])
+    """F of the remaining first touch, of this `age`, and whether it holds."""
+    remaining = relaxation.remaining(age)
     relaxed = relaxation.convolved(depth, memory) / remaining
     work = adhesion.separation / remaining**2
     unit = replace(sphere, radius=sphere.radius + np.zeros_like(depth))

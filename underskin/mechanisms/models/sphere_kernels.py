@@ -309,51 +309,83 @@ def edge_rows(advancing: Floats, receding: Floats, contact_mask: Mask, a: Floats
                     edge = 0.0
 
 
-_SERIES = 1e-3
-_SECANTS, _SETTLED = 12, 1e-6  # of the edge's place between two samples
+_SECANTS, _SETTLED = 12, 1e-4  # steps to the edge's place between two samples, and the last one, whose error is far less
 _SAME_INTERVAL = 1e-9  # relative, of clocks whose steps differ by rounding
 
-Pairs = tuple[Floats, Floats]  # g and τ
+Pairs = tuple[Floats, Floats, int, Floats]  # g and τ, the length of the series, and room for e^(−t/τ) − 1
 Now = tuple[float, float, Floats]  # depth, time, memory of depths
 Rings = tuple[Floats, Floats, Floats, Floats, Floats]  # depth, time, memory of depths, ℓ and ℓ_s of each sample
 
 _MEMORY = "float64[:, :, :, ::1]"
-_PAIRS = "float64[:, ::1], float64[:, ::1]"
+_PAIRS = "float64[:, ::1], float64[:, ::1], int64"
 
 
 @compiled()
-def _lagging(x: float) -> float:
+def _fill_losses(age: float, pairs: Pairs) -> Floats:
+    """e^(−age/τ) − 1 of all pairs, exact to rounding, with one exponential for each single pair and one for the series.
+
+    Single pairs come first, then a `series` whose times fall by a factor of 4 each, then the products of every single
+    pair with the whole series, whose rates add.
+    """
+    _, times, series, losses = pairs
+    singles = (len(times) - series) // (1 + series)
+    for pair in range(singles + min(series, 1)):
+        losses[pair] = math.expm1(-age / times[pair])
+    for pair in range(singles + 1, singles + series):
+        twice = losses[pair - 1] * (2.0 + losses[pair - 1])
+        losses[pair] = twice * (2.0 + twice)
+    product = singles + series
+    for single in range(singles if series > 0 else 0):
+        loss = losses[single]
+        for pair in range(singles, singles + series):
+            losses[product] = loss + losses[pair] * (1.0 + loss)
+            product += 1
+    return losses
+
+
+@compiled()
+def _lagging(loss: float, duration: float, time: float) -> float:
     """(1 − e^(−x))/x: the remaining fraction of a steady change at its end, x its duration over τ."""
-    return 1 - x / 2 + x**2 / 6 if x < _SERIES else -math.expm1(-x) / x
+    return -loss * time / duration if duration > 0.0 else 1.0
 
 
-@compiled(f"void({_ROWS}, {_ROWS}, float64[:, ::1], {_MEMORY})")
-def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) -> None:
+@compiled(f"void({_ROWS}, {_ROWS}, {_PAIRS}, {_MEMORY})")
+def memory_rows(history: Floats, time: Floats, fractions: Floats, times: Floats, series: int, memory: Floats) -> None:
     """Fill Y = ∫ e^(−(t−s)/τ) du(s) of histories u, linear between samples; u at the first sample is a step."""
     points, curves, samples = history.shape
+    count = times.shape[1]
+    losses, lagging = np.zeros(count), np.zeros(count)
     for point in range(points):
+        of_pairs = times[point]
+        pairs = fractions[point], of_pairs, series, losses
         for curve in range(curves):
             u, t, memories = history[point, curve], time[point, curve], memory[point, curve]
-            for pair in range(times.shape[1]):
+            interval = -1.0
+            for pair in range(count):
                 memories[0, pair] = u[0]
-                interval, decay, lagging = -1.0, 0.0, 0.0
-                for sample in range(1, samples):
-                    passed = max(t[sample] - t[sample - 1], 0.0)
-                    if abs(passed - interval) > _SAME_INTERVAL * passed:
-                        interval, x = passed, passed / times[point, pair]
-                        decay, lagging = math.exp(-x), _lagging(x)
-                    memories[sample, pair] = decay * memories[sample - 1, pair] + lagging * (u[sample] - u[sample - 1])
+            for sample in range(1, samples):
+                passed = max(t[sample] - t[sample - 1], 0.0)
+                if abs(passed - interval) > _SAME_INTERVAL * passed:
+                    interval = passed
+                    _fill_losses(passed, pairs)
+                    for pair in range(count):
+                        lagging[pair] = _lagging(losses[pair], passed, of_pairs[pair])
+                step = u[sample] - u[sample - 1]
+                for pair in range(count):
+                    before = memories[sample - 1, pair]
+                    memories[sample, pair] = before + losses[pair] * before + lagging[pair] * step
 
 
 @compiled()
 def _relaxed_depth(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) -> tuple[float, float]:
     """H(s,t) of a ring reached at a depth and time, with the memory of depths then, and e(t−s)."""
-    age = max(now[1] - time, 0.0)
-    relaxed_depth, remaining = now[0] - depth, 1.0
-    for pair in range(len(pairs[0])):
-        fraction, decay = pairs[0][pair], math.exp(-age / pairs[1][pair])
-        relaxed_depth += fraction * (now[2][pair] - decay * memory[pair] - now[0] + depth)
-        remaining -= fraction * (1.0 - decay)
+    losses = _fill_losses(max(now[1] - time, 0.0), pairs)
+    beyond, remaining = now[0] - depth, 1.0
+    relaxed_depth = beyond
+    for pair in range(len(losses)):
+        fraction, loss = pairs[0][pair], losses[pair]
+        relaxed_depth += fraction * (now[2][pair] - memory[pair] - loss * memory[pair] - beyond)
+        remaining += fraction * loss
     return relaxed_depth, remaining
 
 
@@ -368,50 +400,65 @@ def _excess(ring: int, rings: Rings, pairs: Pairs, now: Now) -> float:
 @compiled()
 def _between(low: int, high: int, share: float, rings: Rings, pairs: Pairs, memory: Floats) -> None:
     """Fill the memory of depths for a ring reached at a fraction `share` of the way between two samples."""
+    passed = share * max(rings[1][high] - rings[1][low], 0.0)
+    change = share * (rings[0][high] - rings[0][low])
+    losses = _fill_losses(passed, pairs)
     for pair in range(len(memory)):
-        x = share * max(rings[1][high] - rings[1][low], 0.0) / pairs[1][pair]
-        change = share * (rings[0][high] - rings[0][low])
-        memory[pair] = math.exp(-x) * rings[2][low, pair] + _lagging(x) * change
+        before = rings[2][low, pair]
+        memory[pair] = before + losses[pair] * before + _lagging(losses[pair], passed, pairs[1][pair]) * change
 
 
 @compiled()
-def _last_sample(first: int, high: int, near: int, record: Indices, rings: Rings, pairs: Pairs, now: Now) -> int:
+def _last_sample(
+    first: int, high: int, near: int, record: Indices, rings: Rings, pairs: Pairs, now: Now
+) -> tuple[int, float, float]:
     """The last of the samples from `first` to `high` whose ring holds, searched from a sample `near` it in ever longer
-    steps and then by halving; −1 where not even the first one does.
+    steps and then by halving, and the excesses there and at the next sample; −1 where not even the first one does.
 
     What was reached between two records was not deeper than the first of them.
     """
-    step = 1
-    if _excess(record[near], rings, pairs, now) >= 0:
-        low, beyond = near, near + step
-        while beyond <= high and _excess(record[beyond], rings, pairs, now) >= 0:
+    step, at_low, at_beyond = 1, 0.0, -1.0
+    at_near = _excess(record[near], rings, pairs, now)
+    if at_near >= 0:
+        low, at_low, beyond = near, at_near, near + step
+        while beyond <= high:
+            at_beyond = _excess(record[beyond], rings, pairs, now)
+            if at_beyond < 0:
+                break
             step *= 2
-            low, beyond = beyond, min(beyond + step, max(high, beyond + 1))
+            low, at_low, beyond = beyond, at_beyond, min(beyond + step, max(high, beyond + 1))
         beyond = min(beyond, high + 1)
     else:
-        low, beyond = near - step, near
-        while low > first and _excess(record[low], rings, pairs, now) < 0:
+        low, beyond, at_beyond = near - step, near, at_near
+        while low > first:
+            at_low = _excess(record[low], rings, pairs, now)
+            if at_low >= 0:
+                break
             step *= 2
-            low, beyond = low - step, low
+            low, beyond, at_beyond = low - step, low, at_low
         if low <= first:
-            if beyond <= first or not _excess(first, rings, pairs, now) >= 0:
-                return -1
+            at_low = _excess(first, rings, pairs, now)
+            if beyond <= first or not at_low >= 0:
+                return -1, 0.0, 0.0
             low = first
     while beyond - low > 1:
         middle = (low + beyond) // 2
-        if _excess(record[middle], rings, pairs, now) >= 0:
-            low = middle
+        at_middle = _excess(record[middle], rings, pairs, now)
+        if at_middle >= 0:
+            low, at_low = middle, at_middle
         else:
-            beyond = middle
-    return low
+            beyond, at_beyond = middle, at_middle
+    return low, at_low, at_beyond
 
 
 @compiled()
-def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Floats) -> float:
-    """The fraction of the way between two samples up to which rings hold (regula falsi, Illinois)."""
+def _share(
+    low: int, high: int, at_low: float, at_high: float, rings: Rings, pairs: Pairs, now: Now, memory: Floats
+) -> float:
+    """The fraction of the way between two samples up to which rings hold, by the excesses at both (regula falsi,
+    Illinois)."""
     depth, time, _, advancing_stretch, receding_stretch = rings
-    at_near, at_far = _excess(low, rings, pairs, now), _excess(high, rings, pairs, now)
-    inner, outer, share = 0.0, 1.0, 0.0
+    inner, outer, share, at_near, at_far = 0.0, 1.0, 0.0, at_low, at_high
     for _ in range(_SECANTS):
         fall = at_near - at_far
         tried = min(max(inner + (outer - inner) * at_near / fall, 0.0), 1.0) if fall > 0 else 0.0
@@ -453,6 +500,7 @@ def creep_edge_rows(
     first_contact: Indices,
     fractions: Floats,
     times: Floats,
+    series: int,
     edge: Floats,
     relaxed_depth: Floats,
     memory_force: Floats,
@@ -464,9 +512,9 @@ def creep_edge_rows(
     Rings let go one after another from the outermost; the next one lies between two samples.
     """
     points, curves, samples = depth.shape
-    memory = np.empty(fractions.shape[1])
+    memory, room = np.empty(fractions.shape[1]), np.empty(fractions.shape[1])
     for point in range(points):
-        pairs = fractions[point], times[point]
+        pairs = fractions[point], times[point], series, room
         for curve in range(curves):
             here = point, curve
             rings = depth[here], time[here], depth_memory[here], advancing_stretch[here], receding_stretch[here]
@@ -477,11 +525,12 @@ def creep_edge_rows(
                 if high == sample:
                     low = sample
                     continue
-                low = _last_sample(first, high, min(max(low, first), high), record[here], rings, pairs, now)
+                near = min(max(low, first), high)
+                low, at_low, at_next = _last_sample(first, high, near, record[here], rings, pairs, now)
                 if low < 0:
                     continue
                 high = min(low + 1, high)
-                share = _share(low, high, rings, pairs, now, memory) if high > low else 0.0
+                share = _share(low, high, at_low, at_next, rings, pairs, now, memory) if high > low else 0.0
                 _between(low, high, share, rings, pairs, memory)
                 position = rings[0][low] + share * (rings[0][high] - rings[0][low])
                 ring_time = rings[1][low] + share * (rings[1][high] - rings[1][low])
@@ -490,14 +539,14 @@ def creep_edge_rows(
                 relaxed_depth[point, curve, sample] = _relaxed_depth(position, ring_time, memory, pairs, now)[0]
                 of_force = force[here], time[here], force_memory[here], advancing_stretch[here], receding_stretch[here]
                 _between(low, high, share, of_force, pairs, memory)
+                losses = _fill_losses(max(now[1] - ring_time, 0.0), pairs)
                 total = 0.0
                 for pair in range(len(memory)):
-                    age = max(now[1] - ring_time, 0.0)
-                    total += pairs[0][pair] * math.exp(-age / pairs[1][pair]) * memory[pair]
+                    total += pairs[0][pair] * (1.0 + losses[pair]) * memory[pair]
                 memory_force[point, curve, sample] = total
 
 
-Step = tuple[float, float, Floats, Floats]  # depth before and now, duration over τ, decay of memories
+Step = tuple[float, float, float, Floats, Floats]  # depth before and now, duration, decay and lag of memories
 
 
 @compiled()
@@ -506,25 +555,28 @@ def _followed(
 ) -> tuple[float, float]:
     """Move a ring on by a step: its force over its stiffness, and how far it is pressed beyond where it would have
     recovered to; negative where it is left behind."""
-    before, now, ratio, decay = step
+    before, now, duration, decay, lag = step
     carried = at_once = 1.0 - pairs[0].sum()
     carried *= pressed[ring]
-    for pair in range(len(ratio)):
+    for pair in range(len(decay)):
         carried += pairs[0][pair] * decay[pair] * memory[ring, pair]
-        at_once += pairs[0][pair] * _lagging(ratio[pair])
+        at_once += pairs[0][pair] * lag[pair]
     recovery = -carried / at_once
     change = now - reach - pressed[ring]
-    beyond = change - recovery
-    gap = max(pressed[ring] + reach - before, 0.0)
-    share = beyond / (beyond + gap) if beyond > 0 else 0.0  # of the step, since the ring was met
+    beyond = max(change - recovery, 0.0)
+    for pair in range(len(decay)):
+        memory[ring, pair] = decay[pair] * memory[ring, pair] + lag[pair] * recovery
+    pressed[ring] += recovery + beyond
+    if beyond == 0.0:
+        return 0.0, change - recovery
+    passed = beyond / (beyond + max(pressed[ring] - recovery - beyond + reach - before, 0.0)) * duration  # since met
+    losses = _fill_losses(passed, pairs)
     sudden = 1.0 - pairs[0].sum()
-    for pair in range(len(ratio)):
-        own = _lagging(share * ratio[pair])
-        memory[ring, pair] = decay[pair] * memory[ring, pair] + _lagging(ratio[pair]) * recovery
-        memory[ring, pair] += own * max(beyond, 0.0)
+    for pair in range(len(decay)):
+        own = _lagging(losses[pair], passed, pairs[1][pair])
+        memory[ring, pair] += own * beyond
         sudden += pairs[0][pair] * own
-    pressed[ring] += recovery + max(beyond, 0.0)
-    return sudden * max(beyond, 0.0), beyond
+    return sudden * beyond, beyond
 
 
 @compiled()
@@ -541,10 +593,14 @@ def _march(
     """As `ring_rows`, of one curve."""
     rings, reached = len(stiffness), 0
     pressed, memory = np.zeros(rings), np.zeros((rings, len(pairs[0])))
+    decay, lag = np.zeros(len(pairs[0])), np.zeros(len(pairs[0]))
     for sample in range(first, len(depth)):
         before = max(sample - 1, first)
-        ratio = max(time[sample] - time[before], 0.0) / pairs[1]
-        step = (depth[before] if sample > first else 0.0, depth[sample], ratio, np.exp(-ratio))
+        duration = max(time[sample] - time[before], 0.0)
+        losses = _fill_losses(duration, pairs)
+        for pair in range(len(decay)):
+            decay[pair], lag[pair] = 1.0 + losses[pair], _lagging(losses[pair], duration, pairs[1][pair])
+        step = (depth[before] if sample > first else 0.0, depth[sample], duration, decay, lag)
         while reached < rings and reach[reached] < depth[sample]:
             reached += 1
         outermost, excess, gap = -1, 0.0, reach[0]
@@ -571,6 +627,7 @@ def ring_rows(
     stiffness: Floats,
     fractions: Floats,
     times: Floats,
+    series: int,
     force: Floats,
     edge: Floats,
 ) -> None:
@@ -582,10 +639,11 @@ def ring_rows(
     ring is met.
     """
     points, curves, _ = depth.shape
+    room = np.empty(fractions.shape[1])
     for point in range(points):
+        pairs = fractions[point], times[point], series, room
         for curve in range(curves):
             if again[curve]:
                 here = point, curve
-                pairs = fractions[point], times[point]
                 curve_rows = depth[here], time[here], first_contact[here]
                 _march(*curve_rows, reach[here], stiffness[here], pairs, force[here], edge[here])
