@@ -129,7 +129,9 @@ class CurveModel(ABC):
         for number, indices in enumerate(self._moved, start=1):
             change = force[number][rows] - value
             if indices is self.contact_points:
-                slopes[indices[self.recording], np.arange(len(self.recording))] = change / steps[indices[self.recording]]
+                slopes[indices[self.recording], np.arange(len(self.recording))] = (
+                    change / steps[indices[self.recording]]
+                )
             else:
                 slopes[indices[0]] = change / steps[indices[0]]
         return value, slopes, inside[0][rows]

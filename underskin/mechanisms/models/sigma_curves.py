@@ -177,12 +177,20 @@ class _Added:
     nodes: Floats
     splines: dict[int, TensorSpline]
 
-    def shares(self, variable: Differentiated) -> Iterator[tuple[TensorSpline, Differentiated]]:
-        """The splines that add something, each with its share."""
+    @cached_property
+    def _polynomials(self) -> list[tuple[TensorSpline, np.poly1d, np.poly1d]]:
+        """Each spline with Lagrange's polynomial and its derivative."""
+        parts = []
         for number, spline in self.splines.items():
             others = np.delete(self.nodes, number)
             polynomial = np.poly1d(others, r=True) / np.prod(self.nodes[number] - others)
-            yield spline, chain(polynomial(variable.value), (polynomial.deriv()(variable.value), variable))
+            parts.append((spline, polynomial, polynomial.deriv()))
+        return parts
+
+    def shares(self, variable: Differentiated) -> Iterator[tuple[TensorSpline, Differentiated]]:
+        """The splines that add something, each with its share."""
+        for spline, polynomial, derivative in self._polynomials:
+            yield spline, chain(polynomial(variable.value), (derivative(variable.value), variable))
 
 
 class SigmaOfContacts:

@@ -309,7 +309,10 @@ def edge_rows(advancing: Floats, receding: Floats, contact_mask: Mask, a: Floats
                     edge = 0.0
 
 
-_SECANTS, _SETTLED = 12, 1e-4  # steps to the edge's place between two samples, and the last one, whose error is far less
+_SECANTS, _SETTLED = (
+    12,
+    1e-4,
+)  # steps to the edge's place between two samples, and the last one, whose error is far less
 _SAME_INTERVAL = 1e-9  # relative, of clocks whose steps differ by rounding
 
 Pairs = tuple[Floats, Floats, int, Floats]  # g and τ, the length of the series, and room for e^(−t/τ) − 1
