@@ -139,9 +139,10 @@ def awaited(server: Server, diagnosis_id: str, *states: str) -> dict[str, Any]:
 
 @cache
 def report() -> dict[str, Any]:
-    """The report on `resonant`, made here: what any worker makes of it."""
+    """The report on `resonant`, made here: what any worker makes of it, but for the headline, which is made of the rest
+    where tests change that."""
     made = diagnose(parse(resonant("array")), table())
-    return dict(orjson.loads(orjson.dumps(made.document, option=orjson.OPT_SERIALIZE_NUMPY)))
+    return {**orjson.loads(orjson.dumps(made.document, option=orjson.OPT_SERIALIZE_NUMPY)), "headline": ""}
 
 
 @cache

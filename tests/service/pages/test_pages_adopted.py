@@ -243,7 +243,6 @@ def test_a_tag_says_how_sure_it_is(
         **report(),
         "verdict": verdict,
         "probability": probability,
-        "headline": "",  # made of the rest
         "mechanisms": [entry for entry in report()["mechanisms"] if entry["name"] in mechanisms],
         "alternatives": [{"mechanisms": [name], "probability": share, "why_not": "."} for name, share in alternatives],
         "unnamed": WARMTH if "a law" in tag else None,

@@ -40,7 +40,7 @@ def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server)
     headings = page.get_by_role("heading", level=2).all_inner_texts()
     sections = [name for name in headings if name in SECTIONS]
     assert sections == SECTIONS
-    assert "contact_resonance" in page.locator(".first").inner_text().replace(" ", "_")
+    assert page.locator(".first").inner_text().startswith("Contact resonance, tip mass")
     page.get_by_role("button", name="Adopt this model").click()
     page.wait_for_url("**/skins/resonating?model=adopted")
     visitor.drawn(2)
@@ -201,7 +201,7 @@ def test_hostile_names_in_a_report_stay_text(visitor: Visit, server: Server) -> 
     visitor.go(keep(server, "hostile", hostile, HOSTILE))
     visitor.drawn(4)
     assert visitor.page.locator("img[src=x]").count() == 0
-    assert HOSTILE.split(".")[0] in visitor.page.locator(".first").inner_text()
+    assert HOSTILE.split(".")[0] in visitor.page.locator(".summary").inner_text()
 
 
 def test_a_report_without_its_figures_says_so(server: Server) -> None:

@@ -11,8 +11,8 @@ from underskin.findings.codes import FindingCode
 from underskin.recordings.campaign import to_dict
 
 
-def test_list_says_lacking_probability(server: Server) -> None:
-    """A list says what is lacking each with its own probability."""
+def test_list_says_what_is_lacking(server: Server) -> None:
+    """A list says what is lacking with its strengths, as the report's headline does."""
     both = [
         {**report()["mechanisms"][0], "name": name, "probability": probability}
         for name, probability in (("timing_delay", 0.98), ("contact_resonance", 0.841))
@@ -20,8 +20,8 @@ def test_list_says_lacking_probability(server: Server) -> None:
     diagnosed(server, resonant("two"), {**report(), "probability": 0.822, "mechanisms": both}, "two causes")
     for path in ("/", "/skins/two%20causes"):
         row = said(server, path, "two")
-        assert "lacks timing delay (98 %) and contact resonance (84.1 %)" in row
-        assert "82.2" not in row
+        assert "Timing delay, tip mass 4 g" in row
+        assert "and contact resonance, tip mass 4 g" in row
 
 
 def test_a_diagnosis_that_failed_says_what_to_do(visitor: Visit, server: Server) -> None:
