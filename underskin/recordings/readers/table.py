@@ -25,7 +25,6 @@ from underskin.units import Floats
 
 BLANKS = " "
 _STYLES = (("\t", "."), (";", "."), (",", "."), ("\t", ","), (";", ","), (BLANKS, "."), (BLANKS, ","))
-_BLANKS_ALONE = re.compile(r'[^\t;"]* [^\t;"]*')  # lines of which blanks part the cells
 _BARE_OR_QUOTED = re.compile(r'[^"]*| *"[^"]*"')
 _TOKEN = re.compile(r'"[^"]*"|\S+')
 _COMMENT = re.compile(r"\s*(#|%|//|!)+\s*")
@@ -78,12 +77,15 @@ class Table:
         """The cells of lines by column; None where a line may be no row, or has quotes within a cell."""
         least, separator = max(self.columns), self.separator
         if separator == BLANKS:
-            if not all(map(_BLANKS_ALONE.fullmatch, lines)):
+            if any(mark in line for mark in '\t;"' for line in lines) or not all(" " in line for line in lines):
                 return None
             rows = [line.split() for line in lines]
-            if not all(least < len(row) <= self.width for row in rows):
+            counts = list(map(len, rows))
+            if not least < min(counts) <= max(counts) <= self.width:
                 return None
-            return list(zip(*(row + [""] * (self.width - len(row)) for row in rows), strict=True))
+            if min(counts) < self.width:
+                rows = [row + [""] * (self.width - len(row)) for row in rows]
+            return list(zip(*rows, strict=True))
         counts = [line.count(separator) for line in lines]
         if not least <= min(counts) <= max(counts) < self.width:
             return None
