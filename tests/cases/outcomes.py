@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 _ARRAY = re.compile(r"d33 of the array\s+([-+.\de]+)")
-_MODULUS = re.compile(r"^\s*\S.*?\s([-+.\de]+)\s+[-+.\de]+\s+(?:indentation|compression):", re.MULTILINE)
+_MODULUS = re.compile(
+    r"^\s*\S.*?\s([-+.\de]+)\s+[-+.\de]+\s+(?:indentation|compression(?: and tension)?|tension):", re.MULTILINE
+)
 
 
 @dataclass(frozen=True)
