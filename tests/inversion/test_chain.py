@@ -131,15 +131,14 @@ def test_blows_clipped_before_noise_leave_d33(table: SigmaTable) -> None:
 def test_shaken_charge_clipped_before_noise_is_refused(rail: float, table: SigmaTable) -> None:
     """A charge clipped at so many standard deviations, with 0.5 % of noise behind, gives no d33: every block is hit."""
     random, campaign = np.random.default_rng(3), shaken(charge_noise=0.0)
-    clipped = [rail * np.std(recording.charge_pc) for recording in campaign.of(FrfRecording)]
-    recordings = tuple(
-        replace(
-            recording, charge_pc=np.clip(recording.charge_pc, -end, end) + random.normal(0, 0.005 * end, 4096)
-        )
-        for recording, end in zip(campaign.of(FrfRecording), clipped, strict=True)
-    )  # fmt: skip
+    recordings = []
+    for recording in campaign.of(FrfRecording):
+        charge = np.asarray(recording.charge_pc, dtype=np.float64)
+        end = rail * charge.std()
+        behind = np.clip(charge, -end, end) + random.normal(0, 0.005 * end, len(charge))
+        recordings.append(replace(recording, charge_pc=behind))
     with pytest.raises(NoD33, match="overload"):
-        invert(replace(campaign, recordings=recordings), table)
+        invert(replace(campaign, recordings=tuple(recordings)), table)
 
 
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.08, 0.01), (0.0, 0.2)])
