@@ -253,10 +253,38 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
     block = int(np.ceil(len(force) / _BLOCKS))
     turn = _deepest(displacement)
     span = float(np.ptp(force))
+    least = np.maximum(_BEYOND_JUMP * noise, _LEAST_JUMP * span)
+    snap_in, pull_off = _jumps_of_contact(force, turn, noise, block)
+    arrive, leave = _hold(displacement, turn)
+    drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
+    drifting_after = None
+    if drifting is None and snap_in is None and pull_off is None:
+        drifting_after = _drifting_after(displacement, force, time, leave, noise)
+    _, drift = drifting or drifting_after or (0, 0.0)
+    level = force - drift * (time - time[0])
+    if pull_off is None and drift:
+        _, pull_off = _jumps_of_contact(level, turn, noise, block)
+    detaches = None if pull_off is None else pull_off - 1
+    if pull_off is None:
+        start_force = float(np.median(level[: max(3, block)]))
+        detaches, pull_off = _slow_pull_off(displacement, level - start_force, turn, noise, least)
+    if drifting is not None:
+        air = np.arange(drifting[0])
+    elif drifting_after is not None:
+        air = np.arange(max(len(force) - drifting_after[0], pull_off or 0), len(force))
+    else:
+        air = _air(force, turn, snap_in, pull_off, noise, span)
+    measured = level if drifting_after is not None else force
+    zero = float(np.median(measured[air])) if len(air) >= _AIR else float(force[0])
+    return CurveLandmarks(noise, turn, arrive, leave, snap_in, detaches, pull_off, air, zero, drift)
+
+
+def _jumps_of_contact(force: Floats, turn: int, noise: float, block: int) -> tuple[int | None, int | None]:
+    """The first samples after a jump from the air into contact, and after one back into it; None without one."""
+    span = float(np.ptp(force))
     jump_samples = jumps(force, float(np.hypot(noise, 1e-3 * span)), block)
     least = np.maximum(_BEYOND_JUMP * noise, _LEAST_JUMP * span)
     start_force, end_force = (float(np.median(part)) for part in (force[: max(3, block)], force[-max(3, block) :]))
-    # From the air into contact, or back into it
     few = max(2, min(block, 5))
     before = np.array([np.median(force[max(sample - few, 0) : max(sample, 1)]) for sample in jump_samples.tolist()])
     after = np.array([np.median(force[sample : sample + few]) for sample in jump_samples.tolist()])
@@ -271,23 +299,7 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
         if len(down)
         else _single_snap(force[: turn + 1], start_force, noise)
     )
-    pull_off = int(jump_samples[up[np.argmax(step[up])]]) if len(up) else None
-    detaches = None if pull_off is None else pull_off - 1
-    arrive, leave = _hold(displacement, turn)
-    drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
-    if drifting is None and snap_in is None and pull_off is None:
-        after_contact = _drifting_after(displacement, force, time, leave, noise)
-        if after_contact is not None:
-            air, drift = np.arange(len(force) - after_contact[0], len(force)), after_contact[1]
-            zero = float(np.median(force[air] - drift * (time[air] - time[0])))
-            return CurveLandmarks(noise, turn, arrive, leave, None, None, None, air, zero, drift)
-    if pull_off is None:
-        detaches, pull_off = _slow_pull_off(displacement, force - start_force, turn, noise, least)
-    air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
-    zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
-    return CurveLandmarks(
-        noise, turn, arrive, leave, snap_in, detaches, pull_off, air, zero, 0.0 if drifting is None else drifting[1]
-    )
+    return snap_in, int(jump_samples[up[np.argmax(step[up])]]) if len(up) else None
 
 
 def pressed_depth(displacement: Floats, force: Floats, time: Floats | None = None) -> float:
