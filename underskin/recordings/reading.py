@@ -20,7 +20,7 @@ import numpy as np
 import orjson
 
 from underskin.errors import FileError, InvalidInput, conflicting, too_few
-from underskin.recordings import curve_preparation, files_beside, rig_description, rig_guess, rig_mapping, validation
+from underskin.recordings import curve_preparation, joined_files, rig_description, rig_guess, rig_mapping, validation
 from underskin.recordings.campaign import (
     COLUMNS,
     Campaign,
@@ -127,7 +127,7 @@ def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None 
     The format follows from the content, for formats of other packages from the name. Files of channels need a rig
     description, unless their headings and header say all of it. Raises FileError that names the file and the place,
     InvalidInput where the campaign itself or its skin is invalid. Other files of a recording, which the rig description
-    names (`beside`), are read from the same folder.
+    names (`join`), are read from the same folder.
     """
     return understood(read_contents(source, name, rig), name, rig)
 
@@ -167,15 +167,15 @@ def _by_guess(contents: Contents, name: str) -> Reading:
 
 def read_contents(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Contents | Document:
     """A file's channels, or its campaign document, before a rig description is applied, with the channels of the files
-    that it names `beside`; raises FileError."""
+    that it names (`join`); raises FileError."""
     contents = _parsed(source, name)
-    if rig is None or rig.beside is None or isinstance(contents, Document):
+    if rig is None or rig.join is None or isinstance(contents, Document):
         return contents
     if isinstance(source, bytes):
-        raise FileError(name, "", "is no file with others in its folder, which the rig description names (beside)")
-    others = {file.name: _parsed(file, file.name) for file in files_beside.files_beside(Path(source), rig.beside)}
+        raise FileError(name, "", "is no file with others in its folder, which the rig description names (join)")
+    others = {file.name: _parsed(file, file.name) for file in joined_files.files_to_join(Path(source), rig.join)}
     channels = {file: held for file, held in others.items() if isinstance(held, Contents)}
-    return files_beside.with_beside(contents, channels, name)
+    return joined_files.joined(contents, channels, name)
 
 
 def _parsed(source: Path | str | bytes, name: str) -> Contents | Document:

@@ -14,7 +14,7 @@ columns are one recording. `channels` maps each campaign field to a channel and 
 one, one after the other. `recordings` lists the fields and channels of several recordings in the same rows (a column a
 sensor). `curves` says how the curves of a file are separated, `estimator` how FRFs are estimated from time series (H1,
 H2 or Hv), `derived` defines channels by formulas (`depth: Piezo - Deflection`), `trim` selects the samples of each
-curve, `beside` names the other files of a recording (`{_force: [_charge]}`).
+curve, `join` names the other files of a recording (`{_force: [_charge]}`).
 
 Also here: the values of properties, converted to the unit of their campaign field.
 """
@@ -145,7 +145,7 @@ _OF_PARTS = ("position_mm", "conditions")  # fields of the recording with severa
 CURVE_EXTENTS = ("file", "groups")  # what may make one curve, besides values of a channel
 _FIELDS = (
     *("schema", "name", "kind", "units_checked", "skin", "recording", "recordings"),
-    *("derived", "channels", "curves", "trim", "estimator", "beside"),
+    *("derived", "channels", "curves", "trim", "estimator", "join"),
 )
 _Model = TypeVar("_Model")
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
@@ -188,7 +188,7 @@ class RigDescription:
     """A rig: the kind of its recordings, the fields common to them, the mapping of channels, and what makes one curve:
     `"file"`, `"groups"`, a channel that separates curves, or None (each block is one). `derived` holds formulas by the
     names of the channels that they define, in their order; `joined` the channels that are joined to one, by its name.
-    `entries` are the descriptions of each of several recordings in the same rows, `beside` the part of a file's name
+    `entries` are the descriptions of each of several recordings in the same rows, `join` the part of a file's name
     and what stands in its place in those of the other files of a recording. `document` is as given."""
 
     kind: str
@@ -203,7 +203,7 @@ class RigDescription:
     trim: Trim | None = None
     joined: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
     entries: "tuple[RigDescription, ...]" = ()
-    beside: tuple[str, tuple[str, ...]] | None = None
+    join: tuple[str, tuple[str, ...]] | None = None
 
     @property
     def row_fields(self) -> Iterator[SignalMapping]:
@@ -257,7 +257,7 @@ def from_dict(document: Any) -> RigDescription:
         "estimator": lambda: _estimator(get("estimator"), get("channels")),
         "derived": lambda: _derived(get("derived")),
         "trim": lambda: _trim(get("trim")),
-        "beside": lambda: _beside(get("beside")),
+        "join": lambda: _join(get("join")),
     }
     values = all_of(readings)
     del values["name"]  # that of the document
@@ -398,20 +398,20 @@ def _trim(document: Any) -> Trim | None:
     return trim
 
 
-def _beside(document: Any) -> tuple[str, tuple[str, ...]] | None:
+def _join(document: Any) -> tuple[str, tuple[str, ...]] | None:
     if document is None:
         return None
     if not isinstance(document, Mapping) or len(document) != 1:
         allowed = "must be one part of a file's name with those of the others, such as {_force: [_charge]}"
-        raise wrong_type("beside", shown(document), allowed)
+        raise wrong_type("join", shown(document), allowed)
     ((part, given),) = document.items()
     others = given if isinstance(given, list) else [given]
     for name in (part, *others):
-        field.name("beside", name, False)
+        field.name("join", name, False)
         if not {"/", "\\"}.isdisjoint(name):
-            raise out_of_range("beside", name, "must be a part of the name of a file in the same folder")
+            raise out_of_range("join", name, "must be a part of the name of a file in the same folder")
     if part in others:
-        raise out_of_range("beside", part, "must be replaced by another part of a name")
+        raise out_of_range("join", part, "must be replaced by another part of a name")
     return part, tuple(others)
 
 

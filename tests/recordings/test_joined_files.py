@@ -20,7 +20,7 @@ FORCE, CHARGE = 1 + np.sin(0.3 * SAMPLES), 7 * np.sin(0.3 * SAMPLES)
 def rig(**more: Any) -> rig_description.RigDescription:
     channels = {"force_n": {"channel": "Force"}, "charge_pc": {"channel": "Charge"}}
     given = {"schema": "rig/1", "skin": document(FRF)["skin"], "recording": COMMON, "channels": channels}
-    return rig_description.from_dict({**given, "beside": {"_force": "_charge"}, **more})
+    return rig_description.from_dict({**given, "join": {"_force": "_charge"}, **more})
 
 
 def write(folder: Path, name: str, heading: str, values: np.ndarray, first: int, separator: str = ";") -> None:
@@ -105,7 +105,7 @@ def test_a_name_without_the_part_and_bytes_are_refused(tmp_path: Path) -> None:
         read_file((tmp_path / "a.csv").read_bytes(), "a_force.csv", rig())
 
 
-@pytest.mark.parametrize("beside", ["_charge", {}, {"a": "b", "c": "d"}, {"_force": "../secret"}, {"a": 5}, {"a": "a"}])
+@pytest.mark.parametrize("join", ["_charge", {}, {"a": "b", "c": "d"}, {"_force": "../secret"}, {"a": 5}, {"a": "a"}])
 def test_no_other_names_are_refused(beside: Any) -> None:
-    with pytest.raises(InvalidInput, match="beside"):
+    with pytest.raises(InvalidInput, match="join"):
         rig(beside=beside)

@@ -1,6 +1,6 @@
 """Channels of one recording in several files, such as the force in one and the charge in another.
 
-A rig description says how the names of the files belong together: `beside: {_force: [_charge]}` reads `a_charge.csv`
+A rig description says how the names of the files belong together: `join: {_force: [_charge]}` reads `a_charge.csv`
 with `a_force.csv`. Their clocks align them: the stated starts of both, and the first value of a column of times in
 each; `regular_samples.aligned` cuts the channels to the samples in common.
 """
@@ -20,23 +20,23 @@ from underskin.recordings.regular_samples import mean_step
 _EVEN = 0.05  # of a step: as for channels that start at parts of a sample
 
 
-def files_beside(file: Path, beside: tuple[str, tuple[str, ...]]) -> Iterator[Path]:
+def files_to_join(file: Path, join: tuple[str, tuple[str, ...]]) -> Iterator[Path]:
     """The other files of a recording, by the name of the first; raises FileError where its name has not the part."""
-    part, others = beside
+    part, others = join
     if part not in file.name:
-        raise FileError(str(file), "", f"has no {part!r} in its name, which says what files belong to it (beside)")
+        raise FileError(str(file), "", f"has no {part!r} in its name, which says what files belong to it (join)")
     for other in others:
         yield file.with_name(other.join(file.name.rsplit(part, 1)))
 
 
-def with_beside(contents: Contents, others: Mapping[str, Contents], file: str) -> Contents:
+def joined(contents: Contents, others: Mapping[str, Contents], file: str) -> Contents:
     """The contents with the channels of the `others`, part by part; a repeated name is numbered (`Value (2)`).
 
     Raises FileError that names the files where they have other parts, or no clock by which they could be aligned.
     """
     for name, other in others.items():
         if len(other.blocks) != len(contents.blocks):
-            raise FileError(file, "", f"has {len(contents.blocks)} parts, and {name} beside it {len(other.blocks)}")
+            raise FileError(file, "", f"has {len(contents.blocks)} parts, and {name} {len(other.blocks)}")
         pairs = zip(contents.blocks, other.blocks, strict=True)
         blocks, notes = zip(*(_joined(first, second, file, name) for first, second in pairs), strict=True)
         warnings = (*contents.warnings, *(f"{name}: {warning}" for warning in other.warnings), *filter(None, notes))
@@ -46,7 +46,7 @@ def with_beside(contents: Contents, others: Mapping[str, Contents], file: str) -
 
 
 def _joined(first: Block, second: Block, file: str, other: str) -> tuple[Block, str]:
-    """A part with the channels of that beside it, each with its start and rate unless both have one clock; and a note
+    """A part with the channels of the other, each with its start and rate unless both have one clock; and a note
     where they are taken to begin together."""
     clocks = [_clock(block) for block in (first, second)]
     times = [np.zeros(0) if clock is None else clock.values.real * _seconds(clock) for clock in clocks]
