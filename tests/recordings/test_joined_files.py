@@ -106,6 +106,6 @@ def test_a_name_without_the_part_and_bytes_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("join", ["_charge", {}, {"a": "b", "c": "d"}, {"_force": "../secret"}, {"a": 5}, {"a": "a"}])
-def test_no_other_names_are_refused(beside: Any) -> None:
+def test_no_other_names_are_refused(join: Any) -> None:
     with pytest.raises(InvalidInput, match="join"):
-        rig(beside=beside)
+        rig(join=join)
