@@ -161,6 +161,18 @@ def test_a_drift_is_no_part_of_a_pull_off(drift: float) -> None:
     assert event.arguments["events"]["pull_off"]["force_n"] == pytest.approx(-0.1 * load, rel=0.1)
 
 
+@pytest.mark.parametrize("rises", [0.0, 0.6])
+def test_a_pull_off_shows_whatever_the_drift(rises: float) -> None:
+    """Under a drift of the cell that is as large as the contact's force, and where strands look like a drift."""
+    depth = ways(-3.0, 0.9, -3.0, samples=1500)
+    back, load = np.arange(len(depth)) >= 1500, hertz(np.array(0.9))
+    strands = np.where(depth > -0.24, (0.9 - depth) / 1.14, np.exp((depth + 0.24) / 0.06))
+    force = pressed(depth, noise=2e-3 * load) - np.where(back, 0.25 * load * np.clip(strands, 0.0, 1.0), 0.0)
+    force += rises * load * np.arange(len(depth)) / len(depth)
+    (event,) = contact_events(campaign(depth, force).curves[0])
+    assert event.arguments["events"]["pull_off"]["displacement_mm"] == pytest.approx(-0.24, abs=0.01)
+
+
 def test_a_snap_in_is_no_step_of_the_reading() -> None:
     """A soft stage lets the sphere jump: displacement and force together."""
     depth = np.concatenate([np.linspace(-0.1, 0.0, 200), np.linspace(0.03, 0.3, 300)])

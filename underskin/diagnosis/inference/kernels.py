@@ -148,6 +148,47 @@ def _whiten(factor: Floats, values: Floats) -> None:
         values[row] /= factor[row, row]
 
 
+@compiled()
+def _add_row(weight: float, value: float, columns: Floats, row: int, total: Floats) -> None:
+    """Add one row to Pᵀ W v."""
+    for column in range(len(total)):
+        total[column] += weight * value * columns[column, row]
+
+
+@compiled()
+def _recording_sums(
+    u: Floats, measured: Floats, columns: Floats, weight: Floats, span: tuple[int, int], k2: float, sums: Floats
+) -> float:
+    """Fill the sums (4,) of one recording, whose rows are a `span`; log|I + Pᵀ W P/κ²|."""
+    count = len(columns)
+    factor = k2 * np.eye(count)
+    of_force, of_measured, of_rest = np.zeros(count), np.zeros(count), np.zeros(count)
+    sums[:] = 0.0
+    for row in range(*span):
+        by_force, by_measured = weight[row] * u[row], weight[row] * measured[row]
+        sums[0] += by_force * u[row]
+        sums[1] += by_force * measured[row]
+        sums[2] += by_measured * measured[row]
+        _add_row(weight[row], u[row], columns, row, of_force)
+        _add_row(weight[row], measured[row], columns, row, of_measured)
+        for column in range(count):
+            _add_row(weight[row], columns[column, row], columns, row, factor[column])
+    log_determinant = _factorise(factor) - count * np.log(k2)
+    _whiten(factor, of_force)
+    _whiten(factor, of_measured)
+    sums[0] -= (of_force**2).sum()
+    sums[1] -= (of_force * of_measured).sum()
+    sums[2] -= (of_measured**2).sum()
+    share = sums[1] / max(sums[0], _NONE)
+    for row in range(*span):
+        rest = measured[row] - share * u[row]
+        sums[3] += weight[row] * rest * rest
+        _add_row(weight[row], rest, columns, row, of_rest)
+    _whiten(factor, of_rest)
+    sums[3] -= (of_rest**2).sum()
+    return float(log_determinant)
+
+
 @compiled(
     "void(float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], int64[::1], float64[:, ::1], float64[:, ::1], "
     "float64[:, :, :, ::1], float64[:, ::1])"
@@ -169,53 +210,18 @@ def curve_sums(
     end at the `edges`; `ratio` is η/κ, `level` κ (points, sets).
     """
     points, sets = ratio.shape
-    count, rows = columns.shape
-    factor, weight = np.empty((count, count)), np.empty(rows)
-    of_force, of_measured, of_rest = np.empty(count), np.empty(count), np.empty(count)
+    weight, of_recording = np.empty(columns.shape[1]), np.empty(4)
     for point in range(points):
-        u = force[point]
         for number in range(sets):
-            k2, ratio2, total = level[point, number] ** 2, ratio[point, number] ** 2, 0.0
-            for row in range(rows):
-                larger = 1.0 + ratio2 * size[row]
-                weight[row] = 1.0 / larger
-                total += np.log(larger)
+            larger = 1.0 + ratio[point, number] ** 2 * size
+            weight[:] = 1.0 / larger
+            log_determinant[point, number] = np.log(larger).sum()
             for recording in range(len(edges) - 1):
-                uu = uy = yy = rest2 = 0.0
-                of_force[:], of_measured[:], of_rest[:], factor[:] = 0.0, 0.0, 0.0, 0.0
-                for row in range(edges[recording], edges[recording + 1]):
-                    by_force, by_measured = weight[row] * u[row], weight[row] * measured[row]
-                    uu += by_force * u[row]
-                    uy += by_force * measured[row]
-                    yy += by_measured * measured[row]
-                    for column in range(count):
-                        of_force[column] += by_force * columns[column, row]
-                        of_measured[column] += by_measured * columns[column, row]
-                        weighed = weight[row] * columns[column, row]
-                        for other in range(column + 1):
-                            factor[column, other] += weighed * columns[other, row]
-                for column in range(count):
-                    factor[column, column] += k2
-                total += _factorise(factor) - count * np.log(k2)
-                _whiten(factor, of_force)
-                _whiten(factor, of_measured)
-                for column in range(count):
-                    uu -= of_force[column] ** 2
-                    uy -= of_force[column] * of_measured[column]
-                    yy -= of_measured[column] ** 2
-                share = uy / max(uu, _NONE)
-                for row in range(edges[recording], edges[recording + 1]):
-                    rest = measured[row] - share * u[row]
-                    weighed = weight[row] * rest
-                    rest2 += weighed * rest
-                    for column in range(count):
-                        of_rest[column] += weighed * columns[column, row]
-                _whiten(factor, of_rest)
-                for column in range(count):
-                    rest2 -= of_rest[column] ** 2
-                sums[0, point, number, recording], sums[1, point, number, recording] = uu, uy
-                sums[2, point, number, recording], sums[3, point, number, recording] = yy, rest2
-            log_determinant[point, number] = total
+                span = edges[recording], edges[recording + 1]
+                log_determinant[point, number] += _recording_sums(
+                    force[point], measured, columns, weight, span, level[point, number] ** 2, of_recording
+                )
+                sums[:, point, number, recording] = of_recording
 
 
 @compiled()

@@ -40,7 +40,7 @@ from underskin.recordings.curve_course import is_one_sided
 from underskin.recordings.modulus import of_compression
 from underskin.units import Floats, Indices, Mask, to_si
 
-_STEP = 1e-5  # of a logarithm or of a prior's width
+_STEP = 3e-6  # of a logarithm or of a prior's width
 _AT_ONCE = 1_000_000  # samples of all points
 
 
