@@ -9,7 +9,7 @@ or lie far behind the best are pruned (`FittingProblem.explain`).
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -317,7 +317,6 @@ class Request:
     nuisances: FitPoint | None = None  # starting values of the nuisances, if not the parent's
     initial: Explanation | None = None  # starting values of all parameters
     rival: Explanation | None = None  # what a fit must gain on, if not on the parent's
-    must_lead: bool = False  # fitted only where a start promises to be the best so far
     never_pruned: bool = False  # fitted to convergence and explained, however far behind and even without gain
 
     @property
@@ -483,11 +482,12 @@ def _fitted(fitter: Fitter, starts: Points, request: Request, best: float) -> tu
     # Of curves every pair is tried, and begins from a single mechanism.
     pruned = not (request.never_pruned or len(request.names) <= (1 if fitter.lines.curves else 0))
 
-    def target(at: Evaluated, margin: float = PRUNE_NATS if pruned else np.inf) -> Floats:
+    def target(at: Evaluated) -> Floats:
+        margin = PRUNE_NATS if pruned else np.inf
         return np.full(len(at), min(cost_to_beat, min(best, float(at.cost.min())) + margin))
 
     near = np.inf if request.parent is None else request.parent.best.cost + PRUNE_NATS
-    improved = fitter.improve(starts, partial(target, margin=0.0) if request.must_lead else target, near)
+    improved = fitter.improve(starts, target, near)
     leading = improved.best
     supported = leading.cost[0] < target(leading)[0]
     return improved.points, laplace_at(fitter, leading) if supported else None

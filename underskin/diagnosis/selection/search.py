@@ -170,15 +170,12 @@ class _Sets:
 
     def _refit_from_prior(self, pairs: Sequence[Request]) -> None:
         """Fit pairs of curves from starts over the parameters of both, where the best set leaves something for that to
-        matter and they may lead; a fit that is better takes the place of the one from a single."""
+        matter; a fit that is better takes the place of the one from a single."""
         best = min(self.explanations.values(), key=lambda fitted: fitted.best.cost)
         if smooth_error_gain(best) < _SMOOTH_ERROR:
             return
         self._improve(
-            [
-                Request(pair.names, nuisances=None if Adhesion.name in pair.names else best.point, must_lead=True)
-                for pair in pairs
-            ]
+            [Request(pair.names, nuisances=None if Adhesion.name in pair.names else best.point) for pair in pairs]
         )
 
     def _refit_smaller(self) -> None:
