@@ -486,7 +486,8 @@ def _fitted(fitter: Fitter, starts: Points, request: Request, best: float) -> tu
         margin = PRUNE_NATS if pruned else np.inf
         return np.full(len(at), min(cost_to_beat, min(best, float(at.cost.min())) + margin))
 
-    near = np.inf if request.parent is None else request.parent.best.cost + PRUNE_NATS
+    compared = request.parent or request.rival
+    near = np.inf if compared is None else compared.best.cost + PRUNE_NATS
     improved = fitter.improve(starts, target, near)
     leading = improved.best
     supported = leading.cost[0] < target(leading)[0]
