@@ -56,7 +56,7 @@ def _better(page: Page) -> None:
 
 
 def _adopted(page: Page) -> None:
-    page.get_by_role("button", name="Adopt this model").click()
+    page.get_by_role("button", name="Adopt contact resonance of the rig").click()
     page.wait_for_url("**/skins/example?model=adopted")
     drawn(page, "history")
     page.evaluate("scrollTo(0, 0)")

@@ -29,7 +29,7 @@ from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.reporting.wording import planned_columns
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES
+from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES, followed
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -105,6 +105,7 @@ def diagnosis(
         in_force=adopted is not None and adopted is of_skin[0] and adopted.model_withdrawn_at is None,
         may_be_adopted=of_campaign and report is not None and not_adopted is None,
         settled=report is not None and _settled(report),
+        adopts="" if report is None else _adopted_in_words(report),
         open=of_campaign and report is not None and "curve" not in figures and is_undecided(report),
         limit_fields=FIELDS,
         planned=planned,
@@ -239,6 +240,17 @@ def _settled(report: Mapping[str, Any]) -> bool:
     law = report.get("unnamed")
     share = 1.0 if law is None else law["probability"]
     return report["verdict"] in ("explained", "unexplained") and report["probability"] * share >= EXPLAINED
+
+
+def _adopted_in_words(report: Mapping[str, Any]) -> str:
+    """What an adopted report adds to the paper's model: "contact resonance of the rig"."""
+    law = ["the law over " + followed(report["unnamed"]["axis"])] if report.get("unnamed") else []
+    mechanisms = [
+        in_words([mechanism["name"]])
+        + (f" of the {mechanism['of']}" if mechanism.get("of") in ("rig", "chain") else "")
+        for mechanism in report["mechanisms"]
+    ]
+    return " and ".join([*mechanisms, *law]) or "the paper's model"
 
 
 def _stored(connection: Connection, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any] | None, dict[str, str]]:

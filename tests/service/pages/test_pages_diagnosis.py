@@ -41,14 +41,14 @@ def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server)
     sections = [name for name in headings if name in SECTIONS]
     assert sections == SECTIONS
     assert page.locator(".first").inner_text().startswith("Contact resonance, tip mass")
-    page.get_by_role("button", name="Adopt this model").click()
+    page.get_by_role("button", name="Adopt contact resonance of the rig").click()
     page.wait_for_url("**/skins/resonating?model=adopted")
     visitor.drawn(2)
     assert "by the adopted model" in page.locator("#figure-history figcaption").inner_text()
     assert page.get_by_label("d33 by").input_value() == "adopted"
     page.get_by_role("link", name="version 1").click()
     page.get_by_text("in force for skin resonating", exact=True).wait_for()
-    assert page.get_by_role("button", name="Adopt this model").count() == 0
+    assert page.get_by_role("button", name="Adopt contact resonance of the rig").count() == 0
 
 
 def test_paper_report_nothing_press_saved_file(visitor: Visit, place: str, downloads: Path) -> None:

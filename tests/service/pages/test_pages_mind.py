@@ -131,7 +131,7 @@ def test_excluded_recording_takes_model(visitor: Visit, server: Server) -> None:
     campaign_id, diagnosis_id = diagnosed(server, resonant("explained"), report(), "adopts")
     visitor.go(f"/diagnoses/{diagnosis_id}")
     page.get_by_role("link", name="Adopt", exact=True).click()
-    page.get_by_role("button", name="Adopt this model").click()
+    page.get_by_role("button", name="Adopt contact resonance of the rig").click()
     page.wait_for_url("**/skins/adopts?model=adopted")
     assert "In force: contact resonance" in page.get_by_role("region", name="Adopted model").inner_text()
     visitor.go(f"/campaigns/{campaign_id}")
@@ -146,7 +146,7 @@ def test_excluded_recording_takes_model(visitor: Visit, server: Server) -> None:
     assert "by the paper's model" in page.locator("#figure-history figcaption").inner_text()
     visitor.go(f"/diagnoses/{diagnosis_id}")
     assert "recordings were excluded since" in page.get_by_role("status").first.inner_text()
-    assert page.get_by_role("button", name="Adopt this model").count() == 0
+    assert page.get_by_role("button", name="Adopt contact resonance of the rig").count() == 0
 
 
 def test_ambiguous_diagnosis_names_rivals_settle(visitor: Visit, server: Server) -> None:

@@ -53,10 +53,10 @@ def test_start_history_adopted_model(patient: Visit, diagnosing: Server) -> None
     page.wait_for_url("**/campaigns/*")
     patient.drawn(4)
     page.get_by_role("button", name="Diagnose").click()
-    page.get_by_role("button", name="Adopt this model").wait_for()
+    page.get_by_role("button", name="Adopt contact resonance of the rig").wait_for()
     patient.drawn(4)
     patient.require_accessible()
-    page.get_by_role("button", name="Adopt this model").click()
+    page.get_by_role("button", name="Adopt contact resonance of the rig").click()
 
     page.wait_for_url(f"**/skins/{SKIN}?model=adopted")
     patient.drawn(2)
