@@ -144,7 +144,9 @@ class ReportD33(BaseModel):
         description="The same without what the declared values may be off by: to compare sensors or dates.",
     )
     quotable: bool = Field(description="Whether one answer stands, fits to the noise, and nothing hidden moves d33.")
-    why_not: str | None = Field(default=None, description="Why it is not to be quoted; none of several campaigns is.")
+    why_not: str | None = Field(
+        default=None, description="Why it is not to be quoted, as d33 of several campaigns never is."
+    )
     per_sensor: list[SensorLevel] | None = Field(
         default=None, description="Of several campaigns: one entry a campaign and sensor."
     )

@@ -167,7 +167,7 @@ def test_a_pull_off_shows_whatever_the_drift(rises: float) -> None:
     depth = ways(-3.0, 0.9, -3.0, samples=1500)
     back, load = np.arange(len(depth)) >= 1500, hertz(np.array(0.9))
     strands = np.where(depth > -0.24, (0.9 - depth) / 1.14, np.exp((depth + 0.24) / 0.06))
-    force = pressed(depth, noise=2e-3 * load) - np.where(back, 0.25 * load * np.clip(strands, 0.0, 1.0), 0.0)
+    force = pressed(depth, noise=2e-3 * float(load)) - np.where(back, 0.25 * load * np.clip(strands, 0.0, 1.0), 0.0)
     force += rises * load * np.arange(len(depth)) / len(depth)
     (event,) = contact_events(campaign(depth, force).curves[0])
     assert event.arguments["events"]["pull_off"]["displacement_mm"] == pytest.approx(-0.24, abs=0.01)

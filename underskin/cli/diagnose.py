@@ -49,7 +49,10 @@ def refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_d
 
 def in_words(document: Mapping[str, Any]) -> str:
     """A report's verdict and headline, and on the next line its statement."""
-    return f"{document['verdict']}: {document['headline']}\n{document['statement']}"
+    from underskin.diagnosis.reporting.headline import first_and_rest
+
+    first, _ = first_and_rest(document)
+    return f"{document['verdict']}: {first}.\n{document['statement']}"
 
 
 def write_report(document: dict[str, Any], path: Path) -> None:

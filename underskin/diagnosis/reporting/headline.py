@@ -44,11 +44,10 @@ def within_words(parts: Iterable[str]) -> str:
 
 
 def _parts(report: Document) -> Iterator[str]:
-    slips = [entry for entry in report["findings"] if entry["code"] in SLIPS]
-    if slips:
-        where = f" ({slips[0]['recording']})" if slips[0]["recording"] else ""
-        yield f"{finding(slips[0]['code'])}{where}"
-    yield next(answer for answer in _answers(report) if len(answer.split()) <= _WORDS)
+    slips = [entry for entry in report.get("findings", ()) if entry["code"] in SLIPS]
+    slip = finding(slips[0]["code"]) if slips else ""
+    yield slip
+    yield next(answer for answer in _answers(report) if len(f"{slip} {answer}".split()) <= _WORDS)
     yield _to_quote(report)
     planned = report.get("next_experiment")
     if report["verdict"] == "ambiguous" and planned and planned["recordings"]:
@@ -65,12 +64,16 @@ def _answers(report: Document) -> Iterator[str]:
     if verdict == "insufficient_data":
         yield "these recordings say too little"
     elif verdict == "no_mismatch":
-        rivals = [in_words(rival["mechanisms"]) for rival in report["alternatives"] if rival["probability"] > NAMED]
-        if report["probability"] < EXPLAINED and rivals:
+        rivals = [in_words(rival["mechanisms"]) for rival in _rivals(report)]
+        if (report["probability"] or 0.0) < EXPLAINED and rivals:
             yield f"nothing may be missing ({probability}), or {' or '.join(rivals)}"
-        yield "nothing is missing" if report["probability"] >= EXPLAINED else f"nothing may be missing ({probability})"
+        yield (
+            "nothing is missing"
+            if (report["probability"] or 0.0) >= EXPLAINED
+            else f"nothing may be missing ({probability})"
+        )
     elif verdict == "unexplained":
-        law = report["unnamed"]
+        law = report.get("unnamed")
         if law is not None:
             change = f"a change of {acted_on(law['acts_on'], law['axis'])} over {followed(law['axis'])}"
             yield f"no known mechanism describes this ({probability}): {change}"
@@ -79,21 +82,30 @@ def _answers(report: Document) -> Iterator[str]:
         few = mechanisms if len(mechanisms) <= MOST_QUOTED else ()
         yield " and ".join(map(_with_strength, few)) or names
         yield names
+        count = "a mechanism is" if len(mechanisms) == 1 else f"{len(mechanisms)} mechanisms are"
+        yield f"{count} missing ({probability})"
     else:
-        certain = [group for group in report["presence"] if group["probability"] >= EXPLAINED]
+        certain = [group for group in report.get("presence", ()) if group["probability"] >= EXPLAINED]
         for group in certain:
             either = " or ".join(in_words([name]) for name in group["mechanisms"])
             yield f"{either} ({in_percent(group['probability'])}), not settled"
-        remaining = f"{1 + sum(rival['probability'] > NAMED for rival in report['alternatives'])} explanations remain"
-        yield f"{remaining}, {names or 'nothing missing'} leads with {probability}"
+        remaining = (
+            "many explanations remain" if not _rivals(report) else f"{1 + len(_rivals(report))} explanations remain"
+        )
+        yield f"{remaining}, the best: {names or 'nothing missing'} ({probability})"
         yield remaining
+
+
+def _rivals(report: Document) -> list[Document]:
+    return [rival for rival in report.get("alternatives", ()) if rival["probability"] > NAMED]
 
 
 def _with_strength(mechanism: Document) -> str:
     """A mechanism with where it acts and its first parameter: "adhesion, work of adhesion 148 mJ/m² (145–151)"."""
     of = ", ".join((mechanism.get("scope") or {}).get("sensors") or ())
     name = in_words([mechanism["name"]]) + (f" of {of}" if of else "")
-    return ", ".join([name, *map(_value, mechanism["parameters"][:1])])
+    known = [parameter for parameter in mechanism["parameters"][:1] if parameter["value"] is not None]
+    return ", ".join([name, *map(_value, known)])
 
 
 def _value(parameter: Document) -> str:
@@ -101,14 +113,16 @@ def _value(parameter: Document) -> str:
     called = parameter["name"].replace("_", " ")
     value, low, high = (number(parameter[end], _DIGITS) for end in ("value", "low", "high"))
     size = f"{value} {unit(parameter['unit'])}".rstrip()
-    return f"{called} at or beyond {size}" if parameter.get("at_bound") else f"{called} {size} ({low}–{high})"
+    if parameter.get("at_bound"):
+        return f"{called} at or beyond {size}"
+    return f"{called} {size} ({low}{' to ' if parameter['low'] < 0 else '–'}{high})"
 
 
 def _to_quote(report: Document) -> str:
     """d33 or E with its interval; that there is none to quote where the verdict may be read as if there were."""
-    d33, modulus = report["d33"], ((report["fit"] or {}).get("after") or {}).get("youngs_modulus")
+    d33, modulus = report.get("d33"), ((report.get("fit") or {}).get("after") or {}).get("youngs_modulus")
     if d33 is not None and d33.get("value") is not None:
-        return _value({**d33, "name": "d33"}) if d33["quotable"] else "no d33 to quote"
+        return _value({**d33, "name": "d33"}) if d33.get("quotable", True) else "no d33 to quote"
     if modulus is None or modulus.get("at_bound"):
         return ""
     return _value({**modulus, "name": "E"})

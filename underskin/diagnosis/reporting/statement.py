@@ -156,7 +156,7 @@ def answer_clauses(
         which = "known mechanisms" if all_tried else "mechanisms that were tried"
         return [f"something is missing that none of the {which} describes (probability {percent})"]
     others = sum(answer.probability for answer in answers[1:]) - sum(answer.probability for answer in rivals)
-    further = f", or others, {in_percent(others)} together" if others > NAMED else ""
+    further = f", or other sets, {in_percent(others)} in total" if others > NAMED else ""
     listed += further if listed else ""
     by_sets = f"the sets of mechanisms are: {_answers_in_words([leader, *rivals])}{further}" if rivals else ""
     if verdict == "explained":
@@ -184,7 +184,7 @@ def answer_clauses(
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
         total = in_percent(sum(answer.probability for answer in answers if answer.kind == leader.kind))
         lead = f"known mechanisms explain this ({total} together), best {in_words(leader.names)} ({percent})"
-    all_answers = f"over all answers together: {common}" if common else ""
+    all_answers = f"in most of the remaining answers: {common}" if common else ""
     return [f"{lead}, but {', and '.join(but)}", all_answers, misfit, _law(mentioned)]
 
 

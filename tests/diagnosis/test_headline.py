@@ -1,0 +1,41 @@
+"""The headline of reports as they are kept, old ones included: at most 20 words, with the answer and its number."""
+
+from typing import Any
+
+import pytest
+
+from underskin.diagnosis.reporting.headline import first_and_rest
+
+D33 = {"name": "d33", "unit": "pC/N", "value": -30.0, "low": -31.0, "high": -29.0}
+DELAY = {"name": "delay", "unit": "µs", "value": 14.2, "low": 13.4, "high": 15.1}
+SIGN = [{"code": "sign_flipped", "recording": "r1"}]
+
+
+def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
+    return {"name": name, "probability": 0.97, "parameters": list(parameters)}
+
+
+@pytest.mark.parametrize(
+    ("kept", "headline"),
+    [
+        ({"d33": D33}, "Nothing is missing; d33 −30 pC/N (−31 to −29)"),  # kept before reports had `quotable`
+        ({"d33": {"quotable": False}}, "Nothing is missing"),
+        ({"probability": 0.6, "alternatives": [{"mechanisms": ["adhesion"], "probability": 0.3}]},
+         "Nothing may be missing (60 %), or adhesion"),
+        ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", DELAY)]},
+         "Timing delay, delay 14.2 µs (13.4–15.1)"),
+        ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", {**DELAY, "at_bound": "high"})]},
+         "Timing delay, delay at or beyond 14.2 µs"),
+        ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", {**DELAY, "value": None})]}, "Timing delay"),
+        ({"verdict": "explained", "mechanisms": 12 * [mechanism("timing_delay")]}, "12 mechanisms are missing (97 %)"),
+        ({"verdict": "ambiguous", "findings": SIGN},
+         "Sign reversed; many explanations remain, the best: nothing missing (97 %)"),
+        ({"verdict": "unexplained"}, "Something is missing that no known mechanism describes (97 %)"),
+        ({"verdict": "insufficient_data", "probability": None}, "These recordings say too little"),
+        ({"campaigns": ["a", "b"], "statement": "Both agree. No more."}, "Both agree"),
+        ({"headline": "Adhesion."}, "Adhesion"),
+    ],
+)  # fmt: skip
+def test_a_headline_of_a_kept_report(kept: dict[str, Any], headline: str) -> None:
+    report = {"verdict": "no_mismatch", "probability": 0.97, "statement": "S.", "mechanisms": [], **kept}
+    assert first_and_rest(report)[0] == headline
