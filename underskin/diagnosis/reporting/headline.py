@@ -29,7 +29,8 @@ def first_and_rest(report: Document) -> tuple[str, str]:
     """The headline of a report without its full stop, and its statement; of a report on several campaigns that was kept
     without a headline, the first sentence of the statement and the others."""
     if report.get("headline") or "campaigns" not in report:
-        return (report.get("headline") or headline(report)).rstrip("."), report["statement"]
+        first = report.get("headline") or headline(report)
+        return first.rstrip("."), report["statement"] if report["statement"] != first else ""
     first, _, rest = report["statement"].partition(". ")
     return first.rstrip("."), rest
 
@@ -62,6 +63,7 @@ def _answers(report: Document) -> Iterator[str]:
     mechanisms = report["mechanisms"]
     names = in_words([mechanism["name"] for mechanism in mechanisms])
     if verdict == "insufficient_data":
+        yield report["statement"].partition(". ")[0].rstrip(".")
         yield "these recordings say too little"
     elif verdict == "no_mismatch":
         rivals = [in_words(rival["mechanisms"]) for rival in _rivals(report)]
