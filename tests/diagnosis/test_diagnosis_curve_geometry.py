@@ -142,6 +142,17 @@ def test_a_wrong_thickness_is_a_rival_of_stiffening(true_mm: float, declared_mm:
     assert any(finding.code == "thickness_differs" for finding in report.findings)
 
 
+def test_a_thickness_declared_too_small_beside_a_compressible_layer() -> None:
+    """A layer that yields more than the declared one looks compressible: a mechanism that needs the declared thickness
+    is not compared with a layer of another thickness, and the true one is stated."""
+    depth = ways(-0.05, 0.25, samples=400)[:400]
+    force = pressed(depth, bonded_layer(1.0, 2.0), noise=5e-3)
+    measured = campaign(depth, force, timed=False, skin={"thickness_mm": 0.6})
+    report = diagnosed(measured, "compressible_layer")
+    assert "compressible layer" in report.headline
+    assert any(finding.code == "thickness_differs" for finding in report.findings)
+
+
 def test_a_thick_sample_declared_thin_is_told() -> None:
     """Hertz's law holds; that the declared layer was tried, and does not show, is told."""
     depth = ways(-0.05, 0.2, samples=400)

@@ -103,11 +103,13 @@ def _rivals(report: Document) -> list[Document]:
 
 
 def _with_strength(mechanism: Document) -> str:
-    """A mechanism with where it acts and its first parameter: "adhesion, work of adhesion 148 mJ/m² (145–151)"."""
+    """A mechanism with where it acts and its first parameter whose interval excludes 0: "adhesion, work of adhesion
+    148 mJ/m² (145–151)"."""
     of = ", ".join((mechanism.get("scope") or {}).get("sensors") or ())
     name = in_words([mechanism["name"]]) + (f" of {of}" if of else "")
-    known = [parameter for parameter in mechanism["parameters"][:1] if parameter["value"] is not None]
-    return ", ".join([name, *map(_value, known)])
+    known = [parameter for parameter in mechanism["parameters"] if parameter["value"] is not None]
+    sizes = [parameter for parameter in known if parameter["low"] > 0 or parameter["high"] < 0]
+    return ", ".join([name, *map(_value, (sizes or known)[:1])])
 
 
 def _value(parameter: Document) -> str:

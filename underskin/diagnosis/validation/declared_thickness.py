@@ -58,7 +58,12 @@ def _of_any_thickness(campaign: Campaign, problem: FittingProblem, stated: Seque
     mechanisms.bind(undeclared, problem.table, "indentation")
     lines = replace(curve_lines(undeclared, "indentation"), mechanisms=mechanisms)
     free = FittingProblem(lines, problem.table, problem.other_kinds)
-    others = {name for name in stated if name not in (_LAYER, StrainStiffening.name)}
+    others = {
+        name
+        for name in stated
+        if name not in (_LAYER, StrainStiffening.name)
+        and mechanisms[name].unsupported(undeclared, "indentation") is None
+    }
     sets = dict.fromkeys(tuple(name for name in mechanisms.named if name in {_LAYER, *more}) for more in ((), others))
     return [fit for names in sets if (fit := free.explain(Request(names))) is not None]
 
