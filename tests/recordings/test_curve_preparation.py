@@ -30,6 +30,15 @@ def only(read: Campaign) -> Finding:
     return finding
 
 
+@pytest.mark.parametrize("most", [0.5, 1.0])
+def test_a_force_that_is_held_or_beyond_its_range_is_no_air(most: float) -> None:
+    """Recorded from rest at a force of 0: where the force then stays while the travel goes on, no sign is turned."""
+    depth = np.concatenate([np.zeros(20), np.linspace(0.0, 0.25, 200), np.linspace(0.25, 0.3, 300)])
+    held = np.minimum(hertz(depth), most * hertz(np.array(0.25)))
+    noise = np.random.default_rng(5).normal(0.0, 1e-3 * held.max(), (2, len(depth)))
+    assert falling(held + noise[0], depth + 1e-4 * noise[1], sphere=True) == ()
+
+
 @pytest.mark.parametrize("force", [1, -1])
 @pytest.mark.parametrize("travel", [1, -1])
 @pytest.mark.parametrize("start_mm", [0.0, 0.02])

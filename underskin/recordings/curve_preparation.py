@@ -146,8 +146,12 @@ def _relative_sign(force: Floats, travel: Floats) -> int:
 
 
 def _deep_side(force: Floats, travel: Floats, turns: Indices, relative_sign: int) -> int:
-    """1 where the travel is largest at the deep end, -1 where it is least there, 0 where neither end is stiffer."""
+    """1 where the travel is largest at the deep end, -1 where it is least there, 0 where neither end is stiffer.
+
+    Nor where the force reads 0 at the stiffer end alone: at the other one it is then held, or beyond the cell's range.
+    """
     stiffest = {1: (0.0, 0.0), -1: (0.0, 0.0)}
+    largest = {1: 0.0, -1: 0.0}
     legs = list(zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True))
     near = _NEAR * float(np.ptp(travel))
     for index, turn in enumerate(turns.tolist()):
@@ -155,6 +159,7 @@ def _deep_side(force: Floats, travel: Floats, turns: Indices, relative_sign: int
         first, last = next((leg for leg in adjacent if leg[0] != leg[1]), (turn, turn))
         other = last if turn == first else first
         side = 1 if travel[turn] > travel[other] else -1
+        largest[side] = max(largest[side], abs(float(force[turn])))
         slopes = np.array([_stiffness(force, travel, turn, leg, near) for leg in adjacent])
         error = float(np.linalg.norm(slopes[:, 1])) / len(slopes)
         stiffest[side] = max(stiffest[side], (float(slopes[:, 0].mean()) * relative_sign, error))
@@ -162,7 +167,8 @@ def _deep_side(force: Floats, travel: Floats, turns: Indices, relative_sign: int
     error = max(error, roughness(force) / np.sqrt(_NEAR * len(force)) / near)
     if high < _BEYOND_NOISE * error or high < _STIFFER * low:
         return 0
-    return max(stiffest, key=lambda side: stiffest[side])
+    deep = max(stiffest, key=lambda side: stiffest[side])
+    return deep if largest[-deep] <= (zero := _BEYOND_NOISE * roughness(force)) or largest[deep] > zero else 0
 
 
 def _stiffness(force: Floats, travel: Floats, turn: int, leg: tuple[int, int], near: float) -> tuple[float, float]:

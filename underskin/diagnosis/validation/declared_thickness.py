@@ -1,7 +1,7 @@
 """The declared thickness of an indented sample against the one that its curves show.
 
 A layer of another thickness is a rival like a mechanism more: its thickness is a parameter, as where none is declared,
-with the prior of one mechanism. It is reported where that is not clearly less probable than the stated answer and its 95 %
+with the prior of one mechanism. It is reported where that is not clearly less probable than the answer and its 95 %
 interval excludes the declared value: a wrong thickness and a sample that stiffens with strain look much alike. That the
 declared layer's law was tried, and is clearly less probable, is reported as well.
 """
