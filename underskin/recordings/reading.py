@@ -149,7 +149,7 @@ def _by_guess(contents: Contents, name: str) -> Reading:
     """
     document = rig_guess.of_contents(contents)
     lacking, unclear = rig_guess.missing(document), rig_guess.unclear(contents)
-    doubt = f"more than one column may be {', '.join(unclear)}" if unclear else ""
+    doubt = f"more than one column or property may be {', '.join(unclear)}" if unclear else ""
     if lacking:
         doubt = f"the file does not say {', '.join(lacking)}"
     if not doubt:
