@@ -166,6 +166,18 @@ def test_group_not_foretell_told_beside_error(worst: float, told: bool) -> None:
     assert ("the largest on sensor: a3 (31.3 %), which the others do not foretell" in shown) == told
 
 
+@pytest.mark.parametrize("answered", [False, True])
+def test_modulus_of_the_plain_law_is_compared_with_one_that_is_there(answered: bool) -> None:
+    """Where no modulus over the answers is stated, none is spoken of."""
+    errors = {"heldout_rmse_percent": 17.2, "rmse_percent": 1.8}
+    modulus = {"youngs_modulus": {"unit": "MPa", "value": 2.25, "low": 2.15, "high": 2.35}}
+    after = {**errors, **(modulus if answered else {})}
+    fit = {"before": {**errors, **modulus}, "after": after, "noise_floor_percent": 2.4, "groups": []}
+    shown = texts(body_of({**EMPTY, "verdict": "explained", "fit": fit}, {}))
+    assert "With the plain law alone, weighed by the noise" in shown
+    assert ("to compare with the first" in shown) == answered
+
+
 @pytest.mark.parametrize(
     ("verdict", "probability", "decided"),
     [("explained", 0.97, True), ("no_mismatch", 0.6, False), ("ambiguous", 0.5, False)],

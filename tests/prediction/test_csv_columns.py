@@ -126,3 +126,11 @@ def test_a_diameter_is_halved_and_that_is_told() -> None:
     found = from_csv(b"Indenter diameter [mm]\n8\n", ("indenter_radius_mm",))
     assert found.fields["indenter_radius_mm"].numbers("indenter_radius_mm") == [4.0]
     assert found.notes == ["'Indenter diameter [mm]' is halved"]
+
+
+@pytest.mark.parametrize("row", ['"0,5"', '"a,b"'])
+def test_separators_in_quotes_part_no_cells(row: str) -> None:
+    """A row of one quoted cell under two headings is too short, though the cell holds a separator."""
+    with pytest.raises(CsvError, match="1 on line 2, 2 in the header"):
+        numbers(f"preload_n,frf_pc_per_n\n{row}\n1,7.5\n")
+    assert numbers("preload_n,frf_pc_per_n,\n0.5,1200\n1,7.5,,\n") == [[0.5, 1.0], [1200.0, 7.5]]

@@ -1,6 +1,7 @@
 """Exports as twelve instruments write them in five locales: read without a rig description where the file says enough,
 else refused by what it does not say; the numbers, names and units are those that were written."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import pytest
 from tests.recordings.contents_of_files import contents
 from underskin.errors import FileError
 from underskin.recordings import read_file
-from underskin.recordings.campaign import COLUMNS, Campaign
+from underskin.recordings.campaign import COLUMNS, Campaign, IndentationRecording
 from underskin.recordings.readers.unit_labels import unit
 
 
@@ -226,7 +227,7 @@ def two_travels(locale: Locale) -> Export:
     columns = [*curve(locale), (f"{locale['travel']} 2", "mm", 0.9 * TRAVEL)]
     above = [f"{locale['radius']} [mm]: {locale.number(2.5)}", ""]
     lines = [*above, locale.joined(*bracketed(columns)), *locale.rows(*numbers(columns))]
-    return Export(lines, columns, lacks="more than one column may be displacement_mm")
+    return Export(lines, columns, lacks="more than one column or property may be displacement_mm")
 
 
 LAYOUTS: tuple[Callable[[Locale], Export], ...] = (
@@ -265,3 +266,29 @@ def test_exports(layout: Callable[[Locale], Export], name: str) -> None:
     assert reading.problems == []
     assert reading.warnings[0].startswith("read without a rig description, by headings and units: ")
     assert_recorded(reading.campaign, export.fields)
+
+
+@pytest.mark.parametrize(
+    ("above", "radius_mm"),
+    [
+        (["Probe radius [mm],2"], 2.0),
+        (["Probenradius [mm],9", "Probendurchmesser [mm],18", "Kugelradius [mm],2"], 2.0),
+        (["Radius der Probe [mm],9", "Tip radius [mm],2"], 2.0),
+        (["Dish radius [mm],35", "Indenter radius [mm],2"], 2.0),
+        (["Dish radius [mm],35", "Tip radius [mm],2"], None),
+        (["Fillet radius [mm],0.5", "Probe radius [mm],2"], None),
+    ],
+)
+def test_radius_among_properties(above: list[str], radius_mm: float | None) -> None:
+    """The sphere's radius is the only one of no sample, or the one called so; of two the file is refused."""
+    columns = curve(LOCALES["en"])
+    lines = [*above, "", ",".join(bracketed(columns)), *LOCALES["en"].rows(*numbers(columns))]
+    data = "\n".join(lines).encode()
+    if radius_mm is None:
+        names = " or ".join(repr(line.partition(",")[0]) for line in above)
+        with pytest.raises(FileError, match=re.escape(f"column or property may be indenter_radius_mm ({names})")):
+            read_file(data, "run.csv")
+        return
+    (recording,) = read_file(data, "run.csv").campaign.recordings
+    assert isinstance(recording, IndentationRecording)
+    assert recording.indenter_radius_mm == radius_mm

@@ -22,6 +22,7 @@ from underskin.recordings.frf.flat_zone import (
     lower_half,
     mains_lines,
     roll_off,
+    without_chain_phase,
 )
 from underskin.recordings.frf.line_choice import bin_of, edges_over, usable_lines
 from underskin.recordings.frf.spectra import Frf, stacked
@@ -218,6 +219,19 @@ FILTERS: dict[str, Callable[[Floats], Any]] = {
     "low-pass": lambda f: 1 / (1 + 1j * f / 20),
     "Butterworth's low-pass": lambda f: 1 / (1 - (f / 50) ** 2 + 1.41421356j * f / 50),
 }
+
+
+def test_line_at_0_hz_leaves_the_phase_of_the_chain_alone() -> None:
+    """Two poles of a high-pass are found, and the polarity seen, also from spectra that begin at 0 Hz."""
+    grid = np.concatenate([[0.0], np.geomspace(1, 400, 120)])
+    x = 1j * grid / 40
+    random = np.random.default_rng(0)
+    noise = 0.003 * (random.normal(size=(4, len(grid))) + 1j * random.normal(size=(4, len(grid))))
+    frfs = [Frf(grid, row) for row in -30e-12 * x**2 / (x**2 + np.sqrt(2) * x + 1) * (1 + noise)]
+    (stack,), delay = without_chain_phase(stacked(frfs), [(3.0, 1.0)] * 4)
+    assert delay == 0
+    assert np.isfinite(stack.values).all()
+    assert np.abs(np.angle(-stack.values[:, 1:])).max() < 0.1
 
 
 @pytest.mark.parametrize("name", FILTERS)

@@ -1,5 +1,6 @@
 """Force and charge of one recording in two files, which the rig description joins by their names."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from tests.support.instrument_files import COMMON
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import Reading, read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.channels import Block, Channel, Contents
+from underskin.recordings.joined_files import joined
 
 RATE = 500.0
 SAMPLES = np.arange(200)
@@ -68,18 +71,66 @@ def test_files_without_a_clock_have_the_same_rows(tmp_path: Path) -> None:
         read_file(tmp_path / "a_force.csv", "a_force.csv", given)
 
 
+def lvm(folder: Path, name: str, values: np.ndarray, label: str, began: str) -> None:
+    head = "LabVIEW Measurement\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\n\nChannels\t1\n"
+    head += f"Date\t2026/05/04\nTime\t{began}\nY_Unit_Label\t{label}\n"
+    head += f"Delta_X\t{1 / RATE}\n***End_of_Header***\nX_Value\t{name.title()}\n"
+    (folder / f"a_{name}.lvm").write_text(head + "".join(f"\t{value:.6f}\n" for value in values))
+
+
 def test_starts_that_the_files_state_align_them(tmp_path: Path) -> None:
     """Of LVM files the header says when each began."""
-    for name, values, label, start in (("force", FORCE, "N", 0), ("charge", CHARGE[5:], "pC", 5)):
-        head = "LabVIEW Measurement\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\n\nChannels\t1\n"
-        head += f"Date\t2026/05/04\nTime\t09:00:00.{1000 * start / RATE:06.0f}\nY_Unit_Label\t{label}\n".replace(
-            f".{1000 * start / RATE:06.0f}", f".{round(1e6 * start / RATE):06d}"
-        )
-        head += f"Delta_X\t{1 / RATE}\n***End_of_Header***\nX_Value\t{name.title()}\n"
-        (tmp_path / f"a_{name}.lvm").write_text(head + "".join(f"\t{value:.6f}\n" for value in values))
+    lvm(tmp_path, "force", FORCE, "N", "09:00:00.000000")
+    lvm(tmp_path, "charge", CHARGE[5:], "pC", f"09:00:00.{round(1e6 * 5 / RATE):06d}")
     recording = recorded(read_file(tmp_path / "a_force.lvm", "a_force.lvm", rig()))
     assert recording.force_n == pytest.approx(FORCE[5:], abs=1e-6)
     assert recording.charge_pc == pytest.approx(CHARGE[5:], abs=1e-6)
+
+
+def test_starts_in_whole_seconds_align_nothing(tmp_path: Path) -> None:
+    """Starts a second apart, stated in whole seconds, are refused: the files began up to two seconds apart."""
+    lvm(tmp_path, "force", FORCE, "N", "09:00:00")
+    lvm(tmp_path, "charge", CHARGE, "pC", "09:00:01")
+    with pytest.raises(FileError, match=r"differ, in whole seconds, .* a_charge.lvm at 2026-05-04T09:00:01"):
+        read_file(tmp_path / "a_force.lvm", "a_force.lvm", rig())
+
+
+def part(name: str, first_s: float, began: str) -> Contents:
+    """A file with a column of times and the start that it states."""
+    channels = (Channel("Time", "s", first_s + SAMPLES / RATE), Channel(name, "N", FORCE))
+    return Contents((Block("", channels, None, began),), {}, (), "")
+
+
+@pytest.mark.parametrize(("first_s", "aligned"), [(1.204, True), (0.02, False)])
+def test_columns_of_times_that_start_as_far_apart_align_files(first_s: float, aligned: bool) -> None:
+    """Of one clock, whose first times differ as the starts in whole seconds do, the first times count; else none."""
+    files = part("Force", 0.0, "2026-05-04T09:00:00Z"), part("Charge", first_s, "2026-05-04T09:00:01Z")
+    if not aligned:
+        with pytest.raises(FileError, match="differ, in whole seconds"):
+            joined(files[0], {"a_charge.csv": files[1]}, "a_force.csv")
+        return
+    contents = joined(files[0], {"a_charge.csv": files[1]}, "a_force.csv")
+    assert [channel.starts_s for channel in contents.blocks[0].channels] == [0.0, 0.0, first_s]
+    assert "aligned by their columns of times" in contents.warnings[0]
+
+
+def test_rates_without_starts_are_told() -> None:
+    """Files that state a rate, and no start, lack the start alone; a step of 0 is no rate."""
+    series = [Contents((Block("", (Channel(name, "N", FORCE),), RATE, None),), {}, (), "") for name in ("F", "Q")]
+    assert joined(series[0], {"b": series[1]}, "a").warnings == (
+        "a and b state no start: their rows are taken to be of one time",
+    )
+    still = Block("", (Channel("Q", "pC", CHARGE[5:]),), 0.0, None)
+    with pytest.raises(FileError, match="b: no rate and no even clock"):
+        joined(series[0], {"b": Contents((still,), {}, (), "")}, "a")
+
+
+def test_a_campaign_document_is_not_joined(tmp_path: Path) -> None:
+    """A file that holds no channels is refused by its name, not left out."""
+    write(tmp_path, "a_force.json", "Force [N]", FORCE, 0)
+    (tmp_path / "a_charge.json").write_text(json.dumps(document(FRF)))
+    with pytest.raises(FileError, match=r"a_charge.json: is a campaign document"):
+        read_file(tmp_path / "a_force.json", "a_force.json", rig())
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def read(
     """Say what would be taken from a file for what, and draft a rig description of it.
 
     Nothing is sent or kept. With a rig description, and of files that describe themselves, the recordings are listed;
-    exit status 2 if any cannot be used. So they are where headings and header say enough, beside the draft.
+    exit status 2 if any cannot be used. Without a rig description they are listed too if the headings suffice.
     """
     from underskin.recordings.channels import Contents
     from underskin.recordings.reading import read_contents, understood

@@ -45,9 +45,9 @@ from underskin.recordings.frf.flat_zone import (
     RollOff,
     band_average,
     flat_zone,
-    in_phase,
     lower_half,
     roll_off,
+    without_chain_phase,
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, mean_of, stacked
@@ -432,7 +432,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     if not recorded:
         raise _none_usable(campaign, left_out)
     conditions = [(item.indenter_radius_mm, item.preload_n) for item in recorded]
-    frfs, delay = in_phase(stacked(measured), conditions)
+    frfs, delay = without_chain_phase(stacked(measured), conditions)
     zone = flat_zone(frfs, conditions, band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))

@@ -235,13 +235,11 @@ def _table(data: bytes) -> _Table:
     lines: list[int] = []
     for number, line in numbered:
         try:
-            cells = text.cells(line, separator)
+            cells = text.cells(line, separator, len(rows[0]) if rows else 1)
         except ValueError as error:
             raise CsvError(f"must be readable as CSV (line {number}: {error})") from None
-        width = len(rows[0]) if rows else len(cells)
-        stated = max(len(cells), line.count(separator) + 1)  # with the empty ones at its end
         if any(cells):
-            rows.append([*cells, *[""] * (min(stated, width) - len(cells))])
+            rows.append(cells)
             lines.append(number)
     notes = _notes_under(rows, lines) if rows and len(rows[0]) > 1 else []
     if len(rows) < 2:

@@ -5,7 +5,7 @@ with `a_force.csv`. Their clocks align them: the stated starts of both, and the 
 each; `regular_samples.aligned` cuts the channels to the samples in common.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -15,9 +15,7 @@ import numpy as np
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
 from underskin.recordings.readers.unit_labels import unit
-from underskin.recordings.regular_samples import mean_step
-
-_EVEN = 0.05  # of a step: as for channels that start at parts of a sample
+from underskin.recordings.regular_samples import OFF_SAMPLE, mean_step
 
 
 def files_to_join(file: Path, join: tuple[str, tuple[str, ...]]) -> Iterator[Path]:
@@ -54,17 +52,19 @@ def _joined(first: Block, second: Block, file: str, other: str) -> tuple[Block, 
     texts = (*first.texts, *(words for words in second.texts if first.words(words.name) is None))
     lengths = [max((len(channel.values) for channel in block.channels), default=0) for block in (first, second)]
     rates = [_rate(block, time) for block, time in zip((first, second), times, strict=True)]
-    delay = _delay(first, second, file, other)
+    starts = [float(time[0]) if len(time) else 0.0 for time in times]
+    delay, told = _delay(first, second, starts, file, other)
     is_one_clock = np.array_equal(times[0], times[1]) and rates[0] == rates[1] and not delay
     if is_one_clock and lengths[0] == lengths[1]:
-        note = "" if len(times[0]) else f"{file} and {other} state no clock: their rows are taken to be of one time"
+        lacking = "clock" if rates[0] is None else "" if first.recorded_at else "start"
+        stated = f"{file} and {other} state no {lacking}: their rows are taken to be of one time"
+        note = stated if lacking and not len(times[0]) else ""
         return replace(first, channels=with_distinct_names([*first.channels, *added]), texts=texts), note
-    if rates[0] is not None and rates[1] is not None and abs(rates[1] / rates[0] - 1) * max(lengths) < _EVEN:
+    if rates[0] is not None and rates[1] is not None and abs(rates[1] / rates[0] - 1) * max(lengths) < OFF_SAMPLE:
         rates[1] = rates[0]  # but for rounding
     if None in rates:
         both = " and ".join(name for name, rate in zip((file, other), rates, strict=True) if rate is None)
         raise FileError(file, "", f"{both}: no rate and no even clock, by which they could be aligned")
-    starts = [time[0] if len(time) else 0.0 for time in times]
     together = starts[0] == starts[1] + delay
     timed = [
         replace(
@@ -76,7 +76,7 @@ def _joined(first: Block, second: Block, file: str, other: str) -> tuple[Block, 
         for channels, rate, start in zip((first.channels, added), rates, (starts[0], starts[1] + delay), strict=True)
         for channel in channels
     ]
-    note = f"{file} and {other} begin together, and are cut to {min(lengths)} samples" if together else ""
+    note = f"{file} and {other} begin together, and are cut to {min(lengths)} samples" if together else told
     return replace(first, channels=with_distinct_names(timed), texts=texts, sample_rate_hz=None), note
 
 
@@ -95,19 +95,29 @@ def _seconds(clock: Channel) -> float:
 def _rate(block: Block, time: np.ndarray) -> float | None:
     """Samples a second, as stated or by times in even steps."""
     if not len(time):
-        return block.sample_rate_hz
+        return block.sample_rate_hz or None
     step = mean_step(time)
     even = time[0] + step * np.arange(len(time))
-    return 1 / step if step > 0 and np.abs(time - even).max() <= _EVEN * step else None
+    return 1 / step if step > 0 and np.abs(time - even).max() <= OFF_SAMPLE * step else None
 
 
-def _delay(first: Block, second: Block, file: str, other: str) -> float:
-    """The start of the second part after the first [s]; 0 where neither states one."""
+def _delay(first: Block, second: Block, starts: Sequence[float], file: str, other: str) -> tuple[float, str]:
+    """The stated start of the second part after the first [s], 0 where neither states one; and a note.
+
+    Whole seconds are too coarse to align samples. Where columns of times start [s] as far apart, they are those of one
+    clock, which tells it exactly: then it is 0. Raises FileError where nothing tells it.
+    """
     if first.recorded_at is None and second.recorded_at is None:
-        return 0.0
+        return 0.0, ""
+    stated = f"{file} at {first.recorded_at or '?'}, {other} at {second.recorded_at or '?'}"
     try:
         moments = [datetime.fromisoformat(block.recorded_at or "") for block in (first, second)]
-        return (moments[1] - moments[0]).total_seconds()
+        delay = (moments[1] - moments[0]).total_seconds()
     except (ValueError, TypeError):
-        stated = f"{file} at {first.recorded_at or '?'}, {other} at {second.recorded_at or '?'}"
         raise FileError(file, "", f"the starts of the files cannot be compared: {stated}") from None
+    if not delay or any(moment.microsecond for moment in moments):
+        return delay, ""
+    if round(starts[1] - starts[0]) != delay:
+        reason = f"the starts of the files differ, in whole seconds, by which no samples can be aligned: {stated}"
+        raise FileError(file, "", reason)
+    return 0.0, f"{file} and {other} are aligned by their columns of times, and not by their starts in whole seconds"

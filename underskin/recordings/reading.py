@@ -149,7 +149,7 @@ def _by_guess(contents: Contents, name: str) -> Reading:
     """
     document = rig_guess.of_contents(contents)
     lacking, unclear = rig_guess.missing(document), rig_guess.unclear(contents)
-    doubt = f"more than one column may be {', '.join(unclear)}" if unclear else ""
+    doubt = f"more than one column or property may be {', '.join(unclear)}" if unclear else ""
     if lacking:
         doubt = f"the file does not say {', '.join(lacking)}"
     if not doubt:
@@ -173,9 +173,13 @@ def read_contents(source: Path | str | bytes, name: str, rig: RigDescription | N
         return contents
     if isinstance(source, bytes):
         raise FileError(name, "", "is no file with others in its folder, which the rig description names (join)")
-    others = {file.name: _parsed(file, file.name) for file in joined_files.files_to_join(Path(source), rig.join)}
-    channels = {file: held for file, held in others.items() if isinstance(held, Contents)}
-    return joined_files.joined(contents, channels, name)
+    others: dict[str, Contents] = {}
+    for file in joined_files.files_to_join(Path(source), rig.join):
+        other = _parsed(file, file.name)
+        if isinstance(other, Document):
+            raise FileError(file.name, "", f"is a campaign document, and no file of channels to join to {name} (join)")
+        others[file.name] = other
+    return joined_files.joined(contents, others, name)
 
 
 def _parsed(source: Path | str | bytes, name: str) -> Contents | Document:

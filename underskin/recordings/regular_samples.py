@@ -18,7 +18,7 @@ from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents
 from underskin.units import Floats, Mask
 
-_OFF_SAMPLE = 0.05  # of a step: at half the rate a phase of 9°, and Re FRF 1.2 % too small
+OFF_SAMPLE = 0.05  # of a step: at half the rate a phase of 9°, and Re FRF 1.2 % too small
 _LEAST_COMMON = 2  # samples in common
 
 
@@ -59,7 +59,7 @@ def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[B
         raise FileError(file, "", f"{start_times}, and no sample rate is stated by which to align them")
     late = {name: (last.starts_s - channel.starts_s) * block.sample_rate_hz for name, channel in used.items()}
     skipped = {name: round(samples) for name, samples in late.items()}
-    odd = next((name for name in used if abs(late[name] - skipped[name]) > _OFF_SAMPLE), None)
+    odd = next((name for name in used if abs(late[name] - skipped[name]) > OFF_SAMPLE), None)
     if odd is not None:
         reason = f"that is {late[odd]:.4g} samples: they can be aligned by whole samples alone"
         raise FileError(file, "", f"{start_times}: {reason}; resample one of them, or correct the times")

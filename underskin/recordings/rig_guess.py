@@ -71,7 +71,11 @@ OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius
 _ONE_SENSOR = {"id": "s01", "x_mm": 0, "y_mm": 0}
 _SENSORS = ("sensor", "taxel", "sensore", "capteur")
 _WHEN = ("time", "date", "zeit", "datum", "heure", "ora", "data")
-_SAMPLES = "sample|specimen|probe|prüf|éprouvette|provino|probeta"
+# "probe" is German for a sample, English for what presses
+_SAMPLES = (
+    "sample|specimen|proben|(?:der|die) probe|probe(?=.*(?:höhe|durchmesser))|(?:höhe|durchmesser).*probe|prüf"
+    "|éprouvette|provino|probeta"
+)
 _BY_WORDS = (  # of columns beside an FRF, and of properties: field, dimension, and words in instruments' languages
     ("dynamic_force_n", "force", r"dyn|din[aá]mic"),
     ("preload_n", "force", r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precar"),
@@ -188,7 +192,7 @@ def _places(contents: Contents, sensor: str) -> dict[str, tuple[float, float]]:
 
 
 def unclear(contents: Contents) -> list[str]:
-    """Fields that several columns of a file may be, each with these columns, in words."""
+    """Fields that several columns or several properties of a file may be, each with these, in words."""
     columns = [
         Heading(channel.name, channel.label, np.iscomplexobj(channel.values))
         for block in main_blocks(contents)[:1]
@@ -198,6 +202,12 @@ def unclear(contents: Contents) -> list[str]:
     if not _entries(columns, guessed(columns, {}, {})):
         for column, field in zip(columns, likely(columns)[1], strict=True):
             by_field.setdefault(field, []).append(column.name)
+    stated = of_contents(contents)["recording"]
+    by_field |= {
+        field: names
+        for field, names in _stated_names(contents.properties).items()
+        if isinstance(stated.get(field), Mapping) and "property" in stated[field] and field not in by_field
+    }
     return [f"{field} ({' or '.join(map(repr, names))})" for field, names in by_field.items() if field and names[1:]]
 
 
@@ -323,7 +333,7 @@ def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str
 def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
     """The recording's fields that the file itself states."""
     bare = {(in_brackets(stated) or (stated,))[0].lower().replace(" ", "_"): stated for stated in properties}
-    named = bare | {field: stated for stated in reversed(list(properties)) if (field := _stated_field(stated))}
+    named = bare | {field: names[0] for field, names in _stated_names(properties).items()}
     rate = next((stated for name, stated in bare.items() if name in _RATES), None)
     if rate is not None:
         named[_RATE] = rate
@@ -333,13 +343,19 @@ def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[st
     return {name: {"property": named[name]} for name in _OF_RECORDING[kind] if name in named}
 
 
-def _stated_field(name: str) -> str:
-    """The field that a property states; empty for none, and for the diameter of a sphere, of which it is half."""
-    field = (lab_field(name) or (name,))[0]
-    if field != name or name in LAB:
-        return "" if field == "indenter_radius_mm" and _DIAMETER.search(name) else field
-    stated = unit(labelled_unit(name))
-    return field if stated is None else _field_by_words(name, stated.dimension)
+def _stated_names(properties: Mapping[str, Any]) -> dict[str, list[str]]:
+    """The properties that may state a field, by field: those called as it is, else those that their words suggest."""
+    by_name: dict[str, list[str]] = {}
+    by_words: dict[str, list[str]] = {}
+    for name in properties:
+        field = (lab_field(name) or (name,))[0]
+        label = unit(labelled_unit(name))
+        if field != name or name in LAB or label is None:
+            if field != "indenter_radius_mm" or not _DIAMETER.search(name):  # of which the radius is half
+                by_name.setdefault(field, []).append(name)
+        elif likely_field := _field_by_words(name, label.dimension):
+            by_words.setdefault(likely_field, []).append(name)
+    return by_words | by_name
 
 
 def _field_by_words(name: str, dimension: str) -> str:

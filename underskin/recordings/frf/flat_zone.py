@@ -495,7 +495,7 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
     return RollOff(best, share) if is_explained and share >= _LEAST_SHARE else None
 
 
-def in_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> tuple[list[Stack], float]:
+def without_chain_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> tuple[list[Stack], float]:
     """The FRFs without the phase of the charge's chain, and the delay [s] that was removed.
 
     Where the phases turn over frequency, they are those of the filters that `roll_off` finds, if any: two poles of a
@@ -504,13 +504,14 @@ def in_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> tuple[
     """
     delay = common_delay(without_mains(stacks))
     if delay:
-        undelayed = without_delay(stacks, delay)
+        undelayed = [stack.at(stack.frequency > 0) for stack in without_delay(stacks, delay)]
+        lowest = float(np.concatenate([stack.frequency for stack in undelayed]).min())
         level = np.zeros(len(conditions))
-        for stack in stacks:
+        for stack in undelayed:
             level[stack.rows] = _medians(np.abs(stack.values), stack.used)[:, 0]
         behind = roll_off(undelayed, flat_zone(undelayed, conditions), level)
         if behind is not None:
-            turns = [np.exp(-1j * behind.filters.phase(stack.frequency)) for stack in stacks]
+            turns = [np.exp(-1j * behind.filters.phase(np.maximum(stack.frequency, lowest))) for stack in stacks]
             stacks = [replace(stack, values=stack.values * turn) for stack, turn in zip(stacks, turns, strict=True)]
             delay = common_delay(without_mains(stacks))
     return without_delay(stacks, delay), delay

@@ -259,7 +259,8 @@ def _text_column_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
             yield text_left_out(name, seen.example)
         elif not seen.example and numbers and name != f"column {column + 1}":
             of_rows = f"{numbers} of {reader.count} rows"
-            yield f"column {name!r} has a number in {of_rows}, and is left out: fill its blank cells"
+            advice = "fill its blank cells (those at its end may be empty)"
+            yield f"column {name!r} has a number in {of_rows}, and is left out: {advice}"
 
 
 def _texts(reader: RowReader, found: Headings, rows: slice) -> tuple[TextColumn, ...]:

@@ -77,14 +77,14 @@ def lines(text: str) -> list[str]:
     return _LINE_END.split(text)
 
 
-def cells(line: str, separator: str) -> list[str]:
-    """The cells of a line, without quotes and without the empty ones at its end; at least one.
+def cells(line: str, separator: str, fewest: int = 1) -> list[str]:
+    """The cells of a line, without quotes and without the empty ones at its end beyond the `fewest`; at least one.
 
     A cell in quotes may hold the separator, and quotes, doubled; it ends on its line. Raises ValueError where it does
     not.
     """
     split = [cell.strip() for cell in (_quoted(line, separator) if '"' in line else line.split(separator))]
-    while len(split) > 1 and not split[-1]:
+    while len(split) > fewest and not split[-1]:
         split.pop()
     return split
 
