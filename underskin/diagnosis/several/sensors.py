@@ -240,7 +240,7 @@ class SensorsOverDates:
     suspected: Sequence[frozenset[str]]
 
     @cached_property
-    def _exchanges(self) -> tuple[list[Change], list[Mapping[str, Sensor]], list[Mapping[str, str]]]:
+    def _exchanges(self) -> tuple[list[Change], list[Mapping[str, Sensor]], list[dict[str, str]]]:
         """The exchanges of labels, as a change of each label, the campaigns with these undone, and the label of each
         sensor in each campaign."""
         changes, right, labels = list[Change](), list(self.campaigns), [{sensor: sensor for sensor in self.ids}]
@@ -261,7 +261,7 @@ class SensorsOverDates:
                 label = before[sensor]
                 ends = [self.campaigns[date][label] for date in (number - 1, number)]
                 (first_level, level), uncertainties = _logarithms(ends)
-                change, sd = float(np.expm1(level - first_level - common)), _between(*uncertainties)
+                change, sd = float(np.expm1(level - first_level - common)), float(_between(*uncertainties))
                 source = before[now[label]]
                 changes.append(Change(label, number - 1, number, change, sd, sure[sensor], (), label, source))
         return changes, right, labels
