@@ -103,3 +103,12 @@ def test_dates_share_no_sensor_not_compared() -> None:
     found = told(d33)
     assert len(found.dates) == 2
     assert not found.significant
+
+
+def test_two_sensors_have_no_scatter() -> None:
+    """The change of one of two sensors is no scatter of the other: their array is as certain as they are."""
+    steady = np.log(np.full((2, 4), 30.0))
+    stepped = steady + np.array([[0.0, 0.0, 0.1, 0.1], [0.0, 0.0, 0.0, 0.0]])
+    found = [array_levels(value, np.full((2, 4), 0.01)).deviation for value in (steady, stepped)]
+    assert found[0] == pytest.approx(0.01 / np.sqrt(2))
+    assert found[1] == pytest.approx(found[0])

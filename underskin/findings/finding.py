@@ -505,8 +505,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.RECORDINGS_CONJUGATED: "the phase over frequency of {conjugated:count} of {recordings} recordings is that "
     "of the "
     "others with its sign turned: they look conjugated, and were conjugated back ({conjugated:listed recordings})",
-    Reason.LEVELS_EXCHANGED: "since {since} sensors {first!r} and {second!r} each have the d33 that the other one had "
-    "before: their labels or cables look exchanged, and each d33 since then belongs to the other sensor",
+    Reason.LEVELS_EXCHANGED: "since {since} {labels:sensors} each have the d33 that another of them had "
+    "before: their labels or cables look exchanged, and each d33 since then belongs to that sensor",
     Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, "
     "or their places, look exchanged; put right",
     Reason.CABLES_EXCHANGED: "from recording {since!r} on, in the order of time, sensors {first!r} and {second!r} "

@@ -126,7 +126,7 @@ PRIOR_SENSORS = 4.0  # weight of the stated uncertainties against the observed s
 # Priors: the probability of none, and the scale. g: gains of single recordings scatter by 1 to 5 %, of which mounting
 # and amplifier are a part (PHYSICS.md, section 8); a chain that stays as it was differs by a percent from date to date,
 # seldom by three, so half-normal. q: as wide as the sensors of an array are spread (mixed_model), half-Cauchy.
-_NO_GAIN, _GAIN_SCALE = 0.25, 0.0125
+_NO_GAIN, GAIN_SCALE = 0.25, 0.0125
 _NO_WALK, _WALK_SCALE = 0.6, 0.05
 _NODES = np.concatenate([[0.0], np.geomspace(1e-3, 0.5, 12)])
 _LEAST_DEVIATION = 1e-6  # relative: values without noise
@@ -175,15 +175,14 @@ def array_levels(value: Floats, deviation: Floats) -> ArrayLevels:
     y = np.where(valid, value, 0.0)
     residual = _median_polished(y, valid, valid / u**2)
     score, freedom = (residual**2 * valid / u**2).sum(axis=1), valid.sum(axis=1) - 1
-    scatter = _scatter_of_others(score, freedom)
-    counted = freedom > 0
-    departs = np.zeros(len(value), dtype=bool)
+    counted, departs = freedom > 0, np.zeros(len(value), dtype=bool)
+    scatter = _scatter_of_others(score, freedom, departs)
     if counted.sum() >= FEWEST_SENSORS:
         chance = chdtrc(np.maximum(freedom, 1), score / scatter**2)
         departs = counted & (chance < BY_CHANCE / counted.sum())
     pooled = counted & ~departs
     if departs.any():  # the scatter of all contains theirs
-        scatter = _scatter_of_others(score, np.where(departs, 0, freedom))
+        scatter = _scatter_of_others(score, freedom, departs)
     level, of_level = _weighted(y, valid & pooled[:, None], u * scatter[:, None])
     levelled = valid & np.isfinite(level)
     off = np.where(levelled, y - np.where(levelled, level, 0.0), 0.0)
@@ -271,11 +270,13 @@ def _median(values: Floats, weights: Floats) -> float:
     return float(np.interp(weights.sum() / 2, below, values[order]))
 
 
-def _scatter_of_others(score: Floats, freedom: Floats) -> Floats:
+def _scatter_of_others(score: Floats, freedom: Floats, departs: Mask) -> Floats:
     """The scatter of the other sensors from date to date relative to their uncertainties (sensors,), which assume the
-    gain scatter of a usual rig. The median of squares is used, so that a second departing sensor has no effect."""
-    counted = freedom > 0
-    if counted.sum() < 2:
+    gain scatter of a usual rig. The median of squares is used, so that a second departing sensor has no effect. Of two
+    sensors the scatter is unknown, as both depart from their mean by the same: but not of two beside departing ones,
+    whose residuals are from the median of all."""
+    counted = (freedom > 0) & ~departs
+    if counted.sum() < FEWEST_SENSORS - int(departs.any()):
         return np.ones(len(score))
     usual = np.where(counted, score / np.where(counted, chdtri(np.maximum(freedom, 1), 0.5), 1.0), np.nan)
     typical = np.array([np.nanmedian(np.delete(usual, sensor)) for sensor in range(len(score))])
@@ -339,7 +340,7 @@ def _posterior(
 
 def _log_prior(walk: Floats, gain: Floats) -> Floats:
     """ln of the prior weight of each node, the cells of the grid included."""
-    densities = 1 / (1 + (_NODES / _WALK_SCALE) ** 2), np.exp(-0.5 * (_NODES / _GAIN_SCALE) ** 2)
+    densities = 1 / (1 + (_NODES / _WALK_SCALE) ** 2), np.exp(-0.5 * (_NODES / GAIN_SCALE) ** 2)
     total = np.zeros(len(walk))
     for at, density, none in zip((walk, gain), densities, (_NO_WALK, _NO_GAIN), strict=True):
         cells = np.gradient(_NODES) * density

@@ -14,7 +14,7 @@ from underskin.diagnosis.reporting.wording import finding, in_its_unit, number, 
 from underskin.findings.formatting import capital, in_percent
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 
-_WORDS = 20  # read at a glance
+WORDS = 20  # read at a glance
 _DIGITS = 3
 
 Document = Mapping[str, Any]
@@ -35,12 +35,14 @@ def first_and_rest(report: Document) -> tuple[str, str]:
     return first.rstrip("."), rest
 
 
-def within_words(parts: Iterable[str]) -> str:
-    """A sentence of at most 20 words, of those parts that fit, in their order."""
-    chosen: list[str] = []
+def within_words(parts: Iterable[str], kept: str = "") -> str:
+    """A sentence of at most 20 words: of parts in their order, `kept` of them and the others that fit beside it."""
+    chosen, words = list[str](), len(kept.split())
     for part in parts:
-        if part and len(" ".join([*chosen, part]).split()) <= _WORDS:
+        more = 0 if part == kept else len(part.split())
+        if part and words + more <= WORDS:
             chosen.append(part)
+            words += more
     return f"{capital('; '.join(chosen))}."
 
 
@@ -48,7 +50,7 @@ def _parts(report: Document) -> Iterator[str]:
     slips = [entry for entry in report.get("findings", ()) if entry["code"] in SLIPS]
     slip = finding(slips[0]["code"]) if slips else ""
     yield slip
-    yield next(answer for answer in _answers(report) if len(f"{slip} {answer}".split()) <= _WORDS)
+    yield next(answer for answer in _answers(report) if len(f"{slip} {answer}".split()) <= WORDS)
     yield _to_quote(report)
     planned = report.get("next_experiment")
     if report["verdict"] == "ambiguous" and planned and planned["recordings"]:

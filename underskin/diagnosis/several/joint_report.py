@@ -22,7 +22,7 @@ from underskin.diagnosis.data.names import (
     quantity_in_words,
 )
 from underskin.diagnosis.reporting.d33 import StatedD33
-from underskin.diagnosis.reporting.headline import within_words
+from underskin.diagnosis.reporting.headline import WORDS, within_words
 from underskin.diagnosis.reporting.numbers import at_bound_in_words, rounded
 from underskin.diagnosis.reporting.report import ALTERNATIVES, LEAST_PROBABILITY, SCHEMA, Reported
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
@@ -107,7 +107,7 @@ class Fleet:
     quantities: Sequence[PooledQuantity]
 
 
-_UNQUOTED = {"quotable": False, "why_not": "it is of several campaigns: quote that of one"}
+_UNQUOTED = {"quotable": False, "why_not": "each campaign has its own d33: quote from its own diagnosis"}
 
 
 def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
@@ -126,18 +126,20 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
             Reason.LEVELS_EXCHANGED,
             "",
             "sensor",
-            {"since": skin.dates.called(first.since), "first": first.sensor, "second": second.sensor},
+            {"since": skin.dates.called(ring[0].since), "labels": [str(change.sensor) for change in ring]},
         )
-        for first, second in exchanges(skin.changes)
+        for ring in exchanges(skin.changes)
     ]
-    decisive = [*_failure_clauses(skin), *_exchange_clauses(skin), *_contradiction_clauses(skin.reports)]
+    sensors = {**_failure_clauses(skin), **_exchange_clauses(skin)}
+    decisive = [*sensors.values(), *_contradiction_clauses(skin.reports)]
     stated = _sets_in_words(verdict, unexplained, acting, names, in_percent(probability))
+    brief = _sets_in_brief(verdict, leader.mechanisms, in_percent(probability))
     first = [*decisive, f"apart from that, {stated}"] if decisive else [stated]
     first += [*bounds, *(_rivals_in_words(skin) if verdict == "ambiguous" else [])]
     closing = [skin.dates.order_clause(), _d33_of_last(names[-1], last)]
     return {
         **_begun(name, list(skin.reports), verdict, probability),
-        "headline": within_words([*(clause.partition(":")[0] for clause in decisive), *_change_clauses(skin), stated]),
+        "headline": _headline(skin, [*sensors, *_contradictions_in_brief(skin.reports)], stated, brief),
         "statement": of_clauses(first, _change_clauses(skin), closing, names=names),
         "location": _nowhere("campaign"),
         "mechanisms": mechanisms,
@@ -229,6 +231,26 @@ def _contradiction_clauses(reports: Mapping[str, Reported]) -> list[str]:
     return [f"in {contradiction['statement']}" for contradiction in _prefixed(reports, "contradictions")]
 
 
+def _contradictions_in_brief(reports: Mapping[str, Reported]) -> list[str]:
+    of_campaigns = [name for name, report in reports.items() if report.document.get("contradictions")]
+    return [f"recordings of {name} contradict one another" for name in of_campaigns]
+
+
+def _headline(skin: SkinOverDates, decisive: Sequence[str], stated: str, brief: str) -> str:
+    """What is decisive, the answer, `brief` where it does not fit as it is `stated`, and changes of d33."""
+    changes = _changes_in_brief(skin)
+    answer = next(
+        (
+            answer
+            for others in ([*decisive, *changes[:1]], decisive)
+            for answer in (stated, brief)
+            if len(" ".join([*others, answer]).split()) <= WORDS
+        ),
+        brief,
+    )
+    return within_words([*decisive, answer, *changes], answer)
+
+
 def _verdict(unexplained: Sequence[str], probability: float, anything: bool) -> str:
     if unexplained:
         return "unexplained"
@@ -314,16 +336,16 @@ def _per_sensor(skin: SkinOverDates) -> list[dict[str, Any]]:
             "sensor": sensor,
             "unit": "pC/N",
             **over_sets(parts, {sensor: d33}, d33),
-            "relative": _relative(over_sets(parts, {sensor: d33}, d33), d33),
+            "relative": _relative(d33),
         }
         for name, sensors, parts in zip(skin.dates.names, skin.sensors, skin.over_sets, strict=True)
         for sensor, d33 in sensors.items()
     ]
 
 
-def _relative(stated: Mapping[str, float | None], d33: Sensor) -> dict[str, float | None]:
-    """The interval of a `stated` value to compare it with others, as wide as that of `d33` by one set."""
-    _, _, low, high = d33 * ((stated["value"] or np.nan) / d33[0])
+def _relative(d33: Sensor) -> dict[str, float | None]:
+    """The interval to compare a d33 with others, by the leading history: the shares of sets differ by campaign."""
+    _, _, low, high = d33
     return _rounded(low=low, high=high)
 
 
@@ -336,7 +358,7 @@ def _per_campaign(skin: SkinOverDates) -> dict[str, Any]:
         array = np.array([d33, sd, d33 - SDS_OF_95 * sd, d33 + SDS_OF_95 * sd])
         stated = over_sets(skin.over_sets[number], skin.sensors[number], array)
         name = skin.dates.names[number]
-        rows.append({"campaign": name, "unit": "pC/N", **stated, "relative": _relative(stated, array)})
+        rows.append({"campaign": name, "unit": "pC/N", **stated, "relative": _relative(array)})
     return {"per_campaign": rows}
 
 
@@ -357,6 +379,17 @@ def _sets_in_words(
     return f"{lead}: {', '.join(_acting_in_words(mechanism, names) for mechanism in mechanisms)} ({percent})"
 
 
+def _sets_in_brief(verdict: str, mechanisms: Sequence[str], percent: str) -> str:
+    """The answer without campaigns and dates; mechanisms that would take more than half a headline are counted."""
+    if verdict == "unexplained":
+        return f"something is missing that no known mechanism describes ({percent})"
+    if not mechanisms:
+        return f"nothing {'may be' if verdict == 'ambiguous' else 'is'} missing ({percent})"
+    names = in_words(mechanisms)
+    what = names if len(names.split()) <= WORDS // 2 else f"{len(mechanisms)} mechanisms"
+    return f"{'perhaps ' if verdict == 'ambiguous' else ''}{what} ({percent})"
+
+
 def _acting_in_words(mechanism: Mapping[str, Any], names: Sequence[str]) -> str:
     scope, words = mechanism["scope"], in_words([mechanism["name"]])
     if "since" in scope:
@@ -369,7 +402,7 @@ def _acting_in_words(mechanism: Mapping[str, Any], names: Sequence[str]) -> str:
 def _alternatives(skin: SkinOverDates) -> list[dict[str, Any]]:
     """All answers but the leading history, the most probable first."""
     unlisted = _share([NONE_OF_THESE], 1 - skin.p_described)
-    unlisted |= {"why_not": "what the campaigns leave to something without a name, in one of them or more"}
+    unlisted |= {"why_not": "what the campaigns leave to something unlisted, in one of them or more"}
     histories = [
         _share(history.mechanisms or [NOTHING_MISSING], skin.p_described * history.probability)
         | {"why_not": _history_in_words(history, skin.dates.names)}
@@ -407,18 +440,19 @@ def _history_in_words(history: SetHistory, names: Sequence[str]) -> str:
     return "; ".join(f"{name}: {in_words(mechanisms or (NOTHING_MISSING,))}" for name, mechanisms in sets)
 
 
-def _failure_clauses(skin: SkinOverDates) -> list[str]:
-    """Such as "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12"."""
-    clauses = []
+def _failure_clauses(skin: SkinOverDates) -> dict[str, str]:
+    """Such as "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12", by what is
+    before the colon."""
+    clauses = {}
     for failure, sensors in skin.failures.items():
         single = len(sensors) == 1
-        who = f"sensor {sensors[0]}" if single else f"sensors {listed(sensors)}"
+        who, few = (f"sensor{'' if single else 's'} {named}" for named in (listed(sensors), _few(sensors)))
         state, _, why = failure.fault.partition(": ")
         start = skin.dates.called(failure.first)
         if failure.after is not None:
             again = f"answer{'s' if single else ''} again on {skin.dates.called(failure.after)}"
-            was = f"{who} {'was' if single else 'were'} {state} on {start} ({why})"
-            clauses.append(f"{was} and {again}; left out of what is compared there")
+            was = f"{'was' if single else 'were'} {state} on {start}"
+            clauses[f"{few} {was}"] = f"{who} {was} ({why}) and {again}; left out of what is compared there"
             continue
         when, earlier = "in all campaigns", ""
         if failure.before is not None:
@@ -426,27 +460,42 @@ def _failure_clauses(skin: SkinOverDates) -> list[str]:
             had = [f"{before[sensor][0]:.3g}" for sensor in sensors if sensor in before]
             level = f"{listed(had)} pC/N" if had else "a response"
             when, earlier = f"since {start}", f", after {level} on {skin.dates.called(failure.before)}"
-        clauses.append(
-            f"{who} {'is' if single else 'are'} {state} {when}: {why}{earlier}; left out of all that follows"
-        )
+        is_so = f"{'is' if single else 'are'} {state} {when}"
+        clauses[f"{few} {is_so}"] = f"{who} {is_so}: {why}{earlier}; left out of all that follows"
     return clauses
 
 
-def _exchange_clauses(skin: SkinOverDates) -> list[str]:
-    """Such as "sensors s02 and s05 look exchanged since 2026-09-21: each has the d33 that the other had (s02 …)"."""
-    clauses = []
-    for pair in exchanges(skin.changes):
-        first, second = (change.sensor for change in pair)
+def _exchange_clauses(skin: SkinOverDates) -> dict[str, str]:
+    """Such as "sensors s02 and s05 look exchanged since 2026-09-21: each has the d33 that the other had (s02 …)", by
+    what is before the colon."""
+    clauses = {}
+    for ring in exchanges(skin.changes):
         sizes = ", ".join(
             f"{change.sensor} {change.percent['value']:+.3g} % ({change.percent['low']:+.3g} to "
             f"{change.percent['high']:+.3g})"
-            for change in pair
+            for change in ring
         )
-        since = skin.dates.called(pair[0].since)
-        clauses.append(
-            f"sensors {first} and {second} look exchanged since {since}: each has the d33 that the other had ({sizes})"
+        look = f"look exchanged since {skin.dates.called(ring[0].since)}"
+        names, source = [str(change.sensor) for change in ring], "the other" if len(ring) == 2 else "another"
+        clauses[f"sensors {_few(names)} {look}"] = (
+            f"sensors {listed(names)} {look}: each has the d33 that {source} had ({sizes})"
         )
     return clauses
+
+
+def _changes_in_brief(skin: SkinOverDates) -> list[str]:
+    """Whose d33 changed and by how much, the array first."""
+    changes = [change for change in skin.changes if change.exchanged_with is None]
+    if skin.array is not None and skin.array.is_significant and all(change.sensor is not None for change in changes):
+        changes = [skin.array.change, *changes]
+    return [
+        f"d33 of {'the array' if change.sensor is None else f'sensor {change.sensor}'} {_fell_or_rose(change)}"
+        for change in changes
+    ]
+
+
+def _fell_or_rose(change: Change) -> str:
+    return f"{'fell' if change.value < 0 else 'rose'} by {abs(change.percent['value']):.3g} %"
 
 
 def _change_clauses(skin: SkinOverDates) -> list[str]:
@@ -468,10 +517,11 @@ def _change_clauses(skin: SkinOverDates) -> list[str]:
 def _change_in_words(change: Change, dates: CampaignDates) -> str:
     """A clause on the change of d33 of one sensor or of the array; of the array with its possible causes, which a
     change of level cannot separate."""
-    whose = "of the array" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
+    label = f", labelled {change.label}" if change.label not in (None, change.sensor) else ""
+    whose = "of the array" if change.sensor is None else f"of sensor {change.sensor}{label}, beyond the others,"
     percent = change.percent
     low, high = sorted((abs(percent["low"]), abs(percent["high"])))
-    size = f"{'fell' if change.value < 0 else 'rose'} by {abs(percent['value']):.3g} % ({low:.3g} to {high:.3g})"
+    size = f"{_fell_or_rose(change)} ({low:.3g} to {high:.3g})"
     causes = f", {_causes_in_words(change)}" if change.sensor is None else ""
     return f"d33 {whose} {size} between {dates.called(change.before)} and {dates.called(change.until)}{causes}"
 

@@ -29,6 +29,7 @@ from underskin.findings.codes import FindingCode, Reason
 from underskin.inversion.array_history import (
     FEWEST_DATES,
     FEWEST_SENSORS,
+    GAIN_SCALE,
     PRIOR_SENSORS,
     ArrayLevels,
     array_levels,
@@ -46,8 +47,6 @@ from underskin.units import Floats, to_lab
 _LEAST, _LEAST_OF_ARRAY = 0.03, 0.05  # relative changes that are stated: amplifiers are calibrated to some percent
 _P_CHANGE, _P_SUSPECTED = 0.05, 0.5  # that d33 changes; of a sensor whose level stands apart in one of two campaigns
 _P_EXCHANGE = 0.2  # odds of an exchange, where two sensors have changed at once, over two changes
-_MOST_COMPARED = 12  # sensors, those that changed most: an exchange moves two of them
-_AMPLIFIER = 0.01  # of its gain, from one campaign to the next
 _SCATTERS, _PER_SD, _BEYOND = 7, 3, 4.0  # quantiles of f; values of a per standard deviation, and beyond all z
 
 
@@ -132,7 +131,8 @@ class Change:
     uncertainty: float  # of its logarithm
     probability: float
     causes: tuple[str, ...] = ()  # of a change of all sensors: mechanisms that could have caused it
-    exchanged_with: str | None = None  # the sensor with which it exchanged its d33
+    label: str | None = None  # of a step of one sensor: under which its recordings have this change
+    exchanged_with: str | None = None  # of an exchange, where `sensor` is a label: the label that had its d33 before
 
     @property
     def since(self) -> int:
@@ -240,39 +240,51 @@ class SensorsOverDates:
     suspected: Sequence[frozenset[str]]
 
     @cached_property
-    def _exchanges(self) -> tuple[list[Change], list[Mapping[str, Sensor]]]:
-        """The exchanges of labels, two changes each, and the campaigns with these undone."""
-        changes, right = list[Change](), list(self.campaigns)
+    def _exchanges(self) -> tuple[list[Change], list[Mapping[str, Sensor]], list[dict[str, str]]]:
+        """The exchanges of labels, as a change of each label, the campaigns with these undone, and the label of each
+        sensor in each campaign."""
+        changes, right, labels = list[Change](), list(self.campaigns), [{sensor: sensor for sensor in self.ids}]
         for number in range(1, len(right)):
+            before, held, sure = labels[-1], dict(labels[-1]), dict[str, float]()
+            common = 0.0
             while (found := self._exchange(right, number)) is not None:
-                changes += found
-                names = {str(change.sensor): str(change.exchanged_with) for change in found}
+                (first, second), common, probability = found
+                held[first], held[second] = held[second], held[first]
+                sure |= {sensor: min(probability, sure.get(sensor, 1.0)) for sensor in (first, second)}
+                names = {first: second, second: first}
                 right[number:] = [
                     {names.get(sensor, sensor): d33 for sensor, d33 in campaign.items()} for campaign in right[number:]
                 ]
-        return changes, right
+            labels.append(held)
+            now = {label: sensor for sensor, label in held.items()}
+            for sensor in (sensor for sensor in sure if held[sensor] != before[sensor]):
+                label = before[sensor]
+                ends = [self.campaigns[date][label] for date in (number - 1, number)]
+                (first_level, level), uncertainties = _logarithms(ends)
+                change, sd = float(np.expm1(level - first_level - common)), float(_between(*uncertainties))
+                source = before[now[label]]
+                changes.append(Change(label, number - 1, number, change, sd, sure[sensor], (), label, source))
+        return changes, right, labels
 
-    def _exchange(self, campaigns: Sequence[Mapping[str, Sensor]], number: int) -> list[Change] | None:
-        """The exchange since the previous campaign that is more probable than all else."""
+    def _exchange(
+        self, campaigns: Sequence[Mapping[str, Sensor]], number: int
+    ) -> tuple[tuple[str, str], float, float] | None:
+        """The exchange since the previous campaign that is more probable than all else: the two sensors, the change of
+        ln d33 of all with it, and its probability."""
         before, after = campaigns[number - 1 : number + 1]
         shared = [sensor for sensor in before if sensor in after]
         if len(shared) < FEWEST_SENSORS:
             return None
         (first, u_first), (last, u_last) = (_logarithms([d33[sensor] for sensor in shared]) for d33 in (before, after))
         prior = np.array([self._p_change(number, sensor, len(shared)) for sensor in shared])
-        size, sd = last - first[:, None], np.sqrt(u_last**2 + u_first[:, None] ** 2 + _AMPLIFIER**2)
-        weighed = _exchanges_weighed(size, sd, prior)
+        weighed = _exchanges_weighed(last - first[:, None], _between(u_first[:, None], u_last), prior)
         best = max(weighed, key=lambda pair: weighed[pair])
         others = np.logaddexp.reduce([0.0, *(odds for pair, (odds, _) in weighed.items() if pair != best)])
         log_odds, common = weighed[best]
         if log_odds - others < np.log((1 - NAMED) / NAMED):
             return None
-        p_exchange = float(1 / (1 + np.exp(others - log_odds)))
-        changes = (float(np.expm1(size[row, row] - common)) for row in best)
-        return [
-            Change(shared[row], number - 1, number, change, float(sd[row, row]), p_exchange, (), shared[other])
-            for row, other, change in zip(best, best[::-1], changes, strict=True)
-        ]
+        row, other = best
+        return (shared[row], shared[other]), common, float(1 / (1 + np.exp(others - log_odds)))
 
     def _p_change(self, number: int, sensor: str, sensors: int) -> float:
         """The prior probability that one of so many sensors changed since the previous campaign."""
@@ -333,7 +345,8 @@ class SensorsOverDates:
         for row in shared if len(shared) >= FEWEST_SENSORS else ():
             size, sd = float(np.diff(levels.departure[row])[0]), float(np.hypot(*levels.departure_deviation[row]))
             prior = self._p_change(number, self.ids[row], len(shared))
-            steps.append(_change(self.ids[row], number - 1, number, size, sd, prior))
+            step = _change(self.ids[row], number - 1, number, size, sd, prior)
+            steps.append(replace(step, label=self._exchanges[2][number][self.ids[row]]))
         if np.isfinite(levels.level).all():
             size, sd = float(np.diff(levels.level)[0]), float(np.linalg.norm([*levels.deviation, self.unsure[number]]))
             steps.append(_change(None, number - 1, number, size, sd, _P_CHANGE))
@@ -362,6 +375,11 @@ def _logarithms(sensors: Sequence[Sensor]) -> tuple[Floats, Floats]:
     return np.log(np.abs(d33)), uncertainty / np.abs(d33)
 
 
+def _between(before: Floats, after: Floats) -> Floats:
+    """The standard uncertainty of a change of ln d33 from those of both dates, with the gain of the second."""
+    return np.sqrt(before**2 + after**2 + GAIN_SCALE**2)
+
+
 def _exchanges_weighed(size: Floats, sd: Floats, prior: Floats) -> dict[tuple[int, int], tuple[float, float]]:
     """Of pairs of sensors (indices): ln of the odds of their exchange over none, and the change of all with it.
 
@@ -378,14 +396,13 @@ def _exchanges_weighed(size: Floats, sd: Floats, prior: Floats) -> dict[tuple[in
         same, changed = (log_normal(offset, part) for part in (variance, variance + USUAL_CHANGE**2))
         return np.asarray(np.logaddexp(np.log1p(-prior[row]) + same, np.log(prior[row]) + changed))
 
-    none = np.sum([log_density(row, row) for row in range(len(own))], axis=0)
+    rows = [log_density(row, row) for row in range(len(own))]
+    none = np.sum(rows, axis=0)
     total = np.logaddexp.reduce(none, axis=None)
-    most = np.argsort(-np.abs(own - np.median(own)) / deviation, kind="stable")[:_MOST_COMPARED]
     weighed = {}
-    for first, second in combinations(sorted(most.tolist()), 2):
+    for first, second in combinations(range(len(own)), 2):
         gained = [log_density(*pair) for pair in ((first, second), (second, first))]
-        lost = [log_density(row, row) for row in (first, second)]
-        exchanged = none + sum(gained) - sum(lost)
+        exchanged = none + sum(gained) - rows[first] - rows[second]
         at_once = np.log(_P_EXCHANGE * prior[first] * prior[second])
         log_odds = float(at_once + np.logaddexp.reduce(exchanged, axis=None) - total)
         weighed[first, second] = log_odds, float(common[exchanged.max(axis=0).argmax()])
@@ -405,19 +422,24 @@ def _is_stated(change: Change) -> bool:
     return change.probability > 1 - NAMED and abs(float(np.log1p(change.value))) > least
 
 
-def exchanges(changes: Sequence[Change]) -> list[tuple[Change, Change]]:
-    """The changes of the two sensors of each exchange."""
+def exchanges(changes: Sequence[Change]) -> list[list[Change]]:
+    """The changes of the labels of each exchange: two, or more that have each other's d33 in a ring."""
     found = {(change.since, change.sensor): change for change in changes if change.exchanged_with is not None}
-    pairs = [(change, found[since, change.exchanged_with]) for (since, _), change in found.items()]
-    return [pair for pair in pairs if str(pair[0].sensor) < str(pair[1].sensor)]
+    rings = []
+    while found:
+        ring = [found.pop(next(iter(found)))]
+        while (following := found.pop((ring[-1].since, ring[-1].exchanged_with), None)) is not None:
+            ring.append(following)
+        rings.append(sorted(ring, key=lambda change: str(change.sensor)))
+    return rings
 
 
 def without_steps(campaign: Campaign, steps: Sequence[Change], number: int) -> Campaign:
-    """The campaign of this number with earlier steps of single sensors undone."""
-    factors: dict[str | None, float] = {}
+    """The campaign of this number with earlier steps of single sensors undone, of each under its label."""
+    factors: dict[str, float] = {}
     for change in steps:
-        if change.sensor is not None and change.since <= number:
-            factors[change.sensor] = factors.get(change.sensor, 1.0) / (1 + change.value)
+        if change.label is not None and change.since <= number:
+            factors[change.label] = factors.get(change.label, 1.0) / (1 + change.value)
     if not factors:
         return campaign
     recordings: list[Recording] = []
