@@ -50,7 +50,7 @@ from underskin.recordings.frf.flat_zone import (
     without_chain_phase,
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
-from underskin.recordings.frf.spectra import Frf, mean_of, stacked
+from underskin.recordings.frf.spectra import Frf, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
@@ -281,9 +281,7 @@ def findings_of(
     """Findings on time series: defects, bias by noise, and a mean force that contradicts the preload; and on errors of
     units and sign of the level [C/N] and of the array's d33."""
     defects = [
-        Finding(Reason.DEFECT, item.id, defect.channel, asdict(defect))
-        for item, frf in zip(recorded, measured, strict=True)
-        for defect in frf.defects
+        finding for item, frf in zip(recorded, measured, strict=True) for finding in left_out_of(item.id, frf.defects)
     ]
     typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
     unit_errors = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]

@@ -18,7 +18,7 @@ from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import exchanged_channels, lines_of, oscillation_of
 from underskin.recordings.frf.line_choice import Usable, excited_at_mains, noise_findings, usable_lines
-from underskin.recordings.frf.spectra import Frf, mean_of
+from underskin.recordings.frf.spectra import Frf, left_out_of, mean_of
 from underskin.units import Floats, force_unit, to_lab
 
 _NO_PREFIX = ("gf", "kgf", "lbf")  # units of force that are no power of 1000 off
@@ -159,10 +159,7 @@ def _measured(recordings: Sequence[FrfRecording]) -> tuple[dict[str, Frf], list[
             findings.append(Finding(Reason.SERIES_NOT_USABLE, recording.id, refusal.field, {"refusal": refusal}))
             continue
         measured[recording.id] = frf
-        if frf.defects:
-            first, *others = frf.defects
-            arguments = {**asdict(first), "more": len(others)}
-            findings.append(Finding(Reason.DEFECTS_LEFT_OUT, recording.id, first.channel, arguments))
+        findings += left_out_of(recording.id, frf.defects)
     return measured, findings
 
 

@@ -12,7 +12,7 @@ refined by the advance of the phase over the step. Amplitude X means x = Re(X e^
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
 from typing import Any
@@ -96,6 +96,17 @@ class Defect:
     first_sample: int
 
 
+def left_out_of(recording: str, every: Sequence[Defect]) -> list[Finding]:
+    """The findings on the defects of a recording, one for each kind of each channel: the first, and how many more."""
+    alike: dict[tuple[str, DefectKind], list[Defect]] = {}
+    for defect in every:
+        alike.setdefault((defect.channel, defect.kind), []).append(defect)
+    return [
+        Finding(Reason.DEFECTS_LEFT_OUT, recording, first.channel, {**asdict(first), "more": len(others)})
+        for first, *others in alike.values()
+    ]
+
+
 def mean_of(force: Floats) -> float | None:
     """The mean of a force where it is a preload; None where it lies within three standard deviations of 0, as after an
     AC coupling."""
@@ -106,6 +117,8 @@ def mean_of(force: Floats) -> float | None:
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
     """Every defect of force and charge: those of each by itself that are not physical, and clipping that shows beside
     the other channel alone."""
+    if not len(force):
+        return []
     every = _unphysical(force, charge)
     for channel, signal, other in (("force_n", force, charge), ("charge_pc", charge, force)):
         known = [defect for defect in every if defect.channel == channel]
@@ -209,81 +222,71 @@ def _overload(signal: Floats, rest: Mask) -> Mask:
     return mask
 
 
-_FEWEST_PILED_UP = 16  # samples
+_FEWEST_PILED_UP = 16  # samples, whose counting error is a quarter of them
 _WIDTHS = np.geomspace(1e-4, 0.2, 45)  # of the range: bands that hold noise of 0.002 to 4 % of it
 _TURNING = 1 / (np.sqrt(2.0) - 1)  # within d of its top a turning signal spends √d, and (√2 − 1) √d in the next d
-_DWELLS = 2.4  # kurtosis: 1 of a square wave, 1.5 of a sine or sweep, 1.8 of even levels; 3 of noise
-_PROPORTIONAL = 0.5  # of the largest expected value: up to it a channel is taken to be proportional
-_COMPARED = 0.25  # of the level at the end of the range, from which on the usual error is taken
-_WEAKEST = 1e-4  # of the strongest line's power: weaker ones are leakage or noise
-_GOES_ON = 3.0  # least excess at the end of the range, in usual errors
+_WEAKEST = 1e-4  # of the strongest line's power: from its second side lobe on Hann's window leaks -41 dB (Harris 1978)
+_PASSES = 10  # with half of the samples clipped the expected ones are settled
 
 
-@dataclass(frozen=True)
-class _End:
-    """An end of a signal's range: where it is (`sign`), the `width` of the band that holds most samples relative to the
-    next band as wide, and that `ratio`; 0 where the band is the rest of a signal of blows."""
-
-    sign: float
-    width: float
-    ratio: float
-
-
-def _ends(level: Floats) -> list[_End]:
-    ends = []
-    for sign in (1.0, -1.0):
-        below = np.sort((sign * level).max() - sign * level)
-        widths = _WIDTHS * below[-1]
-        within = np.searchsorted(below, widths, side="right")
-        beside = np.searchsorted(below, 2 * widths, side="right") - within
-        counts = (within >= _FEWEST_PILED_UP) & (2 * within < len(level))
-        ratio = np.where(counts, within / (beside + 1), 0.0)
-        best = int(np.argmax(ratio))
-        ends.append(_End(sign, float(widths[best]), float(ratio[best])))
-    return ends
+def _piled_up(level: Floats, sign: float) -> Mask:
+    """The samples in the band at the upper (`sign` 1) or lower (-1) end of the range that holds most of them relative
+    to the next band as wide; none where a signal that turns there has as many, or where half of all lie there, as at
+    the rest of a signal of blows."""
+    below = (sign * level).max() - sign * level
+    widths = _WIDTHS * below.max()
+    ordered = np.sort(below)
+    within = np.searchsorted(ordered, widths, side="right")
+    beside = np.searchsorted(ordered, 2 * widths, side="right") - within
+    counts = (within >= _FEWEST_PILED_UP) & (2 * within < len(level))
+    ratio = np.where(counts, within / (beside + 1), 0.0)
+    best = int(np.argmax(ratio))
+    return np.asarray((below <= widths[best]) & (ratio[best] > _TURNING))
 
 
 def _clipped_in_noise(signal: Floats, other: Floats) -> Mask:
     """The samples at either end of the range of a signal clipped before noise was added, as before a converter.
 
-    There more of them accumulate within a band than of any signal that turns there, and the other channel goes on: it
-    neither dwells on any level nor accumulates as well, or the linear response to it goes on beyond all that was
-    recorded. A square wave, and a sine that is sampled at few of its phases, accumulate too, but the other channel
-    tells that they do not go on.
+    There more of them accumulate within a band than of any signal that turns there, and the linear response to the
+    other channel goes on beyond all that was recorded. A square wave, a drive whose peaks are limited and a sine that
+    is sampled at few of its phases accumulate too, but the other channel follows them.
+
+    The response is that of the samples away from the ends, where those at the ends count as missing: until it goes on,
+    each pass puts in their place what the response of the pass before makes them (expectation and maximisation:
+    Dempster, Laird and Rubin, J. R. Stat. Soc. B 39, 1977). Its usual error is that of the samples away from the ends,
+    by their power. A periodic signal has one pass: nothing else determines a sample that each of its periods lacks.
     """
     mask = np.zeros(len(signal), dtype=bool)
     level = signal - np.median(signal)
-    ends = _ends(level)
-    if max(end.ratio for end in ends) <= _TURNING:
+    piled = {sign: _piled_up(level, sign) for sign in (1.0, -1.0)}
+    ends = piled[1.0] | piled[-1.0]
+    away, filled = ~ends, level.copy()
+    if not ends.any() or away.sum() < _FEWEST_PILED_UP:
         return mask
-    free = (
-        _kurtosis(other) > _DWELLS
-        and not (period_of(signal) or period_of(other))
-        and max(end.ratio for end in _ends(other)) <= _TURNING
-    )
-    expected = _expected(level, other)
-    for end in ends:
-        top, reached = end.sign * level, end.sign * expected
-        piled = top >= top.max() - end.width
-        if free and end.ratio > _CLIPPED_RATIO:
-            mask |= piled
-        elif end.ratio > _TURNING:
-            away = (level < level.max() - end.width) & (level > level.min() + end.width)
-            compared = away & (np.abs(level) > _COMPARED * np.median(top[piled]))
-            usual = float(np.sqrt(np.mean((expected - level)[compared] ** 2))) if compared.any() else np.inf
-            if np.median(reached[piled]) > top.max() and np.median((reached - top)[piled]) > _GOES_ON * usual:
-                mask |= piled
+    for _ in range(1 if period_of(signal) or period_of(other) else _PASSES):
+        response = _linear_response(other - other.mean(), filled - filled.mean())
+        expected = _scaled(response, level, away)
+        usual = _rms((expected - level)[away] * level[away]) / max(_rms(level[away]), _TINY)
+        for sign, end in piled.items():
+            top, reached = sign * level[end], sign * expected[end]
+            if end.any() and np.median(reached) > top.max() and np.median(reached - top) > _CLEAR * usual:
+                mask |= end
+        if mask.any():
+            break
+        filled[ends] = expected[ends]
     return mask
 
 
-def _expected(level: Floats, other: Floats) -> Floats:
-    """The linear response to the other channel, scaled to the signal where that is small: there it is not clipped."""
-    expected = _linear_response(other - other.mean(), level - level.mean())
-    small = np.abs(expected) < _PROPORTIONAL * np.abs(expected).max()
-    if small.sum() < _FEWEST_PILED_UP:
-        return np.zeros_like(level)
-    slope, offset = np.polyfit(expected[small], level[small], 1)
-    return np.asarray(offset + slope * expected)
+def _scaled(response: Floats, level: Floats, away: Mask) -> Floats:
+    """The response with the slope and offset of its regression on the level of the samples `away` from the ends."""
+    mean, mean_level = response[away].mean(), level[away].mean()
+    centred = response - mean
+    slope = (centred[away] @ level[away]) / max(float(centred[away] @ centred[away]), _TINY)
+    return np.asarray(mean_level + slope * centred)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _linear_response(cause: Floats, effect: Floats) -> Floats:
