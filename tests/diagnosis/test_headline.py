@@ -32,7 +32,7 @@ def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
          "Sign reversed; many explanations remain, the best: nothing missing (97 %)"),
         ({"verdict": "unexplained"}, "Something is missing that no known mechanism describes (97 %)"),
         ({"verdict": "insufficient_data", "statement": "Too little: one FRF. Add more."}, "Too little: one FRF"),
-        ({"verdict": "insufficient_data", "statement": 21 * "much "}, "These recordings say too little"),
+        ({"verdict": "insufficient_data", "statement": 21 * "much "}, "Nothing can be concluded from these recordings"),
         ({"campaigns": ["a", "b"], "statement": "Both agree. No more."}, "Both agree"),
         ({"headline": "Adhesion."}, "Adhesion"),
     ],

@@ -109,7 +109,7 @@ def test_skin_last_campaign_not_diagnosed_shows(server: Server) -> None:
     assert "not diagnosed" not in said(server, "/?find=half", "half")
     sent(server, last, "half")
     row = said(server, "/?find=half", "half")
-    assert "contact resonance" in row
+    assert "Contact resonance" in row
     assert "of May; the last campaign is not diagnosed" in row
 
 

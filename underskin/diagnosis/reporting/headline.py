@@ -22,7 +22,7 @@ Document = Mapping[str, Any]
 
 def headline(report: Document) -> str:
     """One sentence of at most 20 words on a report of one campaign."""
-    return readable(within_words(_parts(report)))
+    return readable(within_words(_parts(report))).replace("_", " ")  # a lab's names of conditions
 
 
 def first_and_rest(report: Document) -> tuple[str, str]:
@@ -65,8 +65,10 @@ def _answers(report: Document) -> Iterator[str]:
     mechanisms = report["mechanisms"]
     names = in_words([mechanism["name"] for mechanism in mechanisms])
     if verdict == "insufficient_data":
-        yield report["statement"].partition(". ")[0].rstrip(".")
-        yield "these recordings say too little"
+        first = report["statement"].partition(". ")[0].rstrip(".")
+        if "_" not in first:  # names of fields are for those who correct them
+            yield first
+        yield "nothing can be concluded from these recordings"
     elif verdict == "no_mismatch":
         rivals = [in_words(rival["mechanisms"]) for rival in _rivals(report)]
         if (report["probability"] or 0.0) < EXPLAINED and rivals:
