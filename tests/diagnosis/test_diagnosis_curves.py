@@ -398,34 +398,6 @@ def test_adhesion_gel_liquid_leaves_modulus(work: float, table: SigmaTable) -> N
     assert 0.8 * stated["low"] < work < 1.25 * stated["high"]
 
 
-def test_drag_acts_on_what_holds_the_sphere() -> None:
-    """A soft cantilever whose base moves steadily drags as much while the gel holds its tip back, at a third of the
-    speed, under a position whose noise is a third of a step."""
-    samples, stiffness, modulus, radius = 1200, 4.4e-5, 0.015, 0.010
-    base = 1e-3 * np.concatenate([np.linspace(-2.0, 0.25, samples), np.linspace(0.25, -2.0, samples + 1)[1:]])  # mm
-    time = 5e-4 * np.arange(len(base))
-    depths = np.linspace(0.0, 3e-4, 3001)
-    press = 16 / 9 * modulus * np.sqrt(radius) * depths**1.5
-    depth = np.where(base > 0, np.interp(base, depths + press / stiffness, depths), base)
-    force = 16 / 9 * modulus * np.sqrt(radius) * np.maximum(depth, 0.0) ** 1.5
-    largest, speed = force.max(), (base[1] - base[0]) / 5e-4
-    drag, random = 0.03 * largest / speed, np.random.default_rng(4)
-    force += drag * np.where(np.arange(len(base)) < samples, speed, -speed)
-    force += 2e-3 * largest * random.normal(size=len(base))
-    recording = IndentationRecording(
-        "gel", radius, depth + 1.5e-6 * random.normal(size=len(base)), force, time_s=np.asarray(time),
-        stage_stiffness_n_per_mm=stiffness,
-    )  # fmt: skip
-    measured = Campaign("gel", SkinDescription(poisson_ratio=0.5), (recording,), units_checked=True)
-    report = underskin.diagnose(measured, without=beside("liquid_drag", "contact_creep"))
-    assert report.verdict == "explained", report.statement
-    (found,) = (mechanism.parameters[0] for mechanism in report.mechanisms)
-    assert found.low <= drag <= found.high
-    assert report.fit is not None
-    assert report.fit.after.youngs_modulus is not None
-    assert report.fit.after.youngs_modulus.value == pytest.approx(modulus, rel=0.03)
-
-
 def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     """A soft gel under a cantilever in a liquid: the zeros of both ways differ, the force steps where it turns, and
     threads of gel let go gradually, without a jump. Adhesion and drag lead, though no law describes threads; E, 15 kPa,

@@ -26,11 +26,10 @@ class LiquidDrag(Mechanism):
     name = "liquid_drag"
     plain = """The liquid around the moving sphere, or the cantilever that holds it, resists the motion, so the force
     is higher on the way in than on the way back, in contact and away from it, and steps where the motion turns."""
-    law = """measured force = contact force + c dz/dt, with z the travel of what holds the sphere: the displacement, and
-    the deflection of a stage whose stiffness is known; in the air, or the liquid, as in contact."""
+    law = "measured force = contact force + c dz/dt, with z the displacement; in the air, or the liquid, as in contact."
     assumptions = """proportional to the speed, with one coefficient for all recordings: a laminar flow, without the
-    growth of the drag within a diameter of the surface and without inertia. The speed is the slope through neighbouring
-    samples."""
+    growth of the drag within a diameter of the surface and without inertia. The speed is that of the displacement as
+    recorded, the slope through neighbouring samples."""
     source = """Alcaraz, Buscemi, Puig-de-Morales, Colchero, Baró & Navajas, Langmuir 18 (2002) 716 (drag on
     cantilevers in water)."""
     stage = Stage.CURVE

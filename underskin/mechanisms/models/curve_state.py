@@ -10,7 +10,6 @@ Y(t) = ∫ e^(−(t−s)/τ) du(s). u is taken as linear between samples, for wh
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -18,7 +17,6 @@ from scipy.special import gamma
 
 from underskin.autodiff import Differentiated, contiguous
 from underskin.mechanisms.models.sphere_kernels import memory_rows
-from underskin.recordings.curve_course import turning_points
 from underskin.units import Floats
 
 _POWER_STEP = float(np.log(4.0))  # of ln τ, as compiled functions take it: τ falls by a factor of 4 each
@@ -100,42 +98,26 @@ def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
     return memory
 
 
-_COUNTS = (3, 7, 15, 31)  # samples whose straight line gives a speed; more where the displacement is noisy
-_STEADY = 0.05  # of the speed: its deviation by noise of the displacement, above which more samples are taken
+_FEW, _MORE = 3, 7  # samples whose straight line gives a speed; more where the displacement is noisy
+_STEADY = 0.05  # of the largest speed: scatter of a steady speed, by noise of the displacement
 
 
 def speeds(displacement: Floats, time: Floats) -> Floats:
     """The speed at each sample (curves, samples) of displacements at times: the slope of the straight line through it
-    and its neighbours, as few as noise allows, so that it changes as fast as the motion does; more than the nearest
-    ones only from the same way."""
-    return np.stack([_speeds(*columns) for columns in zip(displacement, time, strict=True)])
+    and its neighbours, few so that it turns as fast as the motion does."""
+    few, more = _slopes(displacement, time, _FEW), _slopes(displacement, time, _MORE)
+    scatter = np.median(np.abs(few - more), axis=-1, keepdims=True)
+    return np.where(scatter > _STEADY * np.abs(more).max(axis=-1, keepdims=True), more, few)
 
 
-def _speeds(displacement: Floats, time: Floats) -> Floats:
-    ways = [slice(low, high) for low, high in pairwise((*turning_points(displacement)[:-1].tolist(), len(time)))]
-    nearest, *further = [
-        [_lines(displacement[way], time[way], count) for way in ([slice(None)] if count == _COUNTS[0] else ways)]
-        for count in _COUNTS
-    ]
-    speed, _, scatter = (np.concatenate(columns) for columns in zip(*further[-1], strict=True))
-    steady = np.abs(speed)
-    for lines in (*further[-2::-1], nearest):
-        slope, extent, _ = (np.concatenate(columns) for columns in zip(*lines, strict=True))
-        speed = np.where(scatter <= _STEADY * steady * extent, slope, speed)
-    return speed
-
-
-def _lines(displacement: Floats, time: Floats, count: int) -> tuple[Floats, Floats, Floats]:
-    """Of the lines through `count` samples around each, fewer where there are no more: the slopes, √Σ(t − t̄)², and the
-    deviation of the displacement about them."""
-    count = min(count, len(displacement))
-    places, times = (sliding_window_view(column, count) for column in (displacement, time))
+def _slopes(displacement: Floats, time: Floats, count: int) -> Floats:
+    """Slopes of the lines through `count` samples around each, fewer where there are no more."""
+    count = min(count, displacement.shape[-1])
+    places, times = (sliding_window_view(column, count, axis=-1) for column in (displacement, time))
     places, times = (part - part.mean(axis=-1, keepdims=True) for part in (places, times))
-    extent = np.sqrt(np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny))
-    slope = (times * places).sum(axis=-1) / extent**2
-    scatter = np.sqrt(((places - slope[:, None] * times) ** 2).sum(axis=-1) / max(count - 2, 1))
-    window = np.clip(np.arange(len(displacement)) - count // 2, 0, len(slope) - 1)
-    return slope[window], extent[window], scatter[window]
+    slope = (times * places).sum(axis=-1) / np.maximum((times * times).sum(axis=-1), np.finfo(float).tiny)
+    first = np.clip(np.arange(displacement.shape[-1]) - count // 2, 0, slope.shape[-1] - 1)
+    return np.asarray(slope[..., first])
 
 
 @dataclass(frozen=True)

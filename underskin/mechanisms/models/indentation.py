@@ -75,9 +75,7 @@ class IndentationModel(CurveModel):
         self._stage_compliance = np.array([0.0 if stage is None else 1e-3 / stage for stage in stiffnesses])[
             :, None
         ]  # m/N
-        # That of what holds the sphere, which moves on while the sphere is held back
-        held = self.displacement + self._stage_compliance * self._arranged([_forces(curve) for curve in recordings])
-        self._speed = speeds(held, self.time)
+        self._speed = speeds(self.displacement, self.time)
         self._radius = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])[:, None]
         contacts = [_visible_contact(recording, sticks) for recording in recordings]
         self._seen, self._seen_contact = (
@@ -210,13 +208,6 @@ def _with_touch(travel: Floats, time: Floats, again: Mask) -> Path:
     travel[point, curve, then - 1] = 0.0
     first_contact = np.where((first > 0) & (first < travel.shape[-1]), first - 1, first)
     return Path(travel, time, first_contact, again)
-
-
-def _forces(recording: IndentationConditions) -> Floats:
-    """The measured force [N] (samples,); 0 of conditions alone."""
-    if isinstance(recording, IndentationRecording):
-        return np.asarray(recording.force_n)
-    return np.zeros(len(recording.displacement_mm))
 
 
 def _visible_contact(recording: IndentationConditions, sticks: bool) -> tuple[Mask, Mask]:
