@@ -26,7 +26,7 @@ def rig(**more: Any) -> rig_description.RigDescription:
     return rig_description.from_dict({**given, "join": {"_force": "_charge"}, **more})
 
 
-def write(folder: Path, name: str, heading: str, values: np.ndarray, first: int, separator: str = ";") -> None:
+def write(folder: Path, name: str, heading: str, values: np.ndarray, first: float, separator: str = ";") -> None:
     """A file with a clock, whose first row is that of a sample."""
     rows = [f"{(first + row) / RATE:.4f}{separator}{value:.6f}" for row, value in enumerate(values.tolist())]
     (folder / name).write_text("\n".join([f"Time [s]{separator}{heading}", *rows]))
@@ -143,7 +143,7 @@ def test_a_campaign_document_is_not_joined(tmp_path: Path) -> None:
 )
 def test_files_that_do_not_fit_are_refused(name: str, first: float, message: str, tmp_path: Path) -> None:
     write(tmp_path, "a_force.csv", "Force [N]", FORCE, 0)
-    write(tmp_path, name, "Charge [pC]", CHARGE, first)  # type: ignore[arg-type]
+    write(tmp_path, name, "Charge [pC]", CHARGE, first)
     with pytest.raises(FileError, match=message):
         read(tmp_path)
 

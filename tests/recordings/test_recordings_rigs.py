@@ -67,7 +67,7 @@ def test_the_instruments_own_give_is_subtracted() -> None:
     stiff = SMALL.replace("unit: um}", "unit: um, stiffness_n_per_mm: 5}")
     recording = indented("2.5", stiff)
     assert recording.displacement_mm == pytest.approx([0, 0.05, 0.15])
-    assert recording.stage_stiffness_n_per_mm == 5  # contact that sticks comes off by it, and a drag acts on the stage
+    assert recording.stage_stiffness_n_per_mm == 5  # contact that sticks comes off by it
 
 
 def test_force_falls_depth_needs_sign_said() -> None:
