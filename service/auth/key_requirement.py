@@ -27,7 +27,7 @@ class KeyRequirement:
         self.needed = False
         self._keys = keys
         self._store = store
-        self._missing = False
+        self._missing = 0  # looks in a row
         self._failure = LastingFailure(logger)
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="key requirement", daemon=True)
@@ -70,10 +70,10 @@ class KeyRequirement:
                 self._failure.log("whether keys are needed cannot be looked up", error)
 
     def _warn_of_missing_keys(self) -> None:
-        missing = self.needed and not self._keys.file_exists()
-        if missing and not self._missing:
+        # At the second look: `underskin key open` removes keys.json before it lifts the requirement.
+        self._missing = self._missing + 1 if self.needed and not self._keys.file_exists() else 0
+        if self._missing == 2:
             logger.warning(
                 "keys are needed and %s is missing: put it back, or make a key with `underskin key create NAME`",
                 self._keys.path,
             )
-        self._missing = missing
