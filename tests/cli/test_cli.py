@@ -199,6 +199,7 @@ def test_help_lists_commands_without_loading() -> None:
     assert loaded.isdisjoint({"numpy", "scipy", "fastapi", "skfem", "httpx", "service.cli.serve", "tablegen.commands"})
 
 
+@pytest.mark.slow
 def test_units_stand_in_the_help() -> None:
     shown = run("frf", "--help").stdout
     for unit in ("[mm]", "[MPa]", "[N]", "[pC/N]"):

@@ -165,6 +165,7 @@ def test_instrument_files_need_rig_tell_modulus(tmp_path: Path) -> None:
     assert (wrong.returncode, wrong.stderr) == (2, f"underskin: {rig}: schema = 'rig/9': must be rig/1\n")
 
 
+@pytest.mark.slow
 def test_a_pulled_sample_is_not_called_compressed(palm: Campaign, tmp_path: Path) -> None:
     """The modulus of a pulled cylinder is said to be by tension."""
     stretch = np.linspace(1.0, 1.5, 60)

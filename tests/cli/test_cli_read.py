@@ -9,6 +9,8 @@ import yaml
 
 from tests.cli.commands import run
 
+pytestmark = pytest.mark.slow
+
 LINES = [(10.0, 7.0, -2.0), (20.0, 7.25, -4.5), (40.0, 7.5, -9.0), (80.0, 7.6, -18.0)]
 LONG = "Sensor;Sphere diameter [mm];Preload [N];Dynamic force [N];Frequency [Hz];|H| [pC/N];Phase [deg]"
 WIDE = "f [Hz],s01 |H| [pC/N],s01 phase [deg],s02 |H| [pC/N],s02 phase [deg]"

@@ -83,6 +83,7 @@ def test_files_of_different_skins_are_refused(presses: list[str]) -> None:
     assert f"skin.thickness_mm = 3.0: in {presses[1]}; must be 2.5, as in {presses[0]}" in said
 
 
+@pytest.mark.slow
 def test_together_needs_files_and_a_name(presses: list[str]) -> None:
     assert "--together goes with FILE" in refused("d33", "--together", "palm")
     assert "together = '': must be a printable text" in refused("d33", presses[0], "--together", "")

@@ -14,6 +14,8 @@ from underskin.recordings.campaign import Campaign, IndentationRecording, parse
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+pytestmark = pytest.mark.slow
+
 SHARED_CELL = 0.01  # sd of the logarithm of the gain that all curves share
 
 

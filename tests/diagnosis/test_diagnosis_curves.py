@@ -398,6 +398,7 @@ def test_adhesion_gel_liquid_leaves_modulus(work: float, table: SigmaTable) -> N
     assert 0.8 * stated["low"] < work < 1.25 * stated["high"]
 
 
+@pytest.mark.slow
 def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     """A soft gel under a cantilever in a liquid: the zeros of both ways differ, the force steps where it turns, and
     threads of gel let go gradually, without a jump. Adhesion and drag lead, though no law describes threads; E, 15 kPa,

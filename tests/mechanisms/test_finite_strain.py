@@ -45,6 +45,7 @@ def test_solved_force(radius: float, depths: list[float]) -> None:
     assert force_of(*at, share=0.0)[-1] > 1.015 * solved[-1]
 
 
+@pytest.mark.slow
 def test_solved_stiffening() -> None:
     """Yeoh's layer is followed within 0.3 % by the stiffening of the neo-Hookean contact, with E within 1.5 %; taken as
     stiffening of the linear contact it has E twice as far off."""

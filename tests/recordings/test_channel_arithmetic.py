@@ -138,6 +138,7 @@ def test_difference_whatever_units_terms_came(first: str, second: str) -> None:
     np.testing.assert_allclose(in_si(channel), piezo - deflection, rtol=1e-12, atol=1e-18)
 
 
+@pytest.mark.slow
 @given(st.text(max_size=60) | st.text(alphabet="ab0.'[]()+-*/ _,:=@!{}", max_size=40))
 def test_any_text_is_a_formula_or_is_refused(text: str) -> None:
     try:

@@ -16,6 +16,8 @@ from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.reading import Reading
 
+pytestmark = pytest.mark.slow
+
 STEP = 1e-3
 FORCE = np.random.default_rng(1).normal(1.0, 0.1, 200).round(6)
 CHARGE = (7.4 * FORCE).round(6)

@@ -38,6 +38,7 @@ def test_the_papers_reading(toe: float, sign: int) -> None:
     assert found.leaves_at_strain == pytest.approx(2 / 16, rel=0.1)
 
 
+@pytest.mark.slow
 def test_straight_curve_stays_straight() -> None:
     """A straight curve stays straight and its uncertainty is the scatter seen."""
     random = np.random.default_rng(1)
@@ -123,6 +124,7 @@ def test_modulus_sample_contact_leaves_open() -> None:
         indentation_modulus(depth, force, RADIUS, 0.5)
 
 
+@pytest.mark.slow
 @NEEDS_RECORDINGS
 @pytest.mark.parametrize(("product", "modulus_kpa"), [("EF10_0T", 62.5), ("EF30_0T", 101.0), ("EF50_0T", 160.0)])
 def test_silicones_under_compression(product: str, modulus_kpa: float) -> None:
@@ -150,6 +152,7 @@ def test_a_steel_sphere_in_a_well(well: str, modulus_mpa: float) -> None:
     assert found.modulus == pytest.approx(1e6 * modulus_mpa, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pulled", "largest"), [(True, (0.3, 1.5)), (False, (0.08, 0.35))])
 def test_interval_of_neo_hookean_samples(pulled: bool, largest: tuple[float, float]) -> None:
     """The 95 % interval of E holds that of strips and blocks with an unknown zero, slack and 0.1 to 2 % noise."""

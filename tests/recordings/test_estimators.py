@@ -19,6 +19,8 @@ from underskin.recordings.frf.estimators import ESTIMATORS, Estimator
 from underskin.recordings.readers import hdf5_file
 from underskin.units import Floats
 
+pytestmark = pytest.mark.slow
+
 NOISE = 0.3  # of each channel's own standard deviation
 SAMPLES = 200_000
 

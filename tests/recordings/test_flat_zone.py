@@ -353,6 +353,7 @@ def _struck(seed: int) -> Frf:
     return lines.frf.at(np.flatnonzero(lines.frf.used_or_all))
 
 
+@pytest.mark.slow
 def test_noise_of_blows_is_not_called_mains() -> None:
     """Lines that depart no further than others of the same FRFs are not left out as pick-up."""
     named = [bool(mains_lines(stacked([_struck(3 * seed + part) for part in range(3)]))) for seed in range(20)]

@@ -181,6 +181,7 @@ def test_few_numbers_without_time_no_copies() -> None:
     assert (ids(found), found.warnings) == (["a", "b", "c"], [])
 
 
+@pytest.mark.slow
 def test_press_file_instrument_writes() -> None:
     """A press a file as an instrument writes it."""
     description = rig(

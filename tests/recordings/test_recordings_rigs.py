@@ -15,6 +15,8 @@ from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording, IndentationRecording
 from underskin.recordings.rig_description import RigDescription
 
+pytestmark = pytest.mark.slow
+
 RIGS = sorted((EXAMPLES / "rigs").glob("*.yaml"))
 
 

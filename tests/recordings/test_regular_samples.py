@@ -108,6 +108,7 @@ def test_a_clock_printed_coarser_than_a_step(rate: float, form: str) -> None:
     assert bool(note) or np.unique(time).size == time.size
 
 
+@pytest.mark.slow
 @given(st.floats(0.01, 0.06), st.integers(0, 2**32))
 def test_a_clock_with_jitter_is_resampled(jitter: float, seed: int) -> None:
     """Samples of a slow signal at times that vary are those of even times."""

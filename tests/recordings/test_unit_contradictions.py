@@ -16,6 +16,8 @@ from underskin.recordings.readers.unit_labels import contradicts, labelled_unit,
 from underskin.recordings.reading import Reading
 from underskin.recordings.rig_description import RigDescription
 
+pytestmark = pytest.mark.slow
+
 FORCE, CHARGE = np.array([1.0, 1.5, 0.5, 1.0]), np.array([0.0, 3.5, -3.5, 0.5])
 
 

@@ -15,6 +15,8 @@ from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("force", "charge", "t1", "Kanal", "x")
 NUMBER = st.floats(-1e6, 1e6).map(lambda number: round(number, 3))
 ARRAYS = st.lists(NUMBER, min_size=2, max_size=5).map(np.array)
