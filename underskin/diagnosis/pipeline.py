@@ -16,6 +16,7 @@ from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.facts import DiagnosisResult
+from underskin.diagnosis.reporting.modulus import modulus_over_answers
 from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search
@@ -183,7 +184,8 @@ def _diagnose_curves(
     joined = other_kinds.joined(fit)
     problem, result = joined.problem, joined.search
     result = replace(result, laws=tuple(with_laws(problem, result)))
-    partial = partial.with_findings(*thickness_findings(campaign, problem, result))
+    modulus = modulus_over_answers(result, problem, result.fit_behind(result.answers[0]))
+    partial = partial.with_findings(*thickness_findings(campaign, problem, result, modulus))
     return _complete(replace(partial, curves=campaign, joined=joined), problem, result, progress, limits)
 
 

@@ -1,12 +1,13 @@
 """The declared thickness of an indented sample against the one that its curves show.
 
 A layer of another thickness is a rival like a mechanism more: its thickness is a parameter, as where none is declared,
-with the prior of one mechanism. It is reported where that is not clearly less probable than the answer and its 95 %
-interval excludes the declared value: a wrong thickness and a sample that stiffens with strain look much alike. That the
-declared layer's law was tried, and is clearly less probable, is reported as well.
+with the prior of one mechanism. It is reported where that is not clearly less probable than the answer, its 95 %
+interval excludes the declared value: a wrong thickness and a sample that stiffens with strain look much alike. It is
+not where it changes neither mechanisms nor modulus: some percent of thickness make up for what a contact law idealises.
+That the declared layer's law was tried, and is clearly less probable, is reported as well.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,8 +29,11 @@ from underskin.recordings.campaign import Campaign
 _LAYER = LayeredContact.name
 
 
-def thickness_findings(campaign: Campaign, problem: FittingProblem, result: Search) -> list[Finding]:
-    """The thickness of the layer that the curves of a campaign show, where the declared one contradicts it."""
+def thickness_findings(
+    campaign: Campaign, problem: FittingProblem, result: Search, modulus: Mapping[str, float] | None
+) -> list[Finding]:
+    """The thickness of the layer that the curves of a campaign show, where the declared one contradicts it and changes
+    the answer: its mechanisms or `modulus`, the stated one with `low` and `high` [MPa]."""
     declared, named = campaign.skin.thickness_mm, problem.lines.mechanisms.named
     if problem.kind != "indentation" or declared is None or _LAYER not in named:
         return []
@@ -44,9 +48,11 @@ def thickness_findings(campaign: Campaign, problem: FittingProblem, result: Sear
     gains = [fit.log_evidence + log_prior_of(fit, result.supported) - weight for fit in fits]
     for fit, gain in sorted(zip(fits, gains, strict=True), key=lambda pair: -pair[1])[:1]:
         low, value, high = _thickness(fit)
-        if gain > -least and not low <= declared <= high:
+        modulus_mpa = _modulus(campaign, fit)
+        is_same = fit.names == stated.names and modulus is not None and modulus["low"] <= modulus_mpa <= modulus["high"]
+        if gain > -least and not is_same and not low <= declared <= high:
             arguments = {"declared_mm": declared, "value_mm": value, "low_mm": low, "high_mm": high}
-            arguments |= {"modulus_mpa": _modulus(campaign, fit), "better": gain > least}
+            arguments |= {"modulus_mpa": modulus_mpa, "better": gain > least}
             findings.append(Finding(Reason.THICKNESS_DIFFERS, "", "thickness_mm", arguments))
     return findings
 
