@@ -142,6 +142,47 @@ def test_a_wrong_thickness_is_a_rival_of_stiffening(true_mm: float, declared_mm:
     assert any(finding.code == "thickness_differs" for finding in report.findings)
 
 
+def unit_hertz(depth: Floats) -> Floats:
+    """Hertz's force [N] on a sphere of 1 mm and an incompressible half space of 1 MPa."""
+    return 16 / 9 * depth**1.5
+
+
+@pytest.mark.parametrize(
+    ("radii_mm", "declared_mm", "moduli", "why"),
+    [
+        ((2.5, 5.0, 10.0), (10.0, 5.0, 2.5), (1.0, 1.0, 1.0), "if the spheres of 2.5 and 10 mm are exchanged"),
+        ((2.5, 5.0), (2.5, 10.0), (1.0, 1.0), "10 mm is the diameter of that sphere"),
+        ((5.0, 5.0, 5.0), (5.0, 5.0, 5.0), (0.75, 1.0, 1.3), "differs from place to place"),
+        ((2.5, 5.0, 10.0), (2.5, 5.0, 10.0), (0.96, 1.0, 1.03), None),
+    ],
+)
+def test_curves_whose_moduli_differ_lack_something(
+    radii_mm: Floats, declared_mm: Floats, moduli: Floats, why: str | None
+) -> None:
+    """Spheres by Hertz's law of wrong radii, or on places of another modulus: no answer is stated without a word."""
+    depth = ways(-0.05, 0.3, samples=300)
+    curves = [
+        {
+            "id": f"c{number}",
+            "kind": "indentation",
+            "indenter_radius_mm": declared,
+            "displacement_mm": depth.round(7).tolist(),
+            "force_n": (e * r**0.5 * pressed(depth, unit_hertz, seed=number)).round(7).tolist(),
+        }
+        for number, (r, declared, e) in enumerate(zip(radii_mm, declared_mm, moduli, strict=True))
+    ]
+    measured, problems = from_dict(
+        {"schema": "campaign/1", "name": "spheres", "skin": {"poisson_ratio": 0.5}, "recordings": curves}
+    )
+    assert problems == []
+    report = diagnosed(measured)
+    found = [finding.statement for finding in report.findings if finding.code == "curves_differ"]
+    assert report.verdict == ("no_mismatch" if why is None else "ambiguous")
+    assert bool(found) == (why is not None)
+    assert why is None or why in found[0]
+    assert why is None or str(report.headline).startswith("The curves' moduli differ")
+
+
 def test_a_thickness_declared_too_small_beside_a_compressible_layer() -> None:
     """A layer that yields more than the declared one looks compressible: a mechanism that needs the declared thickness
     is not compared with a layer of another thickness, and the true one is stated."""

@@ -32,6 +32,7 @@ from underskin.diagnosis.validation.cross_validation import (
     largest_floor_percent,
     nearest_law_findings,
 )
+from underskin.diagnosis.validation.curve_spread import curve_spread_findings
 from underskin.diagnosis.validation.declared_thickness import thickness_findings
 from underskin.diagnosis.validation.imitation import odds_of_imitated_laws
 from underskin.diagnosis.validation.signatures import (
@@ -218,6 +219,7 @@ def _complete(
     shape = describe(problem, stated) if undescribed else None
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
     determining = frozenset() if partial.joined is None else partial.joined.determining_modulus(stated.names)
+    partial = partial.with_findings(*curve_spread_findings(problem, stated))
     return replace(
         partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,

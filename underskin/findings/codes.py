@@ -61,6 +61,7 @@ class FindingCode(StrEnum):
     HELD_OUT_NO_BETTER = "held_out_no_better"
     NO_SIMPLE_LAW = "no_simple_law"
     UNUSUAL_SCATTER = "unusual_scatter"
+    CURVES_DIFFER = "curves_differ"
     SEATING = "seating"  # in stored reports alone
     NOT_LINEAR = "not_linear"
     CONTACT_SLIPS = "contact_slips"
@@ -186,6 +187,7 @@ class Reason(StrEnum):
     HELD_OUT_NO_BETTER = "held_out_no_better"
     NO_SIMPLE_LAW = "no_simple_law"
     UNUSUAL_SCATTER = "unusual_scatter"
+    CURVES_DIFFER = "curves_differ"
     LOAD_NOT_LINEAR = "not_linear.load"
     PRESSURE_NOT_LINEAR = "not_linear.pressure"
     CONTACT_SLIPS = "contact_slips"

@@ -86,6 +86,7 @@ class DefectKind(StrEnum):
 
 
 _MOST_SENSORS = 3  # named one by one
+_MOST_CURVES = 6  # with their moduli, in a sentence
 _MOST_LISTED = 6
 
 
@@ -143,6 +144,18 @@ def thickness_differs(
         f"the thickness may not be the declared {declared_mm:g} mm: a layer of {value} mm ({low} to {high}) on a stiff "
         f"base describes these curves {how} the stated answer, with a Young's modulus of {modulus_mpa:.3g} MPa"
     )
+
+
+def curves_differ(ids: Sequence[str], factors: Sequence[float], remedies: Sequence[str]) -> str:
+    """Curves whose moduli contradict each other."""
+    each = ", ".join(f"{name} {factor:.2f}" for name, factor in zip(ids[:_MOST_CURVES], factors, strict=False))
+    more = " …" if len(ids) > _MOST_CURVES else ""
+    why = (
+        f"they agree if {' or if '.join(remedies)}"
+        if remedies
+        else "the sample differs from place to place, or a radius, a size or a range is not what is declared"
+    )
+    return f"the moduli of the curves differ by more than a poor rig scatters (times their mean: {each}{more}): {why}"
 
 
 def more_alike(count: int, noun: str) -> str:
@@ -580,6 +593,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.NO_SIMPLE_LAW: no_simple_law,
     Reason.UNUSUAL_SCATTER: "the gain of the recordings scatters by {percent:.2g} %, and by {usual:.2g} % on a poor "
     "rig: something that no recording states changes from one to the next",
+    Reason.CURVES_DIFFER: curves_differ,
     Reason.LOAD_NOT_LINEAR: "L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left "
     "out; it "
     "adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere"

@@ -97,11 +97,12 @@ class Facts:
         """The verdict by the probabilities, as docs/diagnosis.md explains it.
 
         A set of mechanisms explains nothing if one of them may as well have no effect, or has a parameter at the bound
-        of its search; nor does the base model with d33 or a free modulus at a bound.
+        of its search; nor does the base model with d33 or a free modulus at a bound, or any answer to curves whose
+        moduli contradict each other.
         """
         if self.leader.explanation is None:
             return "unexplained"
-        if self.bounds:
+        if self.bounds or self.curves_differ:
             return "ambiguous"
         if self.leader.names == (NOTHING_MISSING,):
             return "no_mismatch"
@@ -129,8 +130,15 @@ class Facts:
     @property
     def other_thickness(self) -> list[str]:
         """A clause on a layer of another thickness than the declared one, where the curves show it as well."""
-        findings = self.diagnosis.findings
-        return [finding.statement for finding in findings if finding.reason == Reason.THICKNESS_DIFFERS]
+        return self._statements(Reason.THICKNESS_DIFFERS)
+
+    @property
+    def curves_differ(self) -> list[str]:
+        """A clause on curves whose moduli contradict each other."""
+        return self._statements(Reason.CURVES_DIFFER)
+
+    def _statements(self, reason: Reason) -> list[str]:
+        return [finding.statement for finding in self.diagnosis.findings if finding.reason == reason]
 
     @property
     def _may_be_the_other(self) -> bool:

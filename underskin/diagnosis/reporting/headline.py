@@ -11,6 +11,7 @@ from typing import Any
 from underskin.diagnosis.data.names import EXPLAINED, MOST_QUOTED, NAMED, in_words
 from underskin.diagnosis.reporting.statement import SLIPS
 from underskin.diagnosis.reporting.wording import finding, in_its_unit, number, readable, unit
+from underskin.findings.codes import FindingCode
 from underskin.findings.formatting import capital, in_percent
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 
@@ -47,7 +48,7 @@ def within_words(parts: Iterable[str], kept: str = "") -> str:
 
 
 def _parts(report: Document) -> Iterator[str]:
-    slips = [entry for entry in report.get("findings", ()) if entry["code"] in SLIPS]
+    slips = [entry for entry in report.get("findings", ()) if entry["code"] in (*SLIPS, FindingCode.CURVES_DIFFER)]
     slip = finding(slips[0]["code"]) if slips else ""
     yield slip
     yield next(answer for answer in _answers(report) if len(f"{slip} {answer}".split()) <= WORDS)
@@ -95,6 +96,8 @@ def _answers(report: Document) -> Iterator[str]:
         for group in certain:
             either = " or ".join(in_words([name]) for name in group["mechanisms"])
             yield f"{either} ({in_percent(group['probability'])}), not settled"
+        if (report["probability"] or 0.0) >= EXPLAINED:
+            yield f"{names or 'nothing missing'} ({probability}), not settled"
         remaining = (
             "many explanations remain" if not _rivals(report) else f"{1 + len(_rivals(report))} explanations remain"
         )

@@ -65,7 +65,7 @@ def statement(facts: Facts) -> str:
     # A mechanism that was not tried may be what is missing: that comes first
     of_tried = verdict == "unexplained" and bool(facts.untried)
     decides += facts.untried if of_tried else []
-    doubts = (*facts.bounds, *facts.other_thickness) if verdict == "ambiguous" else ()
+    doubts = (*facts.bounds, *facts.other_thickness, *facts.curves_differ) if verdict == "ambiguous" else ()
     reserves = [finding for finding in facts.findings if finding["statement"] not in doubts]
     open_questions = [*_clauses(reserves, _RESERVES), *([] if of_tried else facts.untried)]
     quoted = [

@@ -29,6 +29,7 @@ _FINDINGS = {
     "gain_steps": "amplitude off by a factor",
     "held_out_no_better": "no better on other recordings",
     "unusual_scatter": "recordings scatter",
+    "curves_differ": "the curves' moduli differ",
     "line_noise_level": "noise differs from line to line",
     "lines_not_finite": "lines without a number",
     "behind_filter": "band behind a filter",
