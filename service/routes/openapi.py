@@ -62,12 +62,6 @@ def methods(api: FastAPI, path: str) -> list[str]:
     return [method.upper() for method in _document(api)["paths"].get(path, ())]
 
 
-def query_parameters(api: FastAPI, path: str, method: str) -> list[str]:
-    """The query parameters of a route of the API, as they stand in the document."""
-    operation = _document(api)["paths"][path][method.lower()]
-    return [parameter["name"] for parameter in operation.get("parameters", []) if parameter["in"] == "query"]
-
-
 def _document(api: FastAPI) -> dict[str, Any]:
     return api.openapi_schema or _describe(api)
 

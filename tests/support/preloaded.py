@@ -27,6 +27,10 @@ from typing import Any
 UNDERSKIN = Path(sys.executable).with_name("underskin")
 _MODULES = (  # of the server, and of commands that ask it or invert files
     *("service.cli.serve", "service.cli.keys", "service.cli.backup", "alembic.runtime.migration", "psycopg"),
+    "service.store.migrations",
+    # With the first campaign and the first pages
+    *("underskin.surrogate.spline_kernel", "underskin.physics.contact_kernel", "underskin.inversion.elastomer"),
+    *("underskin.figures.campaign_figures", "underskin.figures.frf", "underskin.figures.history", "plotly.subplots"),
     *("underskin.cli.app", "underskin.client.service_client", "underskin.inversion.invert"),
     *("rich.progress", "rich.table"),
 )

@@ -12,7 +12,6 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents
@@ -236,6 +235,8 @@ def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], f
     even = even[(even >= time[0]) & (even <= time[-1])]
     if not all(np.isfinite(column).all() for column in columns.values()):
         raise ValueError("samples are not evenly spaced, and a channel holds no finite number in some")
+    from scipy.interpolate import CubicSpline  # takes 0.4 s to load, which few need
+
     with np.errstate(all="ignore"):
         resampled = {name: np.asarray(CubicSpline(time, column)(even)) for name, column in columns.items()}
     jitter = f"{100 * off.std() / step:.2g} % of a step rms"
