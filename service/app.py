@@ -13,7 +13,9 @@ from service.auth.access_control import AccessControl
 from service.auth.login_throttle import LoginThrottle
 from service.dependencies import authorised
 from service.ingest.uploads import UploadFolder
-from service.jobs import Planner, Runner, WorkerProcesses
+from service.jobs.planner import Planner
+from service.jobs.process import WorkerProcesses
+from service.jobs.runner import Runner
 from service.middleware import request_log
 from service.middleware.asgi_middleware import AsgiMiddleware
 from service.middleware.error_handlers import install_handlers

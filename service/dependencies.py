@@ -8,7 +8,8 @@ from fastapi.security import SecurityScopes
 
 from service.auth.access_control import SAFE
 from service.auth.keys import Key
-from service.jobs import Planner, Runner
+from service.jobs.planner import Planner
+from service.jobs.runner import Runner
 from service.problems import Refusal
 from service.store import Database
 from underskin.errors import wrong_type

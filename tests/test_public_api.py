@@ -79,6 +79,16 @@ def test_every_error_is_an_underskin_error() -> None:
     assert all(issubclass(error, underskin.UnderskinError) for error in raised)
 
 
-def test_import_loads_no_numerics() -> None:
-    seen = "import sys, underskin; print(sorted({'numpy', 'scipy', 'h5py', 'httpx'} & set(sys.modules)))"
+@pytest.mark.parametrize(
+    ("module", "unneeded"),
+    [
+        ("underskin", {"numpy", "scipy", "h5py", "httpx"}),
+        ("underskin.recordings.readers.sandbox", {"scipy", "h5py", "multiprocessing", "underskin.recordings.reading"}),
+        ("service.jobs.worker", {"scipy", "sqlalchemy"}),
+        ("underskin.diagnosis.pipeline", {"scipy.stats"}),
+    ],
+)
+def test_import_loads_what_it_needs(module: str, unneeded: set[str]) -> None:
+    """Processes that start often, for a file, a diagnosis or a command, load nothing that takes long and is not used."""
+    seen = f"import sys, {module}; print(sorted({unneeded} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", seen], capture_output=True, text=True, check=True).stdout == "[]\n"

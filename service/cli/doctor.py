@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from service.cli.shared import read_settings, use_folder_of_lab
-from service.jobs import WorkerProcesses
-from service.jobs.process import CampaignInput
+from service.jobs.process import CampaignInput, WorkerProcesses
 from service.settings import Settings
 from service.usecases.checkup import examine
 from service.usecases.observation import Level, Observation

@@ -3,9 +3,3 @@
 runner.py claims diagnoses and keeps them alive, process.py is the server's side of a worker, worker.py the worker;
 planner.py plans next experiments within a rig's limits, which are not stored.
 """
-
-from service.jobs.planner import Planner
-from service.jobs.process import WorkerProcesses
-from service.jobs.runner import Runner
-
-__all__ = ["Planner", "Runner", "WorkerProcesses"]

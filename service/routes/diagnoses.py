@@ -8,7 +8,7 @@ from fastapi.responses import JSONResponse
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, SkinId, Store, Table, number_of_cursor
-from service.jobs import Runner
+from service.jobs.runner import Runner
 from service.middleware.unique_keys import JsonRoute
 from service.routes.idempotency import Idempotency, Idempotent
 from service.schemas import diagnoses as models

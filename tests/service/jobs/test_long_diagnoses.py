@@ -9,8 +9,9 @@ from typing import Any, Self, cast
 
 import pytest
 
-from service.jobs import Runner, WorkerProcesses, runner
-from service.jobs.process import CampaignInput
+from service.jobs import runner
+from service.jobs.process import CampaignInput, WorkerProcesses
+from service.jobs.runner import Runner
 from service.store import Database, campaigns, diagnoses, open_store
 from tests.support.diagnosed import asked, awaited, report, resonant, sent
 from tests.support.store_server import Place, campaign, running

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from service.jobs import Runner, WorkerProcesses
+from service.jobs.process import WorkerProcesses
+from service.jobs.runner import Runner
 from service.store import campaigns, database, diagnoses, open_store
 from service.store.tables import AnyRow
 from service.store.tables import diagnoses as table_of_diagnoses

@@ -14,7 +14,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import (
@@ -29,6 +28,7 @@ from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, parameter_slices
 from underskin.diagnosis.inference.products import CurveProducts
 from underskin.errors import InvalidInput
+from underskin.halton import halton
 from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter
@@ -187,8 +187,7 @@ def _evenly(parameters: int) -> Floats:
     levels = (np.arange(count) + 0.5) / count
     if parameters < 2:
         return np.asarray(levels[:, None][:, :parameters])
-    others = qmc.Halton(parameters - 1, scramble=False).random(count + 1)[1:]
-    return np.column_stack([levels, others])
+    return np.column_stack([levels, halton(count, parameters - 1)])
 
 
 def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:

@@ -25,11 +25,11 @@ from math import log
 
 import numpy as np
 from scipy.special import logsumexp
-from scipy.stats import qmc
 
 from underskin.diagnosis.noise import GAIN_FALL, Plateau
 from underskin.diagnosis.slips.comparison import LEAST_RESPONSE, flat_level
 from underskin.findings.finding import Finding
+from underskin.halton import halton
 from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.composed import compose
@@ -269,12 +269,11 @@ def _drawn(model: FrfModel, start: Floats) -> Array:
     mechanism_parameters = model.parameters[: len(model.parameters) - len(start)]
     if not mechanism_parameters:
         return start[None, :]
-    share = qmc.Halton(len(mechanism_parameters), scramble=False).random(_DRAWS + 1)[1:]  # the first is 0
     points = [
         [
             parameter.quantile(float(probability))
             for parameter, probability in zip(mechanism_parameters, row, strict=True)
         ]
-        for row in share
+        for row in halton(_DRAWS, len(mechanism_parameters))
     ]
     return np.hstack([points, np.tile(start, (len(points), 1))])

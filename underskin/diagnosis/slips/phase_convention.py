@@ -21,7 +21,6 @@ from math import comb, log
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.stats import norm
 
 from underskin.diagnosis.slips.comparison import LEAST_LINES, LEAST_RECORDINGS
 from underskin.diagnosis.slips.levels import times
@@ -328,13 +327,18 @@ def _of_two_signs(phase: Floats, weight: Floats, signs: Floats) -> float:
     for varied in _VARIED:
         spread = np.sqrt(variance + varied**2)
         parts = (
-            np.log(1 - share) + norm.logpdf(amplitude, 1.0, spread),
-            np.log(share) + norm.logpdf(amplitude, -1.0, spread),
+            np.log(1 - share) + _log_density(amplitude, 1.0, spread),
+            np.log(share) + _log_density(amplitude, -1.0, spread),
         )
         two_signs.append(float(np.logaddexp(*parts).sum()))
         mean = float(np.average(amplitude, weights=spread**-2))
-        one_sign.append(float(norm.logpdf(amplitude, mean, spread).sum()))
+        one_sign.append(float(_log_density(amplitude, mean, spread).sum()))
     return max(two_signs) - max(one_sign)
+
+
+def _log_density(value: Floats, mean: float, deviation: Floats) -> Floats:
+    """Of a normal distribution, but for the constant."""
+    return np.asarray(-0.5 * ((value - mean) / deviation) ** 2 - np.log(deviation))
 
 
 def _orientation(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: Floats) -> tuple[int, float | None]:
