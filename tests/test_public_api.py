@@ -89,6 +89,6 @@ def test_every_error_is_an_underskin_error() -> None:
     ],
 )
 def test_import_loads_what_it_needs(module: str, unneeded: set[str]) -> None:
-    """Processes that start often, for a file, a diagnosis or a command, load nothing that takes long and is not used."""
+    """Processes that start often, for a file, a diagnosis or a command, load nothing that they do not use."""
     seen = f"import sys, {module}; print(sorted({unneeded} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", seen], capture_output=True, text=True, check=True).stdout == "[]\n"
