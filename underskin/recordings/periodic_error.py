@@ -51,7 +51,7 @@ def periodic_error(travel: Floats, force: Floats) -> PeriodicError | None:
     samples, is_mean = (travel, force), len(travel) > _MOST_SAMPLES
     travel, force = _means(travel), _means(force)
     air = _in_air(travel, force)
-    if air.sum() < _FEWEST:
+    if air.sum() < _FEWEST or not np.ptp(force[air]):
         return None
     period_in_air = _period_in_air(travel[air], force[air])
     if period_in_air is None or period_in_air * _OVER_RANGE > np.ptp(travel):
