@@ -9,7 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.support import preloaded
+from tests.cli.commands import run
 
 SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5, "indenter_radius_mm": 4.0}
 FRF = {**SKIN, "preload_n": 1.0, "d33_pc_per_n": 14.0}
@@ -23,7 +23,7 @@ def as_csv(columns: dict[str, Any]) -> str:
 
 
 def by_command(command: str, columns: dict[str, Any], *options: str) -> subprocess.CompletedProcess[str]:
-    return preloaded.run(command, "--input", "-", "--csv", *options, given=as_csv(columns))
+    return run(command, "--input", "-", "--csv", *options, given=as_csv(columns))
 
 
 def columns_of(text: str) -> dict[str, list[str]]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.array_stress.stress_documents import PRESS, SKIN, Document, document, posted
-from tests.support import preloaded
+from tests.cli.commands import run
 from tests.support.cases import first
 from tests.support.sphere_contact import SphereOnLayer
 from underskin import Client
@@ -177,10 +177,10 @@ def test_client_command_give_services_numbers(http: httpx.Client, server_url: st
     assert [words or None for words in found.limit.tolist()] == (plain["limit"] or [None] * len(found.limit))
     file = tmp_path / "load.json"
     file.write_text(json.dumps(request), encoding="utf-8-sig")  # as some editors write it
-    written = preloaded.run("stress", file, "--csv").stdout
+    written = run("stress", file, "--csv").stdout
     rows = list(csv.DictReader(io.StringIO(written)))
     assert [float(row["charge_pc"]) for row in rows] == plain["charge_pc"]
-    shown = preloaded.run("stress", "-", given=json.dumps(request)).stdout
+    shown = run("stress", "-", given=json.dumps(request)).stdout
     first_words = [line.split()[0] for line in shown.splitlines() if line.strip()]
     assert [word for word in first_words if word in found.sensor] == ["s0", "s1", "s2", "s3", "s4"]
     assert found.contact_radius_mm == pytest.approx(plain["contact_radius_mm"])
@@ -239,15 +239,15 @@ def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
     drawn = {"x_mm": [7, 8, 9], "y_mm": [-1, 0, 1], "pressure_mpa": [[0, 0.1, 0], [0.1, 0.3, 0.1], [0, 0.1, 0]]}
     expected = answer(TABLE, read_request({**SKIN, "pressure_map": drawn})).columns["charge_pc"].tolist()
     command = ("stress", skin, "--pressure-map", pressed, "--csv")
-    rows = csv.DictReader(io.StringIO(preloaded.run(*command).stdout))
+    rows = csv.DictReader(io.StringIO(run(*command).stdout))
     assert [(row["sensor"], float(row["charge_pc"])) for row in rows] == list(
         zip(["s0", "s1", "s2", "s3", "s4"], expected, strict=True)
     )
     pressed.write_bytes("mm;7;8;9;\r\n-1;0;0,1;0;\r\n0;0,1;0,3;0,1;\r\n1;0;0,1;0;\r\n;;;;\r\n".encode("utf-16"))
-    spreadsheet = csv.DictReader(io.StringIO(preloaded.run(*command).stdout))
+    spreadsheet = csv.DictReader(io.StringIO(run(*command).stdout))
     assert [float(row["charge_pc"]) for row in spreadsheet] == expected
     skin.write_text(json.dumps({**SKIN, "pressure_map": drawn}))
-    refused = preloaded.run(*command)
+    refused = run(*command)
     assert (refused.returncode, "give it once" in refused.stderr) == (2, True), refused.stderr
     skin.write_text(json.dumps(SKIN))
     cases = (
@@ -260,5 +260,5 @@ def test_the_command_takes_a_map_from_csv(tmp_path: Path) -> None:
     )
     for content, says in first(3, cases):
         pressed.write_text(content)
-        refused = preloaded.run(*command)
+        refused = run(*command)
         assert (refused.returncode, says in refused.stderr) == (2, True), refused.stderr

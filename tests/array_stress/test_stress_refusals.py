@@ -12,7 +12,7 @@ import pytest
 
 from service.routes.stress import EXAMPLE
 from tests.array_stress.stress_documents import PRESS, SKIN, Document, document, posted
-from tests.support import preloaded
+from tests.cli.commands import run
 
 
 def map_of(**changes: Any) -> Callable[[Document], None]:
@@ -125,7 +125,7 @@ def test_nan_refused_batch_too_large_says(http: httpx.Client) -> None:
 @pytest.mark.slow
 def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
     file = tmp_path / "load.json"
-    missing = preloaded.run("stress", tmp_path / "none.json")
+    missing = run("stress", tmp_path / "none.json")
     assert (missing.returncode, "No such file" in missing.stderr) == (2, True)
     for content, says in (
         ("{", "line 1, column 2: not JSON"),
@@ -133,7 +133,7 @@ def test_the_command_names_what_is_wrong(tmp_path: Path) -> None:
         ("[]", "named fields"),
     ):
         file.write_text(content)
-        refused = preloaded.run("stress", file)
+        refused = run("stress", file)
         assert refused.returncode == 2
         assert says in refused.stderr
         assert len(refused.stderr.splitlines()) == 1
@@ -182,7 +182,7 @@ def test_doubtful_answers_say_why(http: httpx.Client, tmp_path: Path) -> None:
     assert "spans 0.01 mm, on sensors 3 mm across: is it in mm?" in found["statement"]
     file = tmp_path / "load.json"
     file.write_text(json.dumps(document(hard)))
-    written = preloaded.run("stress", file)
+    written = run("stress", file)
     assert written.stderr.startswith("underskin: look at contacts[0]: L = F/(R²E) is 0.12")
 
 

@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.support import preloaded
+from tests.cli.commands import run
 from underskin import Client
 from underskin.errors import ServiceError
 
@@ -113,14 +113,14 @@ def test_client_command_numbers(http: httpx.Client, server_url: str) -> None:
         with pytest.raises(ServiceError, match="preload_n"):
             client.field(**{**SPHERE, "preload_n": -1.0})
     options = [f"--{name.replace('_', '-')}={value}" for name, value in SPHERE.items()]
-    written = preloaded.run("field", *options, "--r-points", "5", "--depth-points", "3", "--csv")
+    written = run("field", *options, "--r-points", "5", "--depth-points", "3", "--csv")
     rows = list(csv.DictReader(io.StringIO(written.stdout)))
     stress = [float(row["sigma_zz_mpa"]) for row in rows]
     assert stress == pytest.approx(np.ravel(expected["sigma_zz_mpa"]), rel=1e-9)
     assert [float(row["r_mm"]) for row in rows[:5]] == pytest.approx(expected["r_mm"])
-    shown = preloaded.run("field", *options, "--r-points", "5").stdout
+    shown = run("field", *options, "--r-points", "5").stdout
     assert "σzz on the base" in shown
     assert f"{expected['sigma']:.5g}" in shown
-    refused = preloaded.run("field", *options, "--preload-n", "-1")
+    refused = run("field", *options, "--preload-n", "-1")
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "preload_n" in refused.stderr
