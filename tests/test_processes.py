@@ -26,7 +26,7 @@ from proof.stored import Work, of_each
 if __name__ == "__main__":
     of_each(Work(Path("."), 2), [0.0] * 4 + [60.0] * 4, time.sleep, lambda done, count: Path("{done}").touch())
 """
-PATIENCE_S = 120.0
+PATIENCE_S = 240.0
 
 
 @pytest.fixture(scope="module")

@@ -54,7 +54,7 @@ class Bench:
 
     def wait_for(self, text: str, count: int = 1) -> None:
         """Until it has printed a text so many times."""
-        deadline = time.monotonic() + 120  # a machine may be busy
+        deadline = time.monotonic() + 240  # a machine may be busy
         while self.told.count(text) < count:
             assert time.monotonic() < deadline, f"{text!r} not {count} times in\n{self.told}"
             assert self.process is None or self.process.poll() is None, self.told
@@ -113,7 +113,7 @@ def network(through: Network) -> Iterator[str]:
             }
             try:
                 answer = httpx.request(
-                    self.command, through.server + self.path, content=body, headers=headers, timeout=60
+                    self.command, through.server + self.path, content=body, headers=headers, timeout=240
                 )
             except (httpx.TransportError, httpx.UnsupportedProtocol):
                 self.close_connection = True  # without an answer

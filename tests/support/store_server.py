@@ -69,7 +69,7 @@ def running(place: Place, *, key: str | None = None, **settings: str) -> Iterato
 
 
 def _wait_until_ready(client: httpx.Client, process: preloaded.Process, log: Path) -> None:
-    deadline = time.monotonic() + 120  # a machine may be busy
+    deadline = time.monotonic() + 240  # a machine may be busy
     while time.monotonic() < deadline:
         assert process.poll() is None, log.read_text()[-2000:]
         try:

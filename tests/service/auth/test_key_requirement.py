@@ -27,7 +27,7 @@ def anonymous(server: Server, path: str = "/v1/skins", accept: str = "*/*") -> h
 
 def status_in_time(server: Server, expected: int) -> int:
     """Of an anonymous request: the expected status, or the last one when nobody waits for it any more."""
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 240
     while (status := anonymous(server).status_code) != expected and time.monotonic() < deadline:
         time.sleep(0.05)
     return status

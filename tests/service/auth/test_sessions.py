@@ -220,7 +220,7 @@ def test_a_logout_during_a_look_is_kept(tmp_path: Path, monkeypatch: pytest.Monk
     assert looking.wait(240)
     sessions.log_out(cookie, key)
     logged_out.set()
-    look.join(10)
+    look.join(240)
     assert sessions.has_ended(cookie)
 
 

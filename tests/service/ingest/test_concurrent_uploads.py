@@ -42,7 +42,7 @@ PROBE = """\
 import sys, time, urllib.request
 while True:
     begun = time.monotonic()
-    with urllib.request.urlopen(sys.argv[1], timeout=60) as answer:
+    with urllib.request.urlopen(sys.argv[1], timeout=240) as answer:
         answer.read()
     print(time.monotonic() - begun, flush=True)
     time.sleep(0.1)

@@ -54,13 +54,13 @@ def test_answered_disk_uploads_hangs(hanging_server: Server, disk: HangingDisk, 
         with disk.hanging(call):
             by_page = [pool.submit(send_by_page, hanging_server, number) for number in range(FEW)]
             sent = [pool.submit(send, hanging_server, number) for number in range(count)]
-            end = time.monotonic() + 120
+            end = time.monotonic() + 240
             while not disk.waiting():
                 assert time.monotonic() < end, "nothing hangs"
                 time.sleep(0.05)
             time.sleep(1.0)
             for path in OTHERS:
-                assert hanging_server.http.get(path, timeout=60).status_code == 200, path
+                assert hanging_server.http.get(path, timeout=240).status_code == 200, path
         assert {one.result() for one in by_page} == {303}
         assert {one.result() for one in sent} == {201}
 
@@ -72,7 +72,7 @@ def test_headers_export_answered_without_making(hanging_server: Server, disk: Ha
     for path in ("/v1/skins/exported/export", f"/v1/campaigns/{sent['id']}/document?format=hdf5"):
         whole = http.get(path)
         with disk.hanging("making a file"):
-            head = http.head(path, timeout=10)
+            head = http.head(path, timeout=240)
             assert not disk.waiting()
         assert (head.status_code, head.content) == (200, b"")
         for name in ("Content-Type", "Content-Disposition"):

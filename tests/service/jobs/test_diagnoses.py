@@ -49,7 +49,7 @@ def _parent(pid: str) -> tuple[int, str]:
 
 
 def await_workers(server: Server, count: int, name: str = "underskin-works") -> list[int]:
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 240
     while time.monotonic() < deadline:
         pids = workers_of(server, name)
         if len(pids) == count:
@@ -60,7 +60,7 @@ def await_workers(server: Server, count: int, name: str = "underskin-works") -> 
 
 def is_gone(pid: int) -> bool:
     """Whether a process ends within a while, whoever its parent is by now."""
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 240
     while time.monotonic() < deadline:
         with suppress(FileNotFoundError, ProcessLookupError):
             if (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] != "Z":

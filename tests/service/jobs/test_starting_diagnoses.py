@@ -88,7 +88,7 @@ def test_diagnosis_no_thread_starts_put_back(
         runner = Runner(store, processes, 1)
         runner.start()
         try:
-            ends = time.monotonic() + 120
+            ends = time.monotonic() + 240
             while store.read(diagnoses.find, diagnosis.id).state != "done":
                 assert time.monotonic() < ends, store.read(diagnoses.find, diagnosis.id)
                 time.sleep(0.1)

@@ -50,7 +50,7 @@ def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 def is_well(server: Server) -> bool:
     """Whether `/health` answers, on a connection of its own."""
-    return httpx.get(f"{server.url}/health", timeout=60).status_code == 200
+    return httpx.get(f"{server.url}/health", timeout=240).status_code == 200
 
 
 def counted(server: Server, limit: str) -> float:
@@ -135,7 +135,7 @@ def test_not_take_answer_disconnected(server: Server) -> None:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.sendall(f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: {len(body)}\r\n\r\n".encode() + body)
         before = counted(server, "idle_answer")
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + 240
         while counted(server, "idle_answer") == before:
             assert time.monotonic() < deadline
             time.sleep(0.1)
@@ -150,7 +150,7 @@ def test_request_takes_server_long_not_given(tmp_path: Path) -> None:
         numbers = ", ".join(["0.30000000000000004"] * 1_000_000)
         body = f'{{"a_over_h": [{numbers}], "rt_over_h": 0.6}}'.encode()
         answer = httpx.post(
-            f"{server.url}/v1/sigma", content=body, headers={"Content-Type": "application/json"}, timeout=120
+            f"{server.url}/v1/sigma", content=body, headers={"Content-Type": "application/json"}, timeout=240
         )
     assert len(answer.raise_for_status().json()["sigma"]) == 1_000_000
 
@@ -239,8 +239,8 @@ def test_refused_not_read_gives_way(locked: Server, begun: str) -> None:
     """
     with ExitStack() as stack:
         connections = [one for _ in range(4) for one in opened(locked, CONNECTIONS, begun, stack)]
-        deadline = time.monotonic() + 30
-        while httpx.get(f"{locked.url}/v1/tables", timeout=60).status_code != 401:
+        deadline = time.monotonic() + 240
+        while httpx.get(f"{locked.url}/v1/tables", timeout=240).status_code != 401:
             assert time.monotonic() < deadline
             for connection in connections if begun is REFUSED else []:
                 with suppress(ConnectionError):
@@ -305,7 +305,7 @@ def test_health_answers_connections_descriptors(tmp_path: Path) -> None:
     with log.open("wb") as errors, subprocess.Popen(few, env=environment, stdout=errors, stderr=errors) as process:
         try:
             url = f"http://127.0.0.1:{port}"
-            deadline = time.monotonic() + 120
+            deadline = time.monotonic() + 240
             while "serves on" not in log.read_text():
                 assert process.poll() is None, log.read_text()
                 assert time.monotonic() < deadline

@@ -93,7 +93,7 @@ def test_design_outside_table_says_limit_old(visitor: Visit) -> None:
     visitor.drawn(2)
     force = page.get_by_label("force F").last
     force.fill("900")
-    page.get_by_text("exceeds 0.15: at most 38.4 N").wait_for(timeout=20_000)
+    page.get_by_text("exceeds 0.15: at most 38.4 N").wait_for()
     shown = page.locator(".results").inner_text()
     assert "not told apart everywhere" not in shown
     assert "outside the table" in shown

@@ -77,7 +77,7 @@ def test_law_picture_twins_found(server: Server, visitor: Visit) -> None:
     expect(page.locator("#adhesion").get_by_text(re.compile("Found in none of "))).to_be_visible()
     edge = page.locator("#moving_contact_edge")
     twin = edge.get_by_role("listitem").filter(has_text="modulus error")
-    assert "indentation" in twin.inner_text(timeout=20_000)
+    assert "indentation" in twin.inner_text()
     for image in page.locator("img.picture").all():
         image.scroll_into_view_if_needed()
     page.wait_for_function("() => [...document.images].every(one => one.complete && one.naturalWidth > 0)")

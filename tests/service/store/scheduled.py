@@ -17,7 +17,7 @@ def scheduled(folder: Path, **settings: str) -> dict[str, str]:
 
 def wait_for(folder: Path, count: int) -> list[Path]:
     """Until there are so many backups, or more."""
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 240
     while time.monotonic() < deadline:
         found = [entry.path for entry in stored_backups(folder)] if folder.is_dir() else []
         if len(found) >= count:

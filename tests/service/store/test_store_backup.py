@@ -133,7 +133,7 @@ def test_readers_answered_restore_goes(place: Place, tmp_path: Path, monkeypatch
         def read(what: str, *_: object) -> None:
             if what == "restoring" and not seen:
                 time.sleep(0.5)  # whatever has been begun is under way
-                seen.append([server.http.get(f"/v1/campaigns/{one}", timeout=10).status_code for one in (kept, later)])
+                seen.append([server.http.get(f"/v1/campaigns/{one}", timeout=240).status_code for one in (kept, later)])
 
         with closing(open_store(place.database_url, place.folder)) as store, store.without_writers():
             backup.replace_with(store, file, read)

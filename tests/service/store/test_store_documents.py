@@ -89,7 +89,7 @@ def test_documents_number_recordings_whole(server: Server, count: int) -> None:
     assert to_dict(parse(hdf5_file.read(io.BytesIO(answer.content), ""))) == sent
     with h5py.File(io.BytesIO(answer.content)) as file:
         assert len(file["recordings"]) == count
-    deadline = time.monotonic() + 60  # the file goes once the answer is sent
+    deadline = time.monotonic() + 240  # the file goes once the answer is sent
     while (left := list(server.place.folder.glob("uploads/*/tmp*"))) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert left == []

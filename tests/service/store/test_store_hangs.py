@@ -25,7 +25,7 @@ def test_answered_example_waits_store(server: Server) -> None:
         time.sleep(0.5)
         assert not loading.done()
         for path in ("/health", "/v1/sigma?a_over_h=0.3&rt_over_h=0.6"):
-            assert server.http.get(path, timeout=60).status_code == 200
+            assert server.http.get(path, timeout=240).status_code == 200
         assert not loading.done()  # it waits for the lock, which these did not
         locking.rollback()
         assert loading.result().status_code == 303

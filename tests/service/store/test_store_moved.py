@@ -236,7 +236,7 @@ def test_diagnoses_wait_file_log_says_once(place: Place, tmp_path: Path) -> None
     with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
         answer = server.http.post("/v1/campaigns", json=campaign("one", lines=5))
         (place.folder / DATABASE).rename(tmp_path / "aside")
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + 240
         while any(told not in log.read_text() for told in watchers):
             assert time.monotonic() < deadline
             time.sleep(0.2)
@@ -244,7 +244,7 @@ def test_diagnoses_wait_file_log_says_once(place: Place, tmp_path: Path) -> None
         (tmp_path / "aside").rename(place.folder / DATABASE)
         started = server.http.post(f"/v1/campaigns/{answer.json()['id']}/diagnosis")
         assert started.status_code == 202, started.text
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + 240
         while server.http.get(f"/v1/diagnoses/{started.json()['id']}").json()["state"] == "queued":
             assert time.monotonic() < deadline
             time.sleep(0.1)

@@ -160,7 +160,7 @@ def test_arrivals_skin_not_wait(on_postgresql: Database) -> None:
         keep(connection, "palm")
         other = threading.Thread(target=on_postgresql.write, args=(keep, "palm"))
         other.start()
-        other.join(10)
+        other.join(240)
         assert not other.is_alive()
 
 

@@ -24,7 +24,7 @@ QUICKLY_S = 18.0  # a write waits for 20 s
 def answered(server: Server, path: str) -> httpx.Response:
     """The answer, which must come before a write would have given up."""
     began = time.monotonic()
-    answer = server.http.get(path, timeout=60)
+    answer = server.http.get(path, timeout=240)
     assert (answer.status_code, time.monotonic() - began < QUICKLY_S) == (200, True), answer.text
     return answer
 
