@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import Any, TextIO
 from unittest.mock import patch
 
 import pytest
@@ -64,8 +64,15 @@ def _warnings_told() -> Iterator[None]:
         yield
 
 
-def _write_warning(message: Warning | str, category: type[Warning], file: str, line: int, *_: object) -> None:
-    sys.stderr.write(warnings.formatwarning(message, category, file, line))
+def _write_warning(  # as `warnings.showwarning`, whose other arguments are for messages that go elsewhere
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,  # noqa: ARG001
+    line: str | None = None,  # noqa: ARG001
+) -> None:
+    sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
 def refused(*arguments: str, given: str = "", **environment: str) -> str:
