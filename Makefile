@@ -45,7 +45,6 @@ unit: $(VENV)/.dev ## run the quick tests of the library, without server, browse
 
 test: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at reduced counts (TESTS=tests/physics for some of them)
 	@scripts/system-packages.sh $(TEST_PACKAGES)
-	@[ -d tests/__pycache__ ] || $(PYTHON) -m pytest --collect-only --quiet > /dev/null  # compiled once, not in each process
 	$(PYTEST) $(TESTS)
 
 soak: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at full counts, the long ones included (resumes)
