@@ -7,7 +7,7 @@ given s, t and p. All pairs and starting recordings are tried this way, and the 
 of ln of the number tried. The rival is a step of any size in one of the two sensors.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -16,6 +16,7 @@ from math import log
 import numpy as np
 
 from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, SPREADS, Alternative, Levels, Undone
+from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
@@ -33,8 +34,11 @@ class _Exchange:
     gain: float
 
 
-def exchanged_cables(levels: Levels, positions: Positions) -> Iterator[Alternative]:
-    """The likeliest exchanges, and the rivals; `positions` of the sensors are in mm."""
+def exchanged_cables(screened: Screened) -> Iterator[Alternative]:
+    """The likeliest exchanges, and the rivals."""
+    levels = screened.levels
+    if levels is None:
+        return
     for spread in SPREADS[1:]:  # of sensors whose exchange would show
         tried = list(_tried(levels, spread))
         if not tried:
@@ -42,7 +46,7 @@ def exchanged_cables(levels: Levels, positions: Positions) -> Iterator[Alternati
         best = max(tried, key=lambda exchange: exchange.gain)
         sensor = levels.sensor.copy()
         sensor[best.since] = sum(best.sensors) - sensor[best.since]
-        undo = partial(_with_right_sensors, levels=levels, exchange=best, positions=positions)
+        undo = partial(_with_right_sensors, levels=levels, exchange=best, positions=screened.positions)
         yield Alternative(-SELDOM - log(len(tried)), sensor=sensor, undo=undo)
         late = np.isin(np.arange(len(levels.value)), best.since)
         for name in best.sensors:
@@ -69,7 +73,7 @@ def _tried(levels: Levels, spread: float) -> Iterator[_Exchange]:
 
 
 def _with_right_sensors(
-    recordings: Sequence[FrfRecording], _: float, *, levels: Levels, exchange: _Exchange, positions: Positions
+    recordings: list[FrfRecording], _: float, *, levels: Levels, exchange: _Exchange, positions: Positions
 ) -> Undone:
     """The recordings with their true sensors; contacts move with the sensors."""
     since = levels.index[exchange.since]
@@ -79,19 +83,10 @@ def _with_right_sensors(
     arguments = {"first": first, "second": second, "since": recordings[start].id, "recordings": len(since)}
     right = list(recordings)
     for index in since.tolist():
-        recording = recordings[index]
-        there = second if recording.sensor == first else first
-        right[index] = replace(
-            recording, sensor=there, position_mm=_moved(recording, positions[recording.sensor], positions[there])
-        )
-    return right, Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
-
-
-def _moved(
-    recording: FrfRecording, here: tuple[float, float], there: tuple[float, float]
-) -> tuple[float, float] | None:
-    """The position of the contact relative to the other sensor; None if it was not given."""
-    if recording.position_mm is None:
-        return None
-    x, y = (at + new - old for at, new, old in zip(recording.position_mm, there, here, strict=True))
-    return x, y
+        here, position_mm = recordings[index].sensor, recordings[index].position_mm
+        there = second if here == first else first
+        if position_mm is not None:
+            x, y = (at + new - old for at, new, old in zip(position_mm, positions[there], positions[here], strict=True))
+            position_mm = x, y
+        right[index] = replace(recordings[index], sensor=there, position_mm=position_mm)
+    return right, [Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)]

@@ -4,12 +4,13 @@ Neighbouring τ hardly differ, and count as one choice. Rivals are a single firs
 drift. Where load cycles are noted, ageing explains a fall.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, Alternative, Levels, Undone
+from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, Alternative, Undone
+from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.forms import recording_order
@@ -23,8 +24,11 @@ _FIRST = -1.5  # ln prior of a single first recording that is off, over that of 
 _OVER = 0.01  # of the level: largest remaining drift in recordings that are used
 
 
-def warm_ups(levels: Levels) -> Iterator[Alternative]:
+def warm_ups(screened: Screened) -> Iterator[Alternative]:
     """Drifts of each τ, and the rivals."""
+    levels = screened.levels
+    if levels is None:
+        return
     times = [time for time in _TIMES if time <= _LONGEST * len(levels.value)]
     for time in times:
         undo = partial(_without_first, time=time, may_age=levels.may_age)
@@ -34,7 +38,7 @@ def warm_ups(levels: Levels) -> Iterator[Alternative]:
     yield Alternative(_FIRST, column=CHANGE * (levels.order == 0).astype(float))
 
 
-def _without_first(recordings: Sequence[FrfRecording], size: float, *, time: float, may_age: bool) -> Undone | None:
+def _without_first(recordings: list[FrfRecording], size: float, *, time: float, may_age: bool) -> Undone | None:
     """The recordings after the warm-up."""
     amplitude = CHANGE * size
     if abs(amplitude) < LEAST_CHANGE or (may_age and amplitude > 0):
@@ -43,4 +47,4 @@ def _without_first(recordings: Sequence[FrfRecording], size: float, *, time: flo
     late = recording_order(recordings) > last
     arguments = {"percent": 100 * float(np.exp(-amplitude) - 1), "recordings": int((~late).sum())}
     remaining = [recording for recording, chosen in zip(recordings, late, strict=True) if chosen]
-    return remaining, Finding(Reason.WARM_UP, "", "recorded_at", arguments)
+    return remaining, [Finding(Reason.WARM_UP, "", "recorded_at", arguments)]

@@ -1,0 +1,106 @@
+"""Time series whose force contradicts what is declared: wrong units, or exchanged channels.
+
+The mean force is the preload, unless AC coupling removed it. Its oscillation is about the dynamic force: the peak for
+sines and blows, √2 times the standard deviation for sines and noise; drift, as of a relaxing preload, is not
+oscillation. The logarithms of both ratios are 0 ± 1, and off by ln 1000 together where the force, one of them where the
+preload or the dynamic force, is in a neighbouring unit.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import product
+from math import log
+
+import numpy as np
+
+from underskin.diagnosis.slips.levels import Alternative, Undone
+from underskin.diagnosis.slips.table import GAIN, Screened
+from underskin.diagnosis.slips.wrong_units import MOST_SHARE, SLIP
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf.estimation import exchanged_channels, oscillation_of
+from underskin.recordings.frf.spectra import mean_of
+from underskin.units import force_unit
+
+_NO_PREFIX = ("gf", "kgf", "lbf")  # units of force that are no power of 1000 off
+_OF_FORCE, _OF_DYNAMIC_FORCE, _OF_PRELOAD = (1, 1), (1, 0), (0, 1)  # oscillation and mean that are off what is declared
+_SLIPS = tuple(product((_OF_FORCE, _OF_DYNAMIC_FORCE, _OF_PRELOAD), (log(SLIP), -log(SLIP))))
+
+
+def wrong_forces(screened: Screened) -> Iterator[Alternative]:
+    """Single recordings whose force contradicts what is declared."""
+    contradictions = contradicting_forces(screened.recordings)
+    if contradictions and not are_many(contradictions, screened.recordings):
+        off = {finding.recording for _, finding in contradictions}
+        findings = [replace(one, arguments={**one.arguments, "left_out": True}) for _, one in contradictions]
+        gain = min(nats for nats, _ in contradictions)
+        yield Alternative(0.0, gain, undo=partial(_without, off=off, findings=findings))
+
+
+def _without(recordings: list[FrfRecording], _: float, *, off: set[str], findings: list[Finding]) -> Undone:
+    return [recording for recording in recordings if recording.id not in off], findings
+
+
+def are_many(contradictions: Sequence[object], recordings: Sequence[FrfRecording]) -> bool:
+    """Whether so many recordings are contradicted that it is no slip of single ones."""
+    return len(contradictions) > max(1.0, MOST_SHARE * len(recordings))
+
+
+def together(contradictions: Sequence[tuple[float, Finding]], recordings: int) -> list[Finding]:
+    """One finding where all recordings have the same, otherwise one for each."""
+    findings = [finding for _, finding in contradictions]
+    kinds = {(finding.reason, finding.field, finding.arguments.get("given_in")) for finding in findings}
+    if len(findings) == recordings > 1 and len(kinds) == 1:
+        first = findings[0]
+        return [replace(first, recording="", arguments={**first.arguments, "example": first.recording})]
+    return findings
+
+
+def contradicting_forces(recordings: Sequence[FrfRecording]) -> list[tuple[float, Finding]]:
+    """Of each recording whose force contradicts its declared values the gain of ln evidence, and the finding."""
+    return [contradiction for recording in recordings if (contradiction := _contradiction(recording)) is not None]
+
+
+def _contradiction(recording: FrfRecording) -> tuple[float, Finding] | None:
+    if recording.force_n is None or recording.charge_pc is None:
+        return None
+    if (exchanged := exchanged_channels(recording)) is not None:
+        return np.inf, exchanged
+    preload, dynamic_force_n = mean_of(recording.force_n), recording.dynamic_force_n
+    guess = None if preload is None else force_unit(preload, recording.preload_n)
+    if guess is not None and guess.meant[0][1] in _NO_PREFIX:
+        values = {"mean_n": preload, "preload_n": recording.preload_n, "guess": guess}
+        return np.inf, Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", values)
+    oscillation = np.log(np.maximum(oscillation_of(recording.force_n) / dynamic_force_n, 1e-300))
+    mean = None if preload is None else log(abs(preload) / recording.preload_n)
+
+    def nats(of_oscillation: float, of_mean: float) -> float:
+        off = float(np.abs(oscillation - of_oscillation).min()), 0.0 if mean is None else abs(mean - of_mean)
+        return -0.5 * (off[0] ** 2 + off[1] ** 2) if max(off) < log(SLIP) / 2 else -np.inf
+
+    (off, size), best = max(
+        (
+            ((off, size), nats(off[0] * size, off[1] * size))
+            for off, size in _SLIPS
+            if mean is not None or off[0] == off[1]
+        ),
+        key=lambda slip: slip[1],
+    )
+    gain = best - max(nats(0.0, 0.0), -0.5 * log(SLIP) ** 2)
+    if not gain > GAIN:
+        return None
+    units = {
+        "too_large": (size > 0) == (off == _OF_FORCE),
+        "given_in": "mN" if (size > 0) == (off == _OF_FORCE) else "kN",
+    }
+    nearest = dynamic_force_n * float(np.exp(min(oscillation, key=abs)))
+    if off == _OF_FORCE:
+        arguments = {"oscillation_n": nearest, "dynamic_force_n": dynamic_force_n}
+        return gain, Finding(Reason.SERIES_FORCE, recording.id, "force_n", {**arguments, **units})
+    if off == _OF_DYNAMIC_FORCE:
+        arguments = {"dynamic_force_n": dynamic_force_n}
+        return gain, Finding(Reason.SERIES_DYNAMIC_FORCE, recording.id, "dynamic_force_n", {**arguments, **units})
+    arguments = {"preload_n": recording.preload_n, "mean_n": float(np.mean(recording.force_n))}
+    return gain, Finding(Reason.SERIES_PRELOAD, recording.id, "preload_n", {**arguments, **units})

@@ -1,0 +1,178 @@
+"""Wrong units among the recordings: a force in kN, a sphere or a position in m, a frequency in kHz, a charge in nC.
+
+Values that are meant alike differ by ln 1 ± 1 from the median of all, and those in a neighbouring unit by ln 1000 more
+or less. A position p is in another unit where f·p, with f = 1000 or 1/1000, lies nearer to its sensor: the density of
+contacts falls with the distance squared, as every distance is as likely as ten times as much. At a sensor in the origin
+this cannot be detected, and has little effect. Recordings with such a value are left out.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from math import log
+
+import numpy as np
+
+from underskin.diagnosis.slips.comparison import LEAST_RECORDINGS
+from underskin.diagnosis.slips.levels import Alternative, Undone
+from underskin.diagnosis.slips.table import GAIN, Screened
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.mechanisms.models.composition import D33
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.plausibility import OF_PVDF
+from underskin.units import Floats, Mask, unit_guess
+
+SLIP = 1000.0  # between neighbouring units
+MOST_SHARE = 0.25  # of the recordings; more are no slip of single ones
+_WIDTH = log(12.0)  # of ln 1000: values that are meant to be equal differ by less
+_FAINT = 5e-4  # dynamic force over preload: instruments resolve no less
+_RESPONSE = "frf_re_pc_per_n"
+_LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
+_FIELDS = {  # the units that make values too large, and too small
+    "preload_n": ("mN", "kN"),
+    "dynamic_force_n": ("mN", "kN"),
+    "indenter_radius_mm": ("µm", "m"),
+    "frequency_hz": ("mHz", "kHz"),
+}
+_POSITIONS = (
+    # factor, least distance from the sensor [mm], unit of the positions, or of the sensors
+    (1e3, 1.0, "m", "µm"),
+    (1e-3, 200.0, "µm", "m"),
+)
+_AT_SENSORS_MM = (1e-4, 0.01)  # implausible distances from a sensor: no stage is that precise
+
+
+def wrong_values(screened: Screened) -> Iterator[Alternative]:
+    """For each field the recordings whose value is off all others by a factor of about 1000."""
+    for name, (too_large, too_small) in _FIELDS.items():
+        values = np.array([_value(recording, name) for recording in screened.recordings])
+        off, nats = _off_by_1000(values)
+        findings = []
+        for index in np.flatnonzero(off).tolist():
+            units = {"too_large": bool(off[index] > 0), "given_in": too_large if off[index] > 0 else too_small}
+            arguments = {"value": float(values[index]), **units}
+            findings.append(Finding(Reason.BESIDE_OTHERS, screened.recordings[index].id, name, arguments))
+        yield from _left_out(off != 0, nats, findings, cost=log(len(off)))
+
+
+def wrong_responses(screened: Screened) -> Iterator[Alternative]:
+    """The recordings whose level is off that of all others by a factor of about 1000."""
+    off, nats = _off_by_1000(np.abs(screened.comparison.ratio))
+    findings = [
+        Finding(
+            Reason.RESPONSE_BESIDE_OTHERS, screened.recordings[index].id, _RESPONSE, {"too_large": bool(off[index] > 0)}
+        )
+        for index in np.flatnonzero(off).tolist()
+    ]
+    yield from _left_out(off != 0, nats, findings, cost=log(len(off)))
+
+
+def wrong_positions(screened: Screened) -> Iterator[Alternative]:
+    """The recordings whose position is off by a factor of 1000."""
+    for reason, off, nats, arguments in _positions(screened):
+        if reason is Reason.PLACE:
+            ids = [screened.recordings[index].id for index in np.flatnonzero(off).tolist()]
+            yield from _left_out(off, nats, [Finding(reason, name, "position_mm", arguments) for name in ids], cost=0.0)
+
+
+def all_positions(screened: Screened) -> list[Finding]:
+    """The finding on the unit of all positions where those of many are off by a factor of 1000."""
+    shared = [(reason, arguments) for reason, _, _, arguments in _positions(screened) if reason is Reason.PLACES]
+    return [Finding(reason, "", "position_mm", arguments) for reason, arguments in shared]
+
+
+def _left_out(off: Mask, nats: Floats, findings: list[Finding], cost: float) -> Iterator[Alternative]:
+    """The alternative that these recordings are off, each at the `cost` of choosing it."""
+    if findings:
+        undo = partial(_without, off=off, findings=findings)
+        yield Alternative(-cost * int(off.sum()), float(nats[off].sum()), undo=undo)
+
+
+def _without(recordings: list[FrfRecording], _: float, *, off: Mask, findings: list[Finding]) -> Undone:
+    return [recording for recording, wrong in zip(recordings, off, strict=True) if not wrong], findings
+
+
+def _off_by_1000(values: Floats) -> tuple[Floats, Floats]:
+    """1 for each value that is about 1000 times those of the others, −1 where it is a thousandth, else 0, and the gain
+    of ln evidence by it; a value that is NaN or 0 is unknown. More than a quarter of all, but for one, are no slip."""
+    known = values > 0
+    if known.sum() < LEAST_RECORDINGS:
+        return np.zeros(len(values)), np.zeros(len(values))
+    usual = float(np.median(values[known]))
+    slip = np.log(np.where(known, values, usual) / usual)
+    off = np.where(np.abs(np.abs(slip) - log(SLIP)) < _WIDTH, np.sign(slip), 0.0)
+    few = np.count_nonzero(off) <= max(MOST_SHARE * len(values), 1.0)
+    return few * off, log(SLIP) * (np.abs(slip) - log(SLIP) / 2)
+
+
+def _positions(screened: Screened) -> Iterator[tuple[Reason, Mask, Floats, dict[str, object]]]:
+    """For each wrong unit the recordings that it explains, with the gain of ln evidence."""
+    sensor_mm, contact_mm = _sensors_and_contacts(screened)
+    for factor, least, unit, sensors_unit in _POSITIONS:
+        given, meant = (np.hypot(*(scale * contact_mm - sensor_mm).T) for scale in (1.0, factor))
+        with np.errstate(divide="ignore"):
+            nats = 2 * np.log(np.maximum(given, 1e-12) / np.maximum(meant, 1e-12))
+        off = (given > least) & (nats > GAIN)
+        slip = {"too_small": factor > 1, "given_in": unit}
+        if off.sum() > MOST_SHARE * len(off):
+            yield Reason.PLACES, off, nats, {**slip, "sensors_in": sensors_unit}
+        else:
+            yield Reason.PLACE, off, nats, slip
+
+
+def at_sensors(screened: Screened) -> list[Finding]:
+    """Positions that differ from their sensors' by some µm at most: an offset series in m."""
+    sensor_mm, contact_mm = _sensors_and_contacts(screened)
+    farthest = float(np.hypot(*(contact_mm - sensor_mm).T).max())
+    if not _AT_SENSORS_MM[0] < farthest < _AT_SENSORS_MM[1]:
+        return []
+    return [Finding(Reason.PLACES_AT_SENSORS, "", "position_mm", {"farthest_mm": farthest})]
+
+
+def _sensors_and_contacts(screened: Screened) -> tuple[Floats, Floats]:
+    """Positions of each recording's sensor and contact [mm], (recordings, 2) each."""
+    sensors = [screened.positions[recording.sensor] for recording in screened.recordings]
+    contacts = [recording.position_mm or here for recording, here in zip(screened.recordings, sensors, strict=True)]
+    return np.reshape(sensors, (-1, 2)), np.reshape(contacts, (-1, 2))
+
+
+def _value(recording: FrfRecording, name: str) -> float:
+    frequency = name == "frequency_hz"
+    return float(np.median(lines_of(recording).frequency)) if frequency else float(getattr(recording, name))
+
+
+def faint_oscillation(recordings: Sequence[FrfRecording]) -> list[Finding]:
+    """The finding on a negligible dynamic force, as one given in kN; only laws of large amplitudes use it."""
+    ratio = max(recording.dynamic_force_n / recording.preload_n for recording in recordings)
+    return [] if ratio > _FAINT else [Finding(Reason.DYNAMIC_FORCE_SMALL, "", "dynamic_force_n", {"ratio": ratio})]
+
+
+def contradicting(ratio: Floats) -> Finding | None:
+    """The finding on two recordings with opposite signs, or levels about 1000 apart: neither can be told to be wrong.
+
+    `ratio` (recordings,) is that to the base model (`comparison`), NaN where it is not informative.
+    """
+    size = np.abs(ratio)
+    if len(ratio) != 2 or not (size > 0).all():
+        return None
+    if np.prod(ratio) < 0:
+        return Finding(Reason.TWO_SIGNS, "", _RESPONSE)
+    of_two = float(size.max() / size.min())
+    return Finding(Reason.TWO_RESPONSES, "", _RESPONSE, {"ratio": of_two}) if abs(log(of_two / SLIP)) < _WIDTH else None
+
+
+def unlikely_d33(ratio: Floats, declared: float | None) -> list[Finding]:
+    """The finding on a d33 that no sensor has, or that is off the declared one by a factor of 1000."""
+    d33 = float(np.nanmedian(np.abs(ratio))) * D33.from_fit(D33.start) if np.isfinite(ratio).any() else 0.0
+    if d33 <= 0:
+        return []
+    low, high = _LIKELY_D33
+    if declared:
+        low, high = abs(declared) / SLIP * np.exp(_WIDTH), abs(declared) * SLIP / np.exp(_WIDTH)
+    if low <= d33 <= high:
+        return []
+    guess = unit_guess("d33_pc_per_n", d33, (low, high) if declared else OF_PVDF)
+    slip = None if guess.units else str(guess)
+    arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "units": guess.units, "slip": slip}
+    return [Finding(Reason.D33_NEEDED, "", _RESPONSE, arguments)]
