@@ -227,6 +227,8 @@ def _orientation(log_frf: _LogFrf, listed: Callable[[Floats], dict[str, Elements
     if phase @ phase < len(phase) + _PLAIN:
         return 0, 0.0, None
     kinds = listed(log_frf.frequency)
+    if _DELAY not in kinds:
+        return 0, 0.0, None
     given, turned = (log_frf.fit(*kinds.values(), turned=turned)[0] for turned in (False, True))
     if min(given, turned) > 4 * len(log_frf.frequency):  # twice the number of values: neither is explained
         return 0, 0.0, None
@@ -251,7 +253,8 @@ def _listed(campaign: Campaign, table: SigmaTable, frequency: Floats) -> dict[st
     """
     order = np.argsort([recording.preload_n * recording.indenter_radius_mm for recording in frf_recordings(campaign)])
     some = order[np.linspace(0, len(order) - 1, _CONTACTS).astype(int)]
-    contacts = [campaign.recordings[index].without_measurements(frequency_hz=frequency) for index in some]
+    recordings = [frf_recordings(campaign)[index] for index in some.tolist()]
+    contacts = [one.without_measurements(frequency_hz=frequency, position_mm=None) for one in recordings]
     conditions = Conditions("contacts", campaign.skin, tuple(contacts))
     base = compose((), conditions, table, "frf")
     start = np.array([parameter.start for parameter in base.parameters])
@@ -267,7 +270,8 @@ def _listed(campaign: Campaign, table: SigmaTable, frequency: Floats) -> dict[st
         points, cost = _over_prior(model.parameters[: len(model.parameters) - len(start)])
         values = np.array(list(model.values(np.hstack([points, np.tile(start, (len(points), 1))]))))
         logarithm = np.log(values / base.predict(start).value).reshape(len(points), _CONTACTS, -1).mean(axis=1)
-        listed[name] = logarithm.T, cost
+        if np.isfinite(logarithm).all():  # not beyond the tables
+            listed[name] = logarithm.T, cost
     return listed
 
 
@@ -276,8 +280,9 @@ def _over_prior(parameters: Sequence[Parameter]) -> tuple[Array, Floats]:
     strengths = [parameter for parameter in parameters if parameter.fit_limit is not None]
     shapes = [parameter for parameter in parameters if parameter not in strengths]
     scores = product(np.linspace(-3.0, 3.0, _SHAPES), *[(-1.0, 0.0, 1.0)] * (len(shapes) - 1))
+    none: list[Parameter | None] = [None]
     points, cost = list[list[float]](), list[float]()
-    for score, strength in product(list(scores) if shapes else [()], [*strengths] or [None]):
+    for score, strength in product(list(scores) if shapes else [()], strengths or none):
         values = {one.name: _scale(one) if one is strength else 0.0 for one in strengths}
         values |= {one.name: one.start + at * _scale(one) for one, at in zip(shapes, score, strict=True)}
         points.append([float(np.clip(values[one.name], *one.bounds)) for one in parameters])

@@ -26,7 +26,7 @@ from scipy.special import logsumexp
 
 from underskin.diagnosis.slips.comparison import aligned_lines, flat_level, no_response
 from underskin.diagnosis.slips.levels import LEAST_LEVELS, POSITION_MM, Alternative, Undone
-from underskin.diagnosis.slips.table import ASTRAY, GAIN, Screened
+from underskin.diagnosis.slips.table import ASTRAY, GAIN, Screened, leave_out
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
@@ -104,8 +104,10 @@ def exchanged_labels(screened: Screened) -> Iterator[Alternative]:
     settled = mute.union(*(exchange.true_sensor for exchange in exchanges))
     alone = [move for move in moves if not settled & set(move.true_sensor)]
     if alone:
-        off = sorted({index for move in alone for index in move.since})
-        yield Alternative(0.0, alone[0].gain, undo=partial(_without, off=off))
+        off = np.isin(np.arange(len(recordings)), [index for move in alone for index in move.since])
+        arguments = {"sensors": sorted({labels[index] for index in np.flatnonzero(off)}), "recordings": int(off.sum())}
+        finding = Finding(Reason.LABELS_CONTRADICT_PLACES, "", "sensor", arguments)
+        yield Alternative(0.0, alone[0].gain, undo=leave_out(off, [finding]))
 
 
 def _weighed(
@@ -198,10 +200,3 @@ def _relabelled(
     if since is None:
         return right, [Finding(Reason.LABELS_EXCHANGED, "", "sensor", pair)]
     return right, [Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**pair, **arguments})]
-
-
-def _without(recordings: list[FrfRecording], _: float, *, off: Sequence[int]) -> Undone:
-    """The recordings without those whose labels contradict their positions."""
-    arguments = {"sensors": sorted({recordings[index].sensor for index in off}), "recordings": len(off)}
-    remaining = [recording for index, recording in enumerate(recordings) if index not in off]
-    return remaining, [Finding(Reason.LABELS_CONTRADICT_PLACES, "", "sensor", arguments)]

@@ -11,13 +11,12 @@ recordings cannot tell which.
 """
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from math import log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import Alternative, Undone
-from underskin.diagnosis.slips.table import GAIN, Screened
+from underskin.diagnosis.slips.levels import Alternative
+from underskin.diagnosis.slips.table import GAIN, Screened, leave_out
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.forms import recording_order
@@ -42,16 +41,11 @@ def silent(screened: Screened) -> Iterator[Alternative]:
         arguments = {"first": first, "second": second, "since": recordings[since[0]].id, "recordings": len(since)}
         finding = Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)
         off = np.isin(np.arange(len(recordings)), since)
-        undo = partial(_without, off=off, findings=[finding])
-        yield Alternative(-log(len(recordings)), float(missing_nats[off].sum()), undo=undo)
+        yield Alternative(-log(len(recordings)), float(missing_nats[off].sum()), undo=leave_out(off, [finding]))
     off, findings = _missing(screened, missing_nats > GAIN + log(len(recordings)))
     if findings:
-        undo = partial(_without, off=off, findings=findings)
-        yield Alternative(-len(findings) * log(len(recordings)), float(missing_nats[off].sum()), undo=undo)
-
-
-def _without(recordings: list[FrfRecording], _: float, *, off: Mask, findings: list[Finding]) -> Undone:
-    return [recording for recording, is_off in zip(recordings, off, strict=True) if not is_off], findings
+        choices = len(findings) * log(len(recordings))
+        yield Alternative(-choices, float(missing_nats[off].sum()), undo=leave_out(off, findings))
 
 
 def _missing(screened: Screened, expected: Mask) -> tuple[Mask, list[Finding]]:

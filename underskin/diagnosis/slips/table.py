@@ -29,6 +29,7 @@ from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Mask
 
 GAIN = log(25)  # ln odds that a slip must have against none
 ASTRAY = 1e-5  # share of recordings that nothing listed explains, which bounds the cost of a wrong label or sign
@@ -71,6 +72,15 @@ class Screened:
 
 
 Slip = Callable[[Screened], Iterable[Alternative]]
+
+
+def leave_out(off: Mask, findings: list[Finding]) -> Callable[[list[FrfRecording], float], Undone]:
+    """What undoes a slip by leaving out the recordings that are `off` (recordings,)."""
+
+    def undo(recordings: list[FrfRecording], _: float) -> Undone:
+        return [recording for recording, is_off in zip(recordings, off, strict=True) if not is_off], findings
+
+    return undo
 
 
 def without_slips(screened: Screened, slips: Sequence[Slip]) -> Undone:

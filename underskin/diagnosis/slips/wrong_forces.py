@@ -8,14 +8,13 @@ preload or the dynamic force, is in a neighbouring unit.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import product
 from math import log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import Alternative, Undone
-from underskin.diagnosis.slips.table import GAIN, Screened
+from underskin.diagnosis.slips.levels import Alternative
+from underskin.diagnosis.slips.table import GAIN, Screened, leave_out
 from underskin.diagnosis.slips.wrong_units import MOST_SHARE, SLIP
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -33,14 +32,10 @@ def wrong_forces(screened: Screened) -> Iterator[Alternative]:
     """Single recordings whose force contradicts what is declared."""
     contradictions = contradicting_forces(screened.recordings)
     if contradictions and not are_many(contradictions, screened.recordings):
-        off = {finding.recording for _, finding in contradictions}
+        ids = {finding.recording for _, finding in contradictions}
+        off = np.array([recording.id in ids for recording in screened.recordings])
         findings = [replace(one, arguments={**one.arguments, "left_out": True}) for _, one in contradictions]
-        gain = min(nats for nats, _ in contradictions)
-        yield Alternative(0.0, gain, undo=partial(_without, off=off, findings=findings))
-
-
-def _without(recordings: list[FrfRecording], _: float, *, off: set[str], findings: list[Finding]) -> Undone:
-    return [recording for recording in recordings if recording.id not in off], findings
+        yield Alternative(0.0, min(nats for nats, _ in contradictions), undo=leave_out(off, findings))
 
 
 def are_many(contradictions: Sequence[object], recordings: Sequence[FrfRecording]) -> bool:

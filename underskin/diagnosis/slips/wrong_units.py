@@ -7,14 +7,13 @@ this cannot be detected, and has little effect. Recordings with such a value are
 """
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from math import log
 
 import numpy as np
 
 from underskin.diagnosis.slips.comparison import LEAST_RECORDINGS
-from underskin.diagnosis.slips.levels import Alternative, Undone
-from underskin.diagnosis.slips.table import GAIN, Screened
+from underskin.diagnosis.slips.levels import Alternative
+from underskin.diagnosis.slips.table import GAIN, Screened, leave_out
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composition import D33
@@ -85,12 +84,7 @@ def all_positions(screened: Screened) -> list[Finding]:
 def _left_out(off: Mask, nats: Floats, findings: list[Finding], cost: float) -> Iterator[Alternative]:
     """The alternative that these recordings are off, each at the `cost` of choosing it."""
     if findings:
-        undo = partial(_without, off=off, findings=findings)
-        yield Alternative(-cost * int(off.sum()), float(nats[off].sum()), undo=undo)
-
-
-def _without(recordings: list[FrfRecording], _: float, *, off: Mask, findings: list[Finding]) -> Undone:
-    return [recording for recording, wrong in zip(recordings, off, strict=True) if not wrong], findings
+        yield Alternative(-cost * int(off.sum()), float(nats[off].sum()), undo=leave_out(off, findings))
 
 
 def _off_by_1000(values: Floats) -> tuple[Floats, Floats]:
