@@ -35,6 +35,7 @@ from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, frf_recordings
+from underskin.recordings.frf.line_choice import MAINS_HZ
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Complexes, Floats, Mask
 
@@ -78,7 +79,7 @@ def _turned(recordings: list[FrfRecording], _: float, *, ids: Collection[str], f
 
 
 _BANDS = 24  # of equal width in the logarithm of frequency: a fraction of the width of any element
-_MAINS_HZ, _NEAR_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # mains pick-up has its own phase
+_NEAR_MAINS_HZ = 20.0  # mains pick-up has its own phase, at the odd multiples most
 _UNSURE = 6.0  # times a line's noise, which no step of noise exceeds
 _WIDEST = 0.3  # rad, noise of a line above which the phase cannot be unwrapped
 
@@ -104,7 +105,9 @@ def _log_frf_bands(campaign: Campaign) -> _LogFrfBands:
     rows = lines(campaign)
     edges = np.geomspace(rows.frequency.min() * (1 - 1e-9), rows.frequency.max() * (1 + 1e-9), _BANDS + 1)
     band = np.clip(np.searchsorted(edges, rows.frequency) - 1, 0, _BANDS - 1)
-    near_mains = np.min(np.abs(np.subtract.outer(rows.frequency, _MAINS_HZ)), axis=1) < _NEAR_MAINS_HZ
+    near_mains = (
+        np.min(np.abs(np.subtract.outer(rows.frequency, np.outer(MAINS_HZ, (1, 3)).ravel())), axis=1) < _NEAR_MAINS_HZ
+    )
     usable = ~near_mains & (np.abs(rows.value) > 0)
     value, weight = np.zeros((len(rows.spans), _BANDS), dtype=complex), np.zeros((len(rows.spans), _BANDS))
     for index, span in enumerate(rows.spans):
@@ -126,7 +129,6 @@ def _log_frf_bands(campaign: Campaign) -> _LogFrfBands:
 
 _LARGEST = 0.7  # rad: limit that reduces the weight of sharp resonances, whose frequency differs between recordings
 _RELAXATIONS, _COEFFICIENT = 4, 0.1  # terms of a smooth phase, and the prior standard deviation of each [rad]
-_OVER_CHANNELS = 4.5  # of ln likelihood: phases of channels are ten times as frequent
 _VARIED = (0.0, 0.1, 0.2, 0.4, 0.7, 1.0, 1.4)  # of the mean phase: variation between recordings
 
 
@@ -146,7 +148,7 @@ def _aligned(bands: _LogFrfBands) -> tuple[Floats, float, float]:
     choices = log(comb(int(same.sum()), fewer)) + log(same.sum())
     gain = _of_smooth(bands.frequency, phase, weight, signs)
     gain -= max(_of_smooth(bands.frequency, phase, weight, same), 0.0)
-    if fewer == 0 or gain < choices + _PLAIN / 2 or _of_two_signs(phase, weight, signs) <= _OVER_CHANNELS:
+    if fewer == 0 or gain < choices + _PLAIN / 2 or _of_two_signs(phase, weight, signs) <= -_LOG_PRIOR:
         return same, 0.0, 0.0
     return signs, gain, choices
 

@@ -37,7 +37,6 @@ from underskin.units import Floats
 _SCATTER, _REACHES = 0.2, 0.05  # s, f; p is the largest of a stage
 _SMALL = 0.3  # of the largest response: the least scale of a level; and of the expected level: a weak one
 _ANSWERS = 0.6  # unexpected share of a level, or of `_SMALL`, above which exchanges are tried
-_GAIN_OF_EACH = log(4)  # of ln evidence, by each sensor's own recordings
 _FAR_OFF = 30.0  # times the usual response
 
 Labels = Mapping[str, str]  # of each label the sensor at whose position it responds
@@ -93,7 +92,7 @@ def exchanged_labels(screened: Screened) -> Iterator[Alternative]:
     exchanges = [
         exchange
         for exchange in weighed(_permutations(links, best))
-        if exchange.least > _GAIN_OF_EACH
+        if exchange.least > GAIN / 2  # by each of two, or of more
         and all(best.get(name, sensor) == sensor for name, sensor in exchange.true_sensor.items())
         and not mute & set(exchange.true_sensor)
     ]

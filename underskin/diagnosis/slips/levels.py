@@ -62,7 +62,6 @@ SPREADS = (0.01, 0.06, 0.25)  # t, of calibrated, of good and of poled sensors
 _SMOOTH_SIZES = (0.1, 0.4, 1.0)  # of all smooth functions together
 POSITION_MM = (0.0, 0.1, 0.3)  # p, of a stage (inversion/mixed_model.py)
 SEARCHED = tuple(product((0.04, 0.12), (0.03, 0.3)))  # s, and size of smooth functions, at which slips are tried
-_STEEP = 0.05  # ∂ ln shape/∂ position [1/mm]: below it no scatter of positions shows
 _OVERALL = 3.0  # prior standard deviation of ln of the gain, the d33 of all sensors
 
 
@@ -231,7 +230,9 @@ def _by_cause(levels: Levels, columns: Floats, alternatives: Sequence[Alternativ
     """The evidence of each alternative under one cause."""
     count, none = len(alternatives), np.zeros(len(levels.value))
     spreads = SPREADS if levels.sensor.max() > 0 else SPREADS[:1]
-    position_scatters = POSITION_MM if levels.slope.max(initial=0.0) > _STEEP else POSITION_MM[:1]
+    position_scatters = (
+        POSITION_MM if POSITION_MM[-1] * levels.slope.max(initial=0.0) > _SCATTER[0] else POSITION_MM[:1]
+    )
     values = [levels.value - (none if one.offset is None else one.offset) for one in alternatives]
     right = np.stack([*values, *(none if one.column is None else one.column for one in alternatives)], axis=1)
     evidence, amplitude = np.full(count, -np.inf), np.zeros(count)

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, Alternative, Undone
+from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, SELDOM, Alternative, Undone
 from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -20,7 +20,6 @@ _TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings: half an hour or le
 _LONGEST = 0.3  # largest τ, of the number of recordings
 _SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign, as by a law
 _MOST_SHARE = 0.4  # of the recordings left out at most
-_FIRST = -1.5  # ln prior of a single first recording that is off, over that of a warm-up
 _OVER = 0.01  # of the level: largest remaining drift in recordings that are used
 
 
@@ -35,7 +34,7 @@ def warm_ups(screened: Screened) -> Iterator[Alternative]:
         yield Alternative(0.0, column=CHANGE * np.exp(-levels.order / time), undo=undo)
     for longer in _SLOWER if times else ():
         yield Alternative(0.0, column=CHANGE * np.exp(-levels.order / (longer * times[-1])))
-    yield Alternative(_FIRST, column=CHANGE * (levels.order == 0).astype(float))
+    yield Alternative(-SELDOM, column=CHANGE * (levels.order == 0).astype(float))
 
 
 def _without_first(recordings: list[FrfRecording], size: float, *, time: float, may_age: bool) -> Undone | None:

@@ -24,8 +24,11 @@ from underskin.recordings.frf.spectra import mean_of
 from underskin.units import force_unit
 
 _NO_PREFIX = ("gf", "kgf", "lbf")  # units of force that are no power of 1000 off
-_OF_FORCE, _OF_DYNAMIC_FORCE, _OF_PRELOAD = (1, 1), (1, 0), (0, 1)  # oscillation and mean that are off what is declared
-_SLIPS = tuple(product((_OF_FORCE, _OF_DYNAMIC_FORCE, _OF_PRELOAD), (log(SLIP), -log(SLIP))))
+_OFF = {  # whether the oscillation and the mean are off what is declared
+    Reason.SERIES_FORCE: (1, 1),
+    Reason.SERIES_DYNAMIC_FORCE: (1, 0),
+    Reason.SERIES_PRELOAD: (0, 1),
+}
 
 
 def wrong_forces(screened: Screened) -> Iterator[Alternative]:
@@ -75,27 +78,22 @@ def _contradiction(recording: FrfRecording) -> tuple[float, Finding] | None:
         off = float(np.abs(oscillation - of_oscillation).min()), 0.0 if mean is None else abs(mean - of_mean)
         return -0.5 * (off[0] ** 2 + off[1] ** 2) if max(off) < log(SLIP) / 2 else -np.inf
 
-    (off, size), best = max(
-        (
-            ((off, size), nats(off[0] * size, off[1] * size))
-            for off, size in _SLIPS
-            if mean is not None or off[0] == off[1]
-        ),
-        key=lambda slip: slip[1],
-    )
+    slips = [
+        (nats(of_oscillation * size, of_mean * size), reason, size > 0)
+        for (reason, (of_oscillation, of_mean)), size in product(_OFF.items(), (log(SLIP), -log(SLIP)))
+        if mean is not None or of_oscillation == of_mean
+    ]
+    best, reason, is_larger = max(slips, key=lambda slip: slip[0])
     gain = best - max(nats(0.0, 0.0), -0.5 * log(SLIP) ** 2)
     if not gain > GAIN:
         return None
-    units = {
-        "too_large": (size > 0) == (off == _OF_FORCE),
-        "given_in": "mN" if (size > 0) == (off == _OF_FORCE) else "kN",
+    too_large = is_larger == (reason is Reason.SERIES_FORCE)  # else what is declared is too small
+    arguments = {
+        "dynamic_force_n": dynamic_force_n,
+        "oscillation_n": dynamic_force_n * float(np.exp(min(oscillation, key=abs))),
+        "preload_n": recording.preload_n,
+        "mean_n": float(np.mean(recording.force_n)),
+        "too_large": too_large,
+        "given_in": "mN" if too_large else "kN",
     }
-    nearest = dynamic_force_n * float(np.exp(min(oscillation, key=abs)))
-    if off == _OF_FORCE:
-        arguments = {"oscillation_n": nearest, "dynamic_force_n": dynamic_force_n}
-        return gain, Finding(Reason.SERIES_FORCE, recording.id, "force_n", {**arguments, **units})
-    if off == _OF_DYNAMIC_FORCE:
-        arguments = {"dynamic_force_n": dynamic_force_n}
-        return gain, Finding(Reason.SERIES_DYNAMIC_FORCE, recording.id, "dynamic_force_n", {**arguments, **units})
-    arguments = {"preload_n": recording.preload_n, "mean_n": float(np.mean(recording.force_n))}
-    return gain, Finding(Reason.SERIES_PRELOAD, recording.id, "preload_n", {**arguments, **units})
+    return gain, Finding(reason, recording.id, reason.value.partition("series_")[2] + "_n", arguments)

@@ -24,7 +24,6 @@ from underskin.units import Floats, Mask, unit_guess
 
 SLIP = 1000.0  # between neighbouring units
 MOST_SHARE = 0.25  # of the recordings; more are no slip of single ones
-_WIDTH = log(12.0)  # of ln 1000: values that are meant to be equal differ by less
 _FAINT = 5e-4  # dynamic force over preload: instruments resolve no less
 _RESPONSE = "frf_re_pc_per_n"
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
@@ -95,9 +94,11 @@ def _off_by_1000(values: Floats) -> tuple[Floats, Floats]:
         return np.zeros(len(values)), np.zeros(len(values))
     usual = float(np.median(values[known]))
     slip = np.log(np.where(known, values, usual) / usual)
-    off = np.where(np.abs(np.abs(slip) - log(SLIP)) < _WIDTH, np.sign(slip), 0.0)
+    nats = log(SLIP) * (np.abs(slip) - log(SLIP) / 2)
+    nearest = np.round(slip / log(SLIP))
+    off = np.where((np.abs(nearest) == 1) & (nats > GAIN + log(len(values))), nearest, 0.0)
     few = np.count_nonzero(off) <= max(MOST_SHARE * len(values), 1.0)
-    return few * off, log(SLIP) * (np.abs(slip) - log(SLIP) / 2)
+    return few * off, nats
 
 
 def _positions(screened: Screened) -> Iterator[tuple[Reason, Mask, Floats, dict[str, object]]]:
@@ -153,7 +154,9 @@ def contradicting(ratio: Floats) -> Finding | None:
     if np.prod(ratio) < 0:
         return Finding(Reason.TWO_SIGNS, "", _RESPONSE)
     of_two = float(size.max() / size.min())
-    return Finding(Reason.TWO_RESPONSES, "", _RESPONSE, {"ratio": of_two}) if abs(log(of_two / SLIP)) < _WIDTH else None
+    return (
+        Finding(Reason.TWO_RESPONSES, "", _RESPONSE, {"ratio": of_two}) if round(log(of_two) / log(SLIP)) == 1 else None
+    )
 
 
 def unlikely_d33(ratio: Floats, declared: float | None) -> list[Finding]:
@@ -163,7 +166,7 @@ def unlikely_d33(ratio: Floats, declared: float | None) -> list[Finding]:
         return []
     low, high = _LIKELY_D33
     if declared:
-        low, high = abs(declared) / SLIP * np.exp(_WIDTH), abs(declared) * SLIP / np.exp(_WIDTH)
+        low, high = abs(declared) / SLIP**0.5, abs(declared) * SLIP**0.5  # nearer to it than to another unit
     if low <= d33 <= high:
         return []
     guess = unit_guess("d33_pc_per_n", d33, (low, high) if declared else OF_PVDF)
