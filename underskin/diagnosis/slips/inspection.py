@@ -24,13 +24,11 @@ from underskin.diagnosis.slips.table import Screened, Slip, without_slips
 from underskin.diagnosis.slips.table_domain import within_tables
 from underskin.diagnosis.slips.warm_up import warm_ups
 from underskin.diagnosis.slips.wrong_forces import are_many, contradicting_forces, together, wrong_forces
+from underskin.diagnosis.slips.wrong_positions import all_positions, at_sensors, wrong_positions
 from underskin.diagnosis.slips.wrong_units import (
-    all_positions,
-    at_sensors,
     contradicting,
     faint_oscillation,
     unlikely_d33,
-    wrong_positions,
     wrong_responses,
     wrong_values,
 )

@@ -1,9 +1,7 @@
-"""Wrong units among the recordings: a force in kN, a sphere or a position in m, a frequency in kHz, a charge in nC.
+"""Wrong units among the recordings: a force in kN, a sphere in m, a frequency in kHz, a charge in nC.
 
 Values that are meant alike differ by ln 1 ± 1 from the median of all, and those in a neighbouring unit by ln 1000 more
-or less. A position p is in another unit where f·p, with f = 1000 or 1/1000, lies nearer to its sensor: the density of
-contacts falls with the distance squared, as every distance is as likely as ten times as much. At a sensor in the origin
-this cannot be detected, and has little effect. Recordings with such a value are left out.
+or less. Recordings with such a value are left out.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +18,7 @@ from underskin.mechanisms.models.composition import D33
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import OF_PVDF
-from underskin.units import Floats, Mask, unit_guess
+from underskin.units import Floats, unit_guess
 
 SLIP = 1000.0  # between neighbouring units
 MOST_SHARE = 0.25  # of the recordings; more are no slip of single ones
@@ -33,12 +31,6 @@ _FIELDS = {  # the units that make values too large, and too small
     "indenter_radius_mm": ("µm", "m"),
     "frequency_hz": ("mHz", "kHz"),
 }
-_POSITIONS = (
-    # factor, least distance from the sensor [mm], unit of the positions, or of the sensors
-    (1e3, 1.0, "m", "µm"),
-    (1e-3, 200.0, "µm", "m"),
-)
-_AT_SENSORS_MM = (1e-4, 0.01)  # implausible distances from a sensor: no stage is that precise
 
 
 def wrong_values(screened: Screened) -> Iterator[Alternative]:
@@ -51,7 +43,7 @@ def wrong_values(screened: Screened) -> Iterator[Alternative]:
             units = {"too_large": bool(off[index] > 0), "given_in": too_large if off[index] > 0 else too_small}
             arguments = {"value": float(values[index]), **units}
             findings.append(Finding(Reason.BESIDE_OTHERS, screened.recordings[index].id, name, arguments))
-        yield from _left_out(off != 0, nats, findings, cost=log(len(off)))
+        yield from _left_out(off, nats, findings)
 
 
 def wrong_responses(screened: Screened) -> Iterator[Alternative]:
@@ -63,27 +55,14 @@ def wrong_responses(screened: Screened) -> Iterator[Alternative]:
         )
         for index in np.flatnonzero(off).tolist()
     ]
-    yield from _left_out(off != 0, nats, findings, cost=log(len(off)))
+    yield from _left_out(off, nats, findings)
 
 
-def wrong_positions(screened: Screened) -> Iterator[Alternative]:
-    """The recordings whose position is off by a factor of 1000."""
-    for reason, off, nats, arguments in _positions(screened):
-        if reason is Reason.PLACE:
-            ids = [screened.recordings[index].id for index in np.flatnonzero(off).tolist()]
-            yield from _left_out(off, nats, [Finding(reason, name, "position_mm", arguments) for name in ids], cost=0.0)
-
-
-def all_positions(screened: Screened) -> list[Finding]:
-    """The finding on the unit of all positions where those of many are off by a factor of 1000."""
-    shared = [(reason, arguments) for reason, _, _, arguments in _positions(screened) if reason is Reason.PLACES]
-    return [Finding(reason, "", "position_mm", arguments) for reason, arguments in shared]
-
-
-def _left_out(off: Mask, nats: Floats, findings: list[Finding], cost: float) -> Iterator[Alternative]:
-    """The alternative that these recordings are off, each at the `cost` of choosing it."""
+def _left_out(off: Floats, nats: Floats, findings: list[Finding]) -> Iterator[Alternative]:
+    """The alternative that these recordings are off, each at the cost of choosing it."""
     if findings:
-        yield Alternative(-cost * int(off.sum()), float(nats[off].sum()), undo=leave_out(off, findings))
+        choices, gain = np.count_nonzero(off) * log(len(off)), float(nats[off != 0].sum())
+        yield Alternative(-choices, gain, undo=leave_out(off != 0, findings))
 
 
 def _off_by_1000(values: Floats) -> tuple[Floats, Floats]:
@@ -99,37 +78,6 @@ def _off_by_1000(values: Floats) -> tuple[Floats, Floats]:
     off = np.where((np.abs(nearest) == 1) & (nats > GAIN + log(len(values))), nearest, 0.0)
     few = np.count_nonzero(off) <= max(MOST_SHARE * len(values), 1.0)
     return few * off, nats
-
-
-def _positions(screened: Screened) -> Iterator[tuple[Reason, Mask, Floats, dict[str, object]]]:
-    """For each wrong unit the recordings that it explains, with the gain of ln evidence."""
-    sensor_mm, contact_mm = _sensors_and_contacts(screened)
-    for factor, least, unit, sensors_unit in _POSITIONS:
-        given, meant = (np.hypot(*(scale * contact_mm - sensor_mm).T) for scale in (1.0, factor))
-        with np.errstate(divide="ignore"):
-            nats = 2 * np.log(np.maximum(given, 1e-12) / np.maximum(meant, 1e-12))
-        off = (given > least) & (nats > GAIN)
-        slip = {"too_small": factor > 1, "given_in": unit}
-        if off.sum() > MOST_SHARE * len(off):
-            yield Reason.PLACES, off, nats, {**slip, "sensors_in": sensors_unit}
-        else:
-            yield Reason.PLACE, off, nats, slip
-
-
-def at_sensors(screened: Screened) -> list[Finding]:
-    """Positions that differ from their sensors' by some µm at most: an offset series in m."""
-    sensor_mm, contact_mm = _sensors_and_contacts(screened)
-    farthest = float(np.hypot(*(contact_mm - sensor_mm).T).max())
-    if not _AT_SENSORS_MM[0] < farthest < _AT_SENSORS_MM[1]:
-        return []
-    return [Finding(Reason.PLACES_AT_SENSORS, "", "position_mm", {"farthest_mm": farthest})]
-
-
-def _sensors_and_contacts(screened: Screened) -> tuple[Floats, Floats]:
-    """Positions of each recording's sensor and contact [mm], (recordings, 2) each."""
-    sensors = [screened.positions[recording.sensor] for recording in screened.recordings]
-    contacts = [recording.position_mm or here for recording, here in zip(screened.recordings, sensors, strict=True)]
-    return np.reshape(sensors, (-1, 2)), np.reshape(contacts, (-1, 2))
 
 
 def _value(recording: FrfRecording, name: str) -> float:
