@@ -191,14 +191,7 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
         axis=1,
     )
     laws = []
-    for name, mechanism in CATALOGUE.items():
-        if "frf" not in mechanism.kinds or mechanism.needs_lines:
-            continue
-        try:
-            model = compose((name,), conditions, table, "frf")
-        except Unsupported:
-            continue
-        assert isinstance(model, FrfModel)
+    for model in models_of_laws(conditions, table, along_frequency=False).values():
         if not any(parameter.moves_covariance for parameter in model.parameters):
             relative = np.abs([changed[levels.index] / value for changed in model.values(_drawn(model, start))])
             change = np.log(np.maximum(relative, _LEAST_RATIO))
@@ -208,6 +201,22 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
         *(Cause(log(_SINGLE_CAUSE / len(laws)), np.hstack([declared, law])) for law in laws),
         *(Cause(log(_SMOOTH_CAUSE / len(_SMOOTH_SIZES)), smooth_size * levels.smooth) for smooth_size in _SMOOTH_SIZES),
     ]
+
+
+def models_of_laws(conditions: Conditions, table: SigmaTable, *, along_frequency: bool) -> dict[str, FrfModel]:
+    """The models of single laws of the catalogue under these conditions, by name: of those that act along frequency, or
+    of the others."""
+    models = {}
+    for name, mechanism in CATALOGUE.items():
+        if "frf" not in mechanism.kinds or mechanism.needs_lines is not along_frequency:
+            continue
+        try:
+            model = compose((name,), conditions, table, "frf")
+        except Unsupported:
+            continue
+        assert isinstance(model, FrfModel)
+        models[name] = model
+    return models
 
 
 def explained(levels: Levels, causes: Sequence[Cause], alternatives: Sequence[Alternative]) -> Explained:

@@ -13,9 +13,9 @@ from scipy.optimize import nnls
 
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.slips.comparison import LEAST_LINES
-from underskin.mechanisms.base import Normal, Parameter, Unsupported
+from underskin.diagnosis.slips.levels import models_of_laws
+from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.composed import compose
-from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, Conditions, frf_recordings
 from underskin.recordings.frf.line_choice import MAINS_HZ
@@ -130,14 +130,9 @@ def listed_elements(campaign: Campaign, table: SigmaTable, frequency: Floats) ->
     base = compose((), conditions, table, "frf")
     start = np.array([parameter.start for parameter in base.parameters])
     listed = {}
-    for name, mechanism in CATALOGUE.items():
-        if "frf" not in mechanism.kinds or not mechanism.needs_lines or "phase" not in mechanism.axes:
+    for name, model in models_of_laws(conditions, table, along_frequency=True).items():
+        if "phase" not in CATALOGUE[name].axes:
             continue
-        try:
-            model = compose((name,), conditions, table, "frf")
-        except Unsupported:
-            continue
-        assert isinstance(model, FrfModel)
         points, cost = _over_prior(model.parameters[: len(model.parameters) - len(start)])
         values = np.array(list(model.values(np.hstack([points, np.tile(start, (len(points), 1))]))))
         with np.errstate(divide="ignore", invalid="ignore"):
