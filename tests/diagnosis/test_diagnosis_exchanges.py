@@ -106,6 +106,14 @@ def test_labels_no_permutation_explains_left(table: SigmaTable) -> None:
     assert put_right(report, looked_at(s3, table))
 
 
+def test_slips_of_several_kinds_are_all_put_right(good: Campaign, table: SigmaTable) -> None:
+    """Exchanged labels beside reversed recordings: each is named, and none hides the other."""
+    wrong = changed(changed(good, exchanged("s0", "s2")), lambda entry, n: times(entry, -1.0 if n in (3, 20) else 1.0))
+    report = looked_at(wrong, table)
+    assert sorted(code for code, _ in slips(report)) == ["sensors_exchanged", "sign_flipped", "sign_flipped"]
+    assert put_right(report, right(good, table))
+
+
 def test_exchange_sensor_no_recording_put_right(good: Campaign, table: SigmaTable) -> None:
     """An exchange with a sensor that has no recording of its own is put right.
 

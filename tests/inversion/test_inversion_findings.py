@@ -8,7 +8,7 @@ import pytest
 from tests.inversion.inverted_campaigns import covered, moved, scaled
 from tests.support.shaken_series import shaken
 from tests.support.simulated_campaign import Rig, simulate
-from underskin.diagnosis.slips.time_series import as_lines
+from underskin.diagnosis.slips.inspection import inspect
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding, ImplausibleD33
@@ -172,7 +172,7 @@ def test_force_in_another_unit_is_named_and_left_out(table: SigmaTable, unit: st
     )
     with pytest.raises(InvalidInput, match=rf"force_n.*was it given in {unit}\?|the force is .* N: .* in {unit}\?"):
         invert(replace(campaign, recordings=wrong), table)
-    told = as_lines(wrong, units_checked=False).doubtful
+    told = inspect(replace(campaign, recordings=wrong), table).findings
     assert {finding.field for finding in told} == {"force_n"}
     assert all(unit in finding.statement for finding in told)
 

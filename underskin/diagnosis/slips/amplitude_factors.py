@@ -13,7 +13,9 @@ from math import comb, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, Alternative, Levels, Undone, times
+from underskin.diagnosis.slips.comparison import times
+from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, Alternative, Levels, Undone
+from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
@@ -26,8 +28,11 @@ _WELL, _APART = 0.7, 0.85  # share of recordings within a third of ln c of their
 _SKEWED = 6.5  # of ln prior: misses of the place lower levels by up to half, which two parts fit better than one
 
 
-def amplitude_factors(levels: Levels) -> Iterator[Alternative]:
+def amplitude_factors(screened: Screened) -> Iterator[Alternative]:
     """Each factor with the sets of recordings that may have it, and the rivals."""
+    levels = screened.levels
+    if levels is None:
+        return
     for factor, (scatter, smooth_size) in product(_FACTORS, SEARCHED):
         precision = levels.precision(scatter, smooth_size)
         off = _chosen(levels.value, precision, log(factor))
@@ -59,9 +64,7 @@ def _most_similar_step(axes: Sequence[Floats], off: Mask) -> tuple[Mask, int]:
     return sets[int(np.argmin(np.minimum(mismatches, len(off) - mismatches)))], len(sets)
 
 
-def _without_factor(
-    recordings: Sequence[FrfRecording], _: float, *, levels: Levels, factor: float, off: Mask
-) -> Undone:
+def _without_factor(recordings: list[FrfRecording], _: float, *, levels: Levels, factor: float, off: Mask) -> Undone:
     """The recordings corrected for the factor, without those that have no level."""
     wrong = levels.index[off].tolist()
     arguments = {
@@ -74,7 +77,7 @@ def _without_factor(
     right = [
         times(recordings[index], 1 / factor) if index in wrong else recordings[index] for index in levels.index.tolist()
     ]
-    return right, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
+    return right, [Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)]
 
 
 def _chosen(value: Floats, precision: Floats, size: float) -> Mask:

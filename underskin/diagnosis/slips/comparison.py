@@ -10,7 +10,7 @@ noise, n |mean|²/σ² < 9 (which noise alone exceeds once in 8000 recordings), 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def no_response(aligned: Sequence[Complexes]) -> tuple[Mask, Floats]:
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """Columns over the recordings: level |mean| [C/N], its variance by noise [(C/N)²], whether it shows no response,
-    the ratio to the base model, NaN where it is not informative, and the expected level [C/N], 0 where unknown."""
+    the ratio to the base model, NaN where it is not informative, and the expected level [C/N]."""
 
     level: Floats
     variance: Floats
@@ -77,17 +77,25 @@ class Comparison:
     expected: Floats
 
 
-def compared(recordings: Sequence[FrfRecording], model: Model, inside: Mask) -> Comparison:
-    """The recordings compared with the base model where their contacts are `inside` the tables."""
+def compared(recordings: Sequence[FrfRecording], model: Model) -> Comparison:
+    """The recordings compared with the base model."""
     aligned = aligned_lines(recordings)
     unresponsive, variance = no_response(aligned)
     predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
     shape = predicted[np.searchsorted(model.recording, np.arange(len(aligned)))].real
-    usable = inside & ~unresponsive
-    telling = usable & (np.abs(shape) > LEAST_RESPONSE * np.abs(shape[usable]).max(initial=0.0))
+    telling = ~unresponsive & (np.abs(shape) > LEAST_RESPONSE * np.abs(shape[~unresponsive]).max(initial=0.0))
     flat = [_flat(lines_of(recording).frequency) for recording in recordings]
     median = np.array([float(np.nanmedian(values.real[low])) for values, low in zip(aligned, flat, strict=True)])
     ratio = np.where(telling, median / np.where(shape == 0, 1.0, shape), np.nan)
     usual = float(np.nanmedian(np.abs(ratio))) if telling.any() else 0.0
     level = np.array([float(np.abs(np.nanmean(values))) for values in aligned])
-    return Comparison(level, variance, unresponsive & inside, ratio, np.where(inside, np.abs(shape) * usual, 0.0))
+    return Comparison(level, variance, unresponsive, ratio, np.abs(shape) * usual)
+
+
+def times(recording: FrfRecording, real: float, imaginary: float | None = None) -> FrfRecording:
+    """The recording with its FRF times a factor, its imaginary part times another one where that is given."""
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    imaginary = real if imaginary is None else imaginary
+    scaled = real * recording.frf_re_pc_per_n, imaginary * recording.frf_im_pc_per_n
+    return replace(recording, frf_re_pc_per_n=scaled[0], frf_im_pc_per_n=scaled[1])

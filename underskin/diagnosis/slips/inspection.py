@@ -8,37 +8,57 @@ a time, the most probable first, since each resembles the others.
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Inspected, agree, recording_axes
-from underskin.diagnosis.slips.comparison import compared
-from underskin.diagnosis.slips.exchanged_sensors import without_exchanges
-from underskin.diagnosis.slips.level_slips import without_level_slips
-from underskin.diagnosis.slips.phase_convention import in_common_convention
-from underskin.diagnosis.slips.position_errors import at_sensors, misplaced
-from underskin.diagnosis.slips.reversed_signs import without_reversed
-from underskin.diagnosis.slips.silent import dead, without_silent_pair
+from underskin.diagnosis.slips.amplitude_factors import amplitude_factors
+from underskin.diagnosis.slips.conjugated import conjugated
+from underskin.diagnosis.slips.exchanged_cables import exchanged_cables
+from underskin.diagnosis.slips.exchanged_labels import exchanged_labels
+from underskin.diagnosis.slips.reversed_signs import reversed_signs
+from underskin.diagnosis.slips.sensor_gain import sensor_gains
+from underskin.diagnosis.slips.silent import silent
+from underskin.diagnosis.slips.table import Screened, Slip, without_slips
 from underskin.diagnosis.slips.table_domain import within_tables
-from underskin.diagnosis.slips.time_series import as_given, as_lines
-from underskin.diagnosis.slips.unit_errors import (
+from underskin.diagnosis.slips.warm_up import warm_ups
+from underskin.diagnosis.slips.wrong_forces import are_many, contradicting_forces, together, wrong_forces
+from underskin.diagnosis.slips.wrong_positions import all_positions, at_sensors, wrong_positions
+from underskin.diagnosis.slips.wrong_units import (
+    contradicting,
     faint_oscillation,
-    levels_off_by_1000,
-    single_unit_errors,
     unlikely_d33,
+    wrong_responses,
+    wrong_values,
 )
 from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.models.composed import compose
 from underskin.prediction.pressed_skin import exchanged_values
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.series_lines import as_given, as_lines
 from underskin.recordings.plausibility import loose_sphere, overlapping_sensors, unlikely
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes
 
 LEAST_RECORDINGS = 2  # to compare one with another
 _SAME = 1e-4  # relative difference of copies: files round numbers to some digits
+
+# The table of slips, in the order in which recordings can be judged: forces and declared values, then phases and
+# labels, for which no response has to be right, then responses beside the base model.
+OF_SERIES: Sequence[Slip] = (wrong_forces,)
+OF_VALUES: Sequence[Slip] = (wrong_values, wrong_positions)
+OF_LABELS: Sequence[Slip] = (exchanged_labels,)
+OF_RESPONSES: Sequence[Slip] = (
+    silent,
+    wrong_responses,
+    reversed_signs,
+    sensor_gains,
+    amplitude_factors,
+    exchanged_cables,
+    warm_ups,
+)
 _AXES = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
 
 
@@ -48,13 +68,18 @@ def inspect(campaign: Campaign, table: SigmaTable, keep_ids: Collection[str] | N
     Recordings whose contacts lie beyond the tables as declared are used if their ids are in `keep_ids`; None: if a
     plausible modulus brings them within.
     """
-    recorded = frf_recordings(campaign) if campaign.recordings else ()
-    series = as_lines(recorded, units_checked=campaign.units_checked)
-    if series.doubtful:
-        return _inspected(campaign, [], series.doubtful, _impossible(series.doubtful, confirmable=True))
+    given = list(frf_recordings(campaign)) if campaign.recordings else []
+    contradictions = contradicting_forces(given)
+    of_forces = together(contradictions, len(given))
+    if are_many(contradictions, given) and not campaign.units_checked:
+        return _inspected(campaign, [], of_forces, _impossible(of_forces, confirmable=True))
+    recorded = given
+    if contradictions and not campaign.units_checked:
+        recorded, of_forces = without_slips(Screened(campaign, given, table), OF_SERIES)
+    series = as_lines(recorded)
     imported = {recording.id for recording in recorded if recording.sample_rate_hz is None}
     inspected = _inspect_lines(campaign, series.recordings, imported, table, keep_ids)
-    findings = as_given(recorded, [*series.findings, *inspected.findings])
+    findings = as_given(given, [*of_forces, *series.findings, *inspected.findings])
     return replace(inspected, findings=findings, uneven=series.uneven, unsure=series.unsure)
 
 
@@ -66,57 +91,38 @@ def _inspect_lines(
     keep_ids: Collection[str] | None,
 ) -> Inspected:
     with_lines, of_lines = _with_lines(recorded)
-    recordings, copies = _without_copies(with_lines)
-    off, unit_errors = single_unit_errors(recordings)
-    astray, of_positions, misgiven = misplaced(campaign, recordings)
-    findings = [*of_lines, *copies, *unit_errors, *of_positions]
-    recordings = [recording for recording, wrong in zip(recordings, off | astray, strict=True) if not wrong]
+    originals, copies = _without_copies(with_lines)
+    screened = Screened(campaign, originals, table)
+    misgiven = all_positions(screened)
+    recordings, of_values = without_slips(screened, OF_VALUES)
+    findings = [*of_lines, *copies, *of_values]
     if not recordings:
         return _inspected(campaign, recordings, findings)
+    screened = replace(screened, recordings=recordings)
     contradictory = [*loose_sphere(recordings), *overlapping_sensors(campaign), *misgiven]
     exchanged = exchanged_values(campaign.skin, recordings, table)
     lines = [lines_of(recording).frequency for recording in recordings]
-    doubtful = [*unlikely(campaign, recordings, lines), *at_sensors(campaign, recordings), *exchanged]
+    doubtful = [*unlikely(campaign, recordings, lines), *at_sensors(screened), *exchanged]
     findings += [*doubtful, *contradictory]
     if contradictory or (doubtful and not campaign.units_checked):
         lacking = _impossible([*doubtful, *contradictory], confirmable=not contradictory)
         return _inspected(campaign, [], findings, lacking)
     findings += [*_constant_axes(recordings), *faint_oscillation(recordings)]
-    recordings, of_phase = in_common_convention(recordings, imported)
-    recordings, of_sensors = without_exchanges(campaign, recordings, table)
-    recordings, silent = without_silent_pair(recordings)
-    consistent = _against_model(campaign, recordings, table, keep_ids)
-    findings += [*of_phase, *of_sensors, *silent, *consistent.findings]
-    recordings = list(frf_recordings(consistent.campaign)) if consistent.campaign.recordings else []
-    if consistent.lacking is not None:
-        return _inspected(campaign, recordings, findings, consistent.lacking)
-    recordings, of_levels = without_level_slips(campaign, recordings, table)
-    inspected = _inspected(campaign, recordings, [*findings, *of_levels])
-    return replace(inspected, beyond=consistent.beyond & {recording.id for recording in recordings})
-
-
-def _against_model(
-    campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable, keep_ids: Collection[str] | None
-) -> Inspected:
-    """The recordings compared with the base model: those within the tables that respond, with their true signs."""
-    model = compose((), replace(campaign, recordings=tuple(recordings)), table, "frf")
-    inside, beyond, findings = within_tables(campaign, recordings, model, table, keep_ids)
-    comparison = compared(recordings, model, inside | beyond)
-    if comparison.unresponsive.all():
-        silent = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(recordings)})
-        return Inspected(replace(campaign, recordings=()), [silent], Lacking(Lack.NO_RESPONSE))
-    lost, dead_findings = dead(recordings, comparison)
-    ratio = np.where(lost, np.nan, comparison.ratio)
-    off, off_findings, lacking = levels_off_by_1000(recordings, ratio)
-    findings += [*dead_findings, *off_findings]
-    if lacking is not None:
-        return Inspected(replace(campaign, recordings=()), findings, lacking)
-    right, known, sign_findings = without_reversed(recordings, np.where(off, np.nan, ratio))
-    findings += [*unlikely_d33(ratio, campaign.skin.d33_pc_per_n), *sign_findings]
-    usable = (inside | beyond) & ~lost & ~off & known
-    kept = tuple(recording for recording, chosen in zip(right, usable, strict=True) if chosen)
-    far = frozenset(recording.id for recording, chosen in zip(right, usable & beyond, strict=True) if chosen)
-    return Inspected(replace(campaign, recordings=kept), findings, beyond=far)
+    recordings, of_labels = without_slips(screened, [partial(conjugated, imported=imported), *OF_LABELS])
+    recordings, beyond, of_domain = within_tables(campaign, recordings, table, keep_ids)
+    findings += [*of_labels, *of_domain]
+    if not recordings:
+        return _inspected(campaign, recordings, findings)
+    screened = replace(screened, recordings=recordings)
+    if screened.comparison.unresponsive.all():
+        findings.append(Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(recordings)}))
+        return _inspected(campaign, [], findings, Lacking(Lack.NO_RESPONSE))
+    if (contradiction := contradicting(screened.comparison.ratio)) is not None:
+        return _inspected(campaign, [], [*findings, contradiction], Lacking(Lack.TWO_RECORDINGS_CONTRADICT))
+    findings += unlikely_d33(screened.comparison.ratio, campaign.skin.d33_pc_per_n)
+    recordings, of_responses = without_slips(screened, OF_RESPONSES)
+    inspected = _inspected(campaign, recordings, [*findings, *of_responses])
+    return replace(inspected, beyond=beyond & {recording.id for recording in recordings})
 
 
 def _inspected(

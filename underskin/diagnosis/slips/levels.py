@@ -40,20 +40,10 @@ from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices
 
-GAIN = log(25)  # ln odds that a slip must have against none
 CHANGE = 0.45  # prior standard deviation of a slip's change of ln level of unknown size
 LEAST_LEVELS = 4  # of recordings or of sensors, so that some agree and one can differ
 SELDOM = log(4)  # by which what no convention or habit makes likely is rarer than what one does
 LEAST_CHANGE = 0.12  # of ln level; smaller ones are within the scatter of gains
-
-
-def times(recording: FrfRecording, real: float, imaginary: float | None = None) -> FrfRecording:
-    """The recording with its FRF times a factor, its imaginary part times another one where that is given."""
-    assert recording.frf_re_pc_per_n is not None
-    assert recording.frf_im_pc_per_n is not None
-    imaginary = real if imaginary is None else imaginary
-    scaled = real * recording.frf_re_pc_per_n, imaginary * recording.frf_im_pc_per_n
-    return replace(recording, frf_re_pc_per_n=scaled[0], frf_im_pc_per_n=scaled[1])
 
 
 _TERMS, _SIZE = 4, 0.3  # number of cosines over the rank along an axis, and the prior standard deviation of each
@@ -102,16 +92,6 @@ class Levels:
         indicator = np.eye(int(self.sensor.max()) + 1)[self.sensor]
         return np.asarray(_OVERALL**2 + columns @ columns.T + spread**2 * indicator @ indicator.T)
 
-    @property
-    def spreads(self) -> tuple[float, ...]:
-        """The values of t that are tried."""
-        return SPREADS if self.sensor.max() > 0 else SPREADS[:1]
-
-    @property
-    def position_scatters(self) -> tuple[float, ...]:
-        """The values of p that are tried."""
-        return POSITION_MM if self.slope.max(initial=0.0) > 0.05 else POSITION_MM[:1]
-
 
 def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable) -> Levels:
     """The levels of a campaign's recordings, whose signs are correct."""
@@ -155,24 +135,34 @@ class Cause:
     columns: Floats
 
 
-Undone = tuple[list[FrfRecording], Finding]
+Undone = tuple[list[FrfRecording], list[Finding]]
 
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
     """A slip, or what resembles one: the logarithm of its prior less that of the number of choices, and what it does.
 
-    `offset` (recordings,) is a known change of y; `column` (recordings,) one of unknown amplitude, times its prior
-    standard deviation; `sensor` (recordings,) are the true sensors. `undo` gives the recordings without the slip and
-    the finding, from the recordings and the amplitude in prior standard deviations, or None where it is none of a slip;
-    without it the alternative is no slip.
+    `gain` is its ln evidence over no slip, apart from what it does to the levels: `offset` (recordings,) is a known
+    change of y; `column` (recordings,) one of unknown amplitude, times its prior standard deviation; `sensor`
+    (recordings,) are the true sensors. `undo` gives the recordings without the slip and the findings, from the
+    recordings and the amplitude in prior standard deviations, or None where it is none of a slip; without it the
+    alternative is no slip.
     """
 
     log_prior: float
+    gain: float = 0.0
     offset: Floats | None = None
     column: Floats | None = None
     sensor: Indices | None = None
-    undo: Callable[[Sequence[FrfRecording], float], Undone | None] | None = None
+    undo: Callable[[list[FrfRecording], float], Undone | None] | None = None
+
+    @property
+    def changes_levels(self) -> bool:
+        """Whether it is judged by the model of levels."""
+        return not (self.offset is None and self.column is None and self.sensor is None)
+
+
+NO_SLIP = Alternative(0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,14 +191,7 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
         axis=1,
     )
     laws = []
-    for name, mechanism in CATALOGUE.items():
-        if "frf" not in mechanism.kinds or mechanism.needs_lines:
-            continue
-        try:
-            model = compose((name,), conditions, table, "frf")
-        except Unsupported:
-            continue
-        assert isinstance(model, FrfModel)
+    for model in models_of_laws(conditions, table, along_frequency=False).values():
         if not any(parameter.moves_covariance for parameter in model.parameters):
             relative = np.abs([changed[levels.index] / value for changed in model.values(_drawn(model, start))])
             change = np.log(np.maximum(relative, _LEAST_RATIO))
@@ -218,6 +201,22 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
         *(Cause(log(_SINGLE_CAUSE / len(laws)), np.hstack([declared, law])) for law in laws),
         *(Cause(log(_SMOOTH_CAUSE / len(_SMOOTH_SIZES)), smooth_size * levels.smooth) for smooth_size in _SMOOTH_SIZES),
     ]
+
+
+def models_of_laws(conditions: Conditions, table: SigmaTable, *, along_frequency: bool) -> dict[str, FrfModel]:
+    """The models of single laws of the catalogue under these conditions, by name: of those that act along frequency, or
+    of the others."""
+    models = {}
+    for name, mechanism in CATALOGUE.items():
+        if "frf" not in mechanism.kinds or mechanism.needs_lines is not along_frequency:
+            continue
+        try:
+            model = compose((name,), conditions, table, "frf")
+        except Unsupported:
+            continue
+        assert isinstance(model, FrfModel)
+        models[name] = model
+    return models
 
 
 def explained(levels: Levels, causes: Sequence[Cause], alternatives: Sequence[Alternative]) -> Explained:
@@ -239,12 +238,16 @@ def explained(levels: Levels, causes: Sequence[Cause], alternatives: Sequence[Al
 def _by_cause(levels: Levels, columns: Floats, alternatives: Sequence[Alternative]) -> Explained:
     """The evidence of each alternative under one cause."""
     count, none = len(alternatives), np.zeros(len(levels.value))
+    spreads = SPREADS if levels.sensor.max() > 0 else SPREADS[:1]
+    position_scatters = (
+        POSITION_MM if POSITION_MM[-1] * levels.slope.max(initial=0.0) > _SCATTER[0] else POSITION_MM[:1]
+    )
     values = [levels.value - (none if one.offset is None else one.offset) for one in alternatives]
     right = np.stack([*values, *(none if one.column is None else one.column for one in alternatives)], axis=1)
     evidence, amplitude = np.full(count, -np.inf), np.zeros(count)
     scatters = np.array(_SCATTER)
     prior = _SCATTER_PRIOR.log_density(np.log(scatters))
-    for spread, position_scatter in product(levels.spreads, levels.position_scatters):
+    for spread, position_scatter in product(spreads, position_scatters):
         fixed = levels.expected(spread, columns) + np.diag((levels.slope * position_scatter) ** 2)
         eigenvalues, vectors = np.linalg.eigh(fixed)  # of all s: C = V (Λ + s²) Vᵀ
         turned = vectors.T @ right

@@ -13,7 +13,7 @@ import numpy as np
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.laws.modulus_error import LARGEST_FACTOR
-from underskin.mechanisms.models.composed import Model, compose
+from underskin.mechanisms.models.composed import compose
 from underskin.physics import hertz
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
@@ -29,25 +29,22 @@ _UNITS = {  # given instead of the field's own: 1000 times smaller, and larger
 
 
 def within_tables(
-    campaign: Campaign,
-    recordings: list[FrfRecording],
-    model: Model,
-    table: SigmaTable,
-    keep_ids: Collection[str] | None,
-) -> tuple[Mask, Mask, list[Finding]]:
-    """Which contacts lie within the tables as declared, which others are used, and the findings on the rest.
+    campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable, keep_ids: Collection[str] | None
+) -> tuple[list[FrfRecording], frozenset[str], list[Finding]]:
+    """The recordings whose contacts lie within the tables, the ids of those that do not as declared and are used all
+    the same, and the findings on the rest.
 
     `keep_ids` are the recordings whose contacts are known to lie within the tables; None: those that a plausible
     modulus brings there. Where none lies within as declared, that modulus must bring most of them there.
     """
-    inside = _inside(model, len(recordings))
     subset = replace(campaign, recordings=tuple(recordings))
-    beyond = np.zeros_like(inside) if inside.all() else ~inside & _inside_where_stiffest(subset, table)
-    if not inside.any() and beyond.mean() <= _ENOUGH:
-        beyond[:] = False
-    if_stiffer = beyond.copy()
-    if keep_ids is not None:
-        beyond &= [recording.id in keep_ids for recording in recordings]
+    inside = _inside(subset, table)
+    stiffest = _times(subset, "skin.youngs_modulus_mpa", LARGEST_FACTOR)  # where contacts are narrowest
+    if_stiffer = np.zeros_like(inside) if inside.all() else ~inside & _inside(stiffest, table)
+    if not inside.any() and if_stiffer.mean() <= _ENOUGH:
+        if_stiffer[:] = False
+    beyond = if_stiffer & [keep_ids is None or recording.id in keep_ids for recording in recordings]
+    usable = inside | beyond
     skin = campaign.skin
     assert skin.thickness_mm is not None
     assert skin.youngs_modulus_mpa is not None
@@ -55,35 +52,25 @@ def within_tables(
     sphere = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])
     modulus = float(to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa))
     radius_mm = 1e3 * hertz.contact_radius(force, sphere, modulus, skin.poisson_ratio)
-    if not (inside | beyond).any():
+    if not usable.any():
         ratios = radius_mm / skin.thickness_mm
         arguments = {"smallest": float(ratios.min()), "largest": float(ratios.max())}
         none_inside = Finding(Reason.NO_CONTACT_WITHIN_TABLES, "", "skin.thickness_mm", arguments)
-        return inside, beyond, [none_inside, *_possible_unit_errors(subset, table)]
-    stiffer = {"declared_mpa": skin.youngs_modulus_mpa, "factor": LARGEST_FACTOR}
-    exclusions = [
-        Finding(Reason.OUT_OF_TABLES_UNLESS_STIFFER, recordings[index].id, "preload_n", stiffer)
-        if if_stiffer[index]
-        else Finding(
-            Reason.OUT_OF_TABLES_DECLARED,
-            recordings[index].id,
-            "preload_n",
-            {"radius_mm": float(radius_mm[index]), "thickness_mm": skin.thickness_mm},
-        )
-        for index in np.flatnonzero(~(inside | beyond))
-    ]
-    return inside, beyond, exclusions
+        return [], frozenset(), [none_inside, *_possible_unit_errors(subset, table)]
+    findings = []
+    for index in np.flatnonzero(~usable).tolist():
+        reason = Reason.OUT_OF_TABLES_UNLESS_STIFFER if if_stiffer[index] else Reason.OUT_OF_TABLES_DECLARED
+        stiffer = {"declared_mpa": skin.youngs_modulus_mpa, "factor": LARGEST_FACTOR}
+        declared = {"radius_mm": float(radius_mm[index]), "thickness_mm": skin.thickness_mm}
+        findings.append(Finding(reason, recordings[index].id, "preload_n", stiffer if if_stiffer[index] else declared))
+    far = frozenset(recordings[index].id for index in np.flatnonzero(beyond).tolist())
+    return [recordings[index] for index in np.flatnonzero(usable).tolist()], far, findings
 
 
-def _inside(model: Model, recordings: int) -> Mask:
-    inside: Mask = model.valid[np.searchsorted(model.recording, np.arange(recordings))]
-    return inside
-
-
-def _inside_where_stiffest(campaign: Campaign, table: SigmaTable) -> Mask:
-    """Which contacts lie within the tables at the largest plausible modulus, where contacts are narrowest."""
-    stiffest = _times(campaign, "skin.youngs_modulus_mpa", LARGEST_FACTOR)
-    return _inside(compose((), stiffest, table, "frf"), len(campaign.recordings))
+def _inside(campaign: Campaign, table: SigmaTable) -> Mask:
+    """Which contacts lie within the tables (recordings,)."""
+    model = compose((), campaign, table, "frf")
+    return np.asarray(model.valid[np.searchsorted(model.recording, np.arange(len(campaign.recordings)))])
 
 
 def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding]:
@@ -91,8 +78,7 @@ def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding
     findings = []
     for field, units in _UNITS.items():
         for factor, unit in zip((1e-3, 1e3), units, strict=True):
-            inside = _inside(compose((), _times(campaign, field, factor), table, "frf"), len(campaign.recordings))
-            if inside.mean() > _ENOUGH:
+            if _inside(_times(campaign, field, factor), table).mean() > _ENOUGH:
                 findings.append(Finding(Reason.WITHIN_TABLES, "", field, {"larger": factor > 1, "given_in": unit}))
     return findings
 

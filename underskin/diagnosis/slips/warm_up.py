@@ -4,12 +4,13 @@ Neighbouring τ hardly differ, and count as one choice. Rivals are a single firs
 drift. Where load cycles are noted, ageing explains a fall.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, Alternative, Levels, Undone
+from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, SELDOM, Alternative, Undone
+from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.forms import recording_order
@@ -19,22 +20,24 @@ _TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings: half an hour or le
 _LONGEST = 0.3  # largest τ, of the number of recordings
 _SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign, as by a law
 _MOST_SHARE = 0.4  # of the recordings left out at most
-_FIRST = -1.5  # ln prior of a single first recording that is off, over that of a warm-up
 _OVER = 0.01  # of the level: largest remaining drift in recordings that are used
 
 
-def warm_ups(levels: Levels) -> Iterator[Alternative]:
+def warm_ups(screened: Screened) -> Iterator[Alternative]:
     """Drifts of each τ, and the rivals."""
+    levels = screened.levels
+    if levels is None:
+        return
     times = [time for time in _TIMES if time <= _LONGEST * len(levels.value)]
     for time in times:
         undo = partial(_without_first, time=time, may_age=levels.may_age)
         yield Alternative(0.0, column=CHANGE * np.exp(-levels.order / time), undo=undo)
     for longer in _SLOWER if times else ():
         yield Alternative(0.0, column=CHANGE * np.exp(-levels.order / (longer * times[-1])))
-    yield Alternative(_FIRST, column=CHANGE * (levels.order == 0).astype(float))
+    yield Alternative(-SELDOM, column=CHANGE * (levels.order == 0).astype(float))
 
 
-def _without_first(recordings: Sequence[FrfRecording], size: float, *, time: float, may_age: bool) -> Undone | None:
+def _without_first(recordings: list[FrfRecording], size: float, *, time: float, may_age: bool) -> Undone | None:
     """The recordings after the warm-up."""
     amplitude = CHANGE * size
     if abs(amplitude) < LEAST_CHANGE or (may_age and amplitude > 0):
@@ -43,4 +46,4 @@ def _without_first(recordings: Sequence[FrfRecording], size: float, *, time: flo
     late = recording_order(recordings) > last
     arguments = {"percent": 100 * float(np.exp(-amplitude) - 1), "recordings": int((~late).sum())}
     remaining = [recording for recording, chosen in zip(recordings, late, strict=True) if chosen]
-    return remaining, Finding(Reason.WARM_UP, "", "recorded_at", arguments)
+    return remaining, [Finding(Reason.WARM_UP, "", "recorded_at", arguments)]

@@ -1,69 +1,18 @@
-"""Recordings given as time series: contradictions of their force, and their FRF lines.
-
-The mean force is the preload, unless AC coupling removed it. Its oscillation is about the dynamic force: the peak for
-sines and blows, √2 times the standard deviation for sines and noise. Drift, as of a relaxing preload, is not
-oscillation: the straight line through each eighth of the record is removed. Contradictions point to wrong units or
-exchanged channels.
-"""
+"""Recordings given as time series as FRFs: their lines that can be used, and what is said of the others."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.slips.unit_errors import MOST_SHARE, SLIP
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import exchanged_channels, lines_of, oscillation_of
+from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.frf.line_choice import Usable, excited_at_mains, noise_findings, usable_lines
-from underskin.recordings.frf.spectra import Frf, left_out_of, mean_of
-from underskin.units import Floats, force_unit, to_lab
-
-_NO_PREFIX = ("gf", "kgf", "lbf")  # units of force that are no power of 1000 off
-_WITHIN = 30.0  # times what is declared, or a thousand times it
-
-
-def contradiction_of(recording: FrfRecording) -> Finding | None:
-    """The finding where the force of a recording contradicts its declared values, else None."""
-    if recording.force_n is None or recording.charge_pc is None:
-        return None
-    mean = float(np.mean(recording.force_n))
-    preload = mean_of(recording.force_n)
-    if (exchanged := exchanged_channels(recording)) is not None:
-        return exchanged
-    oscillation = oscillation_of(recording.force_n) / recording.dynamic_force_n
-    agrees = any(_near(ratio, 1.0) for ratio in oscillation)
-    nearest = oscillation[int(np.argmin(np.abs(np.log(np.maximum(oscillation, 1e-300)))))] * recording.dynamic_force_n
-    pressed = None if preload is None else abs(preload) / recording.preload_n
-    guess = None if preload is None else force_unit(preload, recording.preload_n)
-    if guess is not None and guess.meant[0][1] in _NO_PREFIX:
-        values = {"mean_n": preload, "preload_n": recording.preload_n, "guess": guess}
-        return Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", values)
-    for factor, unit, other_unit in ((SLIP, "mN", "kN"), (1 / SLIP, "kN", "mN")):
-        off = any(_near(ratio, factor) for ratio in oscillation)
-        dynamic_force = {"dynamic_force_n": recording.dynamic_force_n}
-        if off and (not agrees if pressed is None else _near(pressed, factor)):
-            arguments = {"oscillation_n": float(nearest), **dynamic_force, "too_large": factor > 1, "given_in": unit}
-            return Finding(Reason.SERIES_FORCE, recording.id, "force_n", arguments)
-        if off and not agrees and pressed is not None and _near(pressed, 1.0):
-            arguments = {**dynamic_force, "too_large": factor < 1, "given_in": other_unit}
-            return Finding(Reason.SERIES_DYNAMIC_FORCE, recording.id, "dynamic_force_n", arguments)
-        if agrees and pressed is not None and _near(pressed, factor):
-            arguments = {
-                "preload_n": recording.preload_n,
-                "mean_n": mean,
-                "too_large": factor < 1,
-                "given_in": other_unit,
-            }
-            return Finding(Reason.SERIES_PRELOAD, recording.id, "preload_n", arguments)
-    return None
-
-
-def _near(ratio: float, factor: float) -> bool:
-    return factor / _WITHIN < ratio < factor * _WITHIN
-
+from underskin.recordings.frf.spectra import Frf, left_out_of
+from underskin.units import Floats, to_lab
 
 _MANY = 0.1  # of the lines
 _GIVEN_AS = {"frequency_hz": "sample_rate_hz", "frf_re_pc_per_n": "charge_pc"}
@@ -73,35 +22,19 @@ _GIVEN_AS = {"frequency_hz": "sample_rate_hz", "frf_re_pc_per_n": "charge_pc"}
 class Estimated:
     """The recordings as FRFs, and the findings on their time series.
 
-    `doubtful`: the findings where the forces of many recordings contradict what is declared; then there are no
-    recordings. `uneven`: relative noise of the lines, by the recording's id. `unsure`: relative uncertainty of all
-    levels due to noise in the channels.
+    `uneven`: relative noise of the lines, by the recording's id. `unsure`: relative uncertainty of all levels due to
+    noise in the channels.
     """
 
     recordings: list[FrfRecording]
     findings: list[Finding]
-    doubtful: Sequence[Finding] = ()
-    uneven: Mapping[str, Floats] = field(default_factory=dict)
-    unsure: float = 0.0
+    uneven: Mapping[str, Floats]
+    unsure: float
 
 
-def as_lines(recordings: Sequence[FrfRecording], *, units_checked: bool) -> Estimated:
-    """The recordings with their usable lines, without single ones whose force contradicts what is declared.
-
-    With `units_checked` contradictions are findings and nothing is left out.
-    """
-    contradictions = [finding for recording in recordings if (finding := contradiction_of(recording)) is not None]
-    are_many = len(contradictions) > max(1.0, MOST_SHARE * len(recordings))
-    if are_many and not units_checked:
-        return Estimated([], [], doubtful=_together(contradictions, len(recordings)))
-    if are_many or units_checked:
-        findings = _together(contradictions, len(recordings))
-    else:
-        findings = [replace(finding, arguments={**finding.arguments, "left_out": True}) for finding in contradictions]
-        off = {finding.recording for finding in contradictions}
-        recordings = [recording for recording in recordings if recording.id not in off]
-    measured, of_estimates = _measured(recordings)
-    findings += of_estimates
+def as_lines(recordings: Sequence[FrfRecording]) -> Estimated:
+    """The recordings with their usable lines."""
+    measured, findings = _measured(recordings)
     chosen = dict(zip(measured, usable_lines(list(measured.values())), strict=True))
     usable, series = list[FrfRecording](), dict[str, Usable]()
     for recording in [recording for recording in recordings if recording.id in chosen]:
@@ -126,7 +59,7 @@ def as_lines(recordings: Sequence[FrfRecording], *, units_checked: bool) -> Esti
         if lines.choice.uneven is not None
     }
     unsure = float(np.median([frf.bias_unsure for frf in frfs])) if frfs else 0.0
-    return Estimated(usable, findings, uneven=uneven, unsure=unsure)
+    return Estimated(usable, findings, uneven, unsure)
 
 
 def as_given(recordings: Sequence[FrfRecording], findings: Sequence[Finding]) -> list[Finding]:
@@ -138,15 +71,6 @@ def as_given(recordings: Sequence[FrfRecording], findings: Sequence[Finding]) ->
         replace(finding, field=_GIVEN_AS.get(finding.field, finding.field)) if finding.recording in series else finding
         for finding in findings
     ]
-
-
-def _together(contradictions: list[Finding], recordings: int) -> list[Finding]:
-    """One finding where all recordings have the same, otherwise one for each."""
-    kinds = {(finding.reason, finding.field, finding.arguments.get("given_in")) for finding in contradictions}
-    if len(contradictions) == recordings > 1 and len(kinds) == 1:
-        first = contradictions[0]
-        return [replace(first, recording="", arguments={**first.arguments, "example": first.recording})]
-    return contradictions
 
 
 def _measured(recordings: Sequence[FrfRecording]) -> tuple[dict[str, Frf], list[Finding]]:
