@@ -6,7 +6,7 @@ its contact. Contact points are shifted all at once, since each moves one curve 
 
 Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
 platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. A sample that is only compressed or only
-pulled is slack, F = 0, before d0. Stages: declared value → nominal stress of the material → friction at the platens →
+pulled is slack, F = 0, before d0; and so it is again where it relaxed and would pull, or push, on its way back. Stages: declared value → nominal stress of the material → friction at the platens →
 relaxation.
 """
 
@@ -37,7 +37,7 @@ from underskin.recordings.campaign import (
     SkinDescription,
 )
 from underskin.recordings.curve_course import is_one_sided
-from underskin.recordings.modulus import of_compression
+from underskin.recordings.modulus import ZERO_SD, of_compression
 from underskin.units import Floats, Indices, Mask, to_si
 
 _STEP = 3e-6  # of a logarithm or of a prior's width
@@ -175,6 +175,7 @@ class CompressionModel(CurveModel):
         self._area = np.pi / 4 * diameter**2
         self._shape_factor = diameter / (4 * self._height)
         self._loaded = np.array([_loaded(recording) for recording in recordings])[:, None]
+        self._leaves = np.array([_leaves(recording) for recording in recordings])[:, None]
 
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
@@ -195,6 +196,7 @@ class CompressionModel(CurveModel):
         if relaxation is not None:
             force = relaxation.at_rest * force
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
+            force = np.where(self._leaves * force < 0, 0.0, force)
         return force, np.ones(force.shape, dtype=bool)
 
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
@@ -218,6 +220,16 @@ def _loaded(recording: CompressionConditions) -> float:
     if not isinstance(recording, CompressionRecording) or not is_one_sided(recording.force_n):
         return 0.0
     return 1.0 if recording.force_n.max() > -recording.force_n.min() else -1.0
+
+
+def _leaves(recording: CompressionConditions) -> float:
+    """As `_loaded`, but 0 where the force also reads the other sign, beyond what the zero may be off: a sample that
+    relaxed, drawn back, is left by a platen, which does not pull, or hangs slack, as a strip that cannot push; one that
+    is glued is not."""
+    if not isinstance(recording, CompressionRecording):
+        return 0.0
+    side = _loaded(recording)
+    return side if float((-side * recording.force_n).max()) < ZERO_SD * float(np.abs(recording.force_n).max()) else 0.0
 
 
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:
