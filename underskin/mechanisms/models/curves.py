@@ -222,6 +222,14 @@ def _loaded(recording: CompressionConditions) -> float:
     return 1.0 if recording.force_n.max() > -recording.force_n.min() else -1.0
 
 
+def _unloaded(force: Floats) -> int:
+    """The sample at which a cylinder is unloaded: before its largest force, since one that relaxed has lost its
+    contact before it is drawn back all the way; of all samples where none before reads zero."""
+    size = np.abs(force)
+    before = int(size[: int(size.argmax()) + 1].argmin())
+    return before if size[before] < ZERO_SD * size.max() else int(size.argmin())
+
+
 def _leaves(recording: CompressionConditions) -> float:
     """As `_loaded`, but 0 where the force also reads the other sign, beyond what the zero may be off: a sample that
     relaxed, drawn back, is left by a platen, which does not pull, or hangs slack, as a strip that cannot push; one that
@@ -243,8 +251,7 @@ def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescriptio
                 estimates.append(of_compression(recording).modulus)
             except InvalidInput as refusal:
                 raise refusal.at(f"recordings[{recording.id}].{refusal.field}") from refusal
-            unloaded = int(np.abs(recording.force_n).argmin())
-            contact = float(to_si("displacement_mm", recording.displacement_mm[unloaded]))
+            contact = float(to_si("displacement_mm", recording.displacement_mm[_unloaded(recording.force_n)]))
         else:
             required_modulus(skin)
         points.append(contact_point(recording.id, contact, _CONTACT_SD * height, _CONTACT_BOUND * height))
