@@ -6,8 +6,8 @@ its contact. Contact points are shifted all at once, since each moves one curve 
 
 Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
 platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. A sample that is only compressed or only
-pulled is slack, F = 0, before d0; and so it is again where it relaxed and would pull, or push, on its way back. Stages: declared value → nominal stress of the material → friction at the platens →
-relaxation.
+pulled is slack, F = 0, before d0, and again where it relaxed and its force would change sign on its way back. Stages:
+declared value → nominal stress of the material → friction at the platens → relaxation.
 """
 
 from abc import ABC, abstractmethod
