@@ -61,8 +61,9 @@ _ORDER = 10.0  # ratio of the ends of an interval
 
 
 def is_known(parameter: Mapping[str, Any]) -> bool:
-    """Whether the 95 % interval of a positive quantity leaves it less than an order of magnitude."""
-    return bool(parameter["high"] < _ORDER * parameter["low"])
+    """Whether the 95 % interval of a positive quantity, if it has one, leaves it less than an order of magnitude."""
+    low, high = parameter.get("low"), parameter.get("high")
+    return low is None or high is None or bool(high < _ORDER * low)
 
 
 def of_logarithms(shares: Floats, means: Floats, deviations: Floats) -> dict[str, float | None]:
