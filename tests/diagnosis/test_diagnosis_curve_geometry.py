@@ -96,6 +96,37 @@ def test_pulled_strip_told_without_spheres() -> None:
     assert "pressed" not in report.statement
 
 
+@pytest.mark.parametrize(
+    ("largest", "fraction", "seconds", "glued"),
+    [(-0.5, 0.6, 3.0, False), (-1.0, 0.7, 4.0, False), (0.2, 0.6, 3.0, False), (0.2, 0.6, 3.0, True)],
+)
+def test_relaxed_sample_on_its_way_back(largest: float, fraction: float, seconds: float, glued: bool) -> None:
+    """A block that relaxed is left by its platens, and a strip hangs slack, before it is drawn back all the way; a
+    glued block is pulled. E, the relaxed fraction and its time are those that made the curve."""
+    time = np.linspace(0.0, 20.0, 4001)
+    strain = largest * (1 - np.abs(time / 10 - 1))
+    elastic = neo_hookean(strain, noise=0.0)
+    lost, relaxed = 0.0, np.zeros(len(time))
+    for sample, step in enumerate(np.diff(time, prepend=0.0)):  # d lost/dt = (elastic - lost)/seconds
+        lost += (elastic[sample] - lost) * step / (seconds + step / 2)
+        relaxed[sample] = elastic[sample] - fraction * lost
+    loaded = np.sign(largest) * relaxed > 0
+    force = relaxed if glued else np.where(loaded, relaxed, 0.0)
+    assert loaded[:2000].mean() > 0.99
+    assert loaded[2001:].mean() < 0.75
+    noise = 2e-3 * np.abs(force).max() * np.random.default_rng(5).normal(size=len(time))
+    measured = block(strain[::8], (force + noise)[::8])
+    curves = [replace(curve, time_s=time[::8]) for curve in measured.curves]
+    report = diagnosed(replace(measured, recordings=tuple(curves)), "contact_creep")
+    assert report.verdict == "explained"
+    (creep,) = report.mechanisms
+    found = {parameter.name: parameter.value for parameter in creep.parameters}
+    assert creep.name == "contact_creep"
+    assert found["relaxed_fraction"] == pytest.approx(fraction, rel=0.05)
+    assert found["relaxation_time"] == pytest.approx(seconds, rel=0.05)
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.05)
+
+
 def test_few_points_of_a_pulled_strip_are_not_contradicted() -> None:
     """Of several strengths each may be zero, and all together not: a strip that stiffens only where it is pulled
     farthest is not said to stiffen in doubt, nor to have been predicted by a law that the rest does not show."""

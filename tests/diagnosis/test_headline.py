@@ -8,6 +8,7 @@ from underskin.diagnosis.reporting.headline import first_and_rest
 
 D33 = {"name": "d33", "unit": "pC/N", "value": -30.0, "low": -31.0, "high": -29.0}
 DELAY = {"name": "delay", "unit": "µs", "value": 14.2, "low": 13.4, "high": 15.1}
+KNOWN = {"name": "youngs_modulus", "unit": "MPa", "value": 2.0, "low": 1.8, "high": 2.2}
 SIGN = [{"code": "sign_flipped", "recording": "r1"}]
 
 
@@ -35,6 +36,9 @@ def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
         ({"verdict": "insufficient_data", "statement": 21 * "much "}, "Nothing can be concluded from these recordings"),
         ({"campaigns": ["a", "b"], "statement": "Both agree. No more."}, "Both agree"),
         ({"headline": "Adhesion."}, "Adhesion"),
+        ({"fit": {"after": {"youngs_modulus": KNOWN}}}, "Nothing is missing; E 2 MPa (1.8–2.2)"),
+        ({"fit": {"after": {"youngs_modulus": {**KNOWN, "low": 0.2, "high": 2.1}}}},
+         "Nothing is missing; no E to quote"),
     ],
 )  # fmt: skip
 def test_a_headline_of_a_kept_report(kept: dict[str, Any], headline: str) -> None:

@@ -14,6 +14,7 @@ from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.reporting.headline import first_and_rest
+from underskin.diagnosis.reporting.numbers import is_known
 from underskin.findings.formatting import in_percent
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -80,7 +81,7 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
 def _modulus(report: Mapping[str, Any]) -> str | None:
     """Young's modulus of curves under the answer, in words."""
     after = (report["fit"] or {}).get("after", {}).get("youngs_modulus")
-    if after is None or report["verdict"] not in ("explained", "no_mismatch"):
+    if after is None or report["verdict"] not in ("explained", "no_mismatch") or not is_known(after):
         return None
     value, low, high = (f"{after[name]:.3g}" for name in ("value", "low", "high"))
     return f"{value} {after['unit']} (95 %: {low} to {high})"

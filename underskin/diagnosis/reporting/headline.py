@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, MOST_QUOTED, NAMED, in_words
+from underskin.diagnosis.reporting.numbers import is_known
 from underskin.diagnosis.reporting.statement import SLIPS
 from underskin.diagnosis.reporting.wording import finding, in_its_unit, number, readable, unit
 from underskin.findings.codes import FindingCode
@@ -130,10 +131,11 @@ def _value(parameter: Document) -> str:
 
 
 def _to_quote(report: Document) -> str:
-    """d33 or E with its interval; that there is none to quote where the verdict may be read as if there were."""
+    """d33 or E with its interval; that there is none to quote where the verdict may be read as if there were, and of an
+    E whose order of magnitude is not known."""
     d33, modulus = report.get("d33"), ((report.get("fit") or {}).get("after") or {}).get("youngs_modulus")
     if d33 is not None and d33.get("value") is not None:
         return _value({**d33, "name": "d33"}) if d33.get("quotable", True) else "no d33 to quote"
     if modulus is None or modulus.get("at_bound"):
         return ""
-    return _value({**modulus, "name": "E"})
+    return _value({**modulus, "name": "E"}) if is_known(modulus) else "no E to quote"

@@ -57,6 +57,15 @@ def in_sentence(parameter: Mapping[str, Any]) -> str:
     return f"{value} {parameter['unit']} (95 %: {low} to {high})"
 
 
+_ORDER = 10.0  # ratio of the ends of an interval
+
+
+def is_known(parameter: Mapping[str, Any]) -> bool:
+    """Whether the 95 % interval of a positive quantity, if it has one, leaves it less than an order of magnitude."""
+    low, high = parameter.get("low"), parameter.get("high")
+    return low is None or high is None or bool(high < _ORDER * low)
+
+
 def of_logarithms(shares: Floats, means: Floats, deviations: Floats) -> dict[str, float | None]:
     """The median and the 95 % interval of a quantity whose logarithm is a mixture of normal distributions (parts,)."""
     return with_ends(*(float(np.exp(mixture_quantile(shares, means, deviations, level))) for level in QUANTILES_OF_95))

@@ -266,6 +266,9 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     if modulus.get("at_bound"):
         bound = f"{modulus['value']:.3g} {modulus['unit']}"
         return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
+    if not numbers.is_known(modulus):
+        low, high = (f"{modulus[end]:.3g}" for end in ("low", "high"))
+        return f"Young's modulus {how} is not known: {low} to {high} {modulus['unit']} (95 %)"
     return f"Young's modulus {how}: {numbers.in_sentence(modulus)}"
 
 

@@ -6,8 +6,8 @@ its contact. Contact points are shifted all at once, since each moves one curve 
 
 Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
 platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. A sample that is only compressed or only
-pulled is slack, F = 0, before d0. Stages: declared value → nominal stress of the material → friction at the platens →
-relaxation.
+pulled is slack, F = 0, before d0, and again where it relaxed and its force would change sign on its way back. Stages:
+declared value → nominal stress of the material → friction at the platens → relaxation.
 """
 
 from abc import ABC, abstractmethod
@@ -37,7 +37,7 @@ from underskin.recordings.campaign import (
     SkinDescription,
 )
 from underskin.recordings.curve_course import is_one_sided
-from underskin.recordings.modulus import of_compression
+from underskin.recordings.modulus import ZERO_SD, of_compression
 from underskin.units import Floats, Indices, Mask, to_si
 
 _STEP = 3e-6  # of a logarithm or of a prior's width
@@ -175,6 +175,7 @@ class CompressionModel(CurveModel):
         self._area = np.pi / 4 * diameter**2
         self._shape_factor = diameter / (4 * self._height)
         self._loaded = np.array([_loaded(recording) for recording in recordings])[:, None]
+        self._leaves = np.array([_leaves(recording) for recording in recordings])[:, None]
 
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
@@ -195,6 +196,7 @@ class CompressionModel(CurveModel):
         if relaxation is not None:
             force = relaxation.at_rest * force
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
+            force = np.where(self._leaves * force < 0, 0.0, force)
         return force, np.ones(force.shape, dtype=bool)
 
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
@@ -220,6 +222,24 @@ def _loaded(recording: CompressionConditions) -> float:
     return 1.0 if recording.force_n.max() > -recording.force_n.min() else -1.0
 
 
+def _unloaded(force: Floats) -> int:
+    """The sample at which a cylinder is unloaded: before its largest force, since one that relaxed has lost its
+    contact before it is drawn back all the way; of all samples where none before reads zero."""
+    size = np.abs(force)
+    before = int(size[: int(size.argmax()) + 1].argmin())
+    return before if size[before] < ZERO_SD * size.max() else int(size.argmin())
+
+
+def _leaves(recording: CompressionConditions) -> float:
+    """As `_loaded`, but 0 where the force also reads the other sign, beyond what the zero may be off: a sample that
+    relaxed, drawn back, is left by a platen, which does not pull, or hangs slack, as a strip that cannot push; one that
+    is glued is not."""
+    if not isinstance(recording, CompressionRecording):
+        return 0.0
+    side = _loaded(recording)
+    return side if float((-side * recording.force_n).max()) < ZERO_SD * float(np.abs(recording.force_n).max()) else 0.0
+
+
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:
     """The nuisance parameters; raises InvalidInput where a measured curve does not load."""
     estimates, points = [], []
@@ -231,8 +251,7 @@ def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescriptio
                 estimates.append(of_compression(recording).modulus)
             except InvalidInput as refusal:
                 raise refusal.at(f"recordings[{recording.id}].{refusal.field}") from refusal
-            unloaded = int(np.abs(recording.force_n).argmin())
-            contact = float(to_si("displacement_mm", recording.displacement_mm[unloaded]))
+            contact = float(to_si("displacement_mm", recording.displacement_mm[_unloaded(recording.force_n)]))
         else:
             required_modulus(skin)
         points.append(contact_point(recording.id, contact, _CONTACT_SD * height, _CONTACT_BOUND * height))
