@@ -30,7 +30,7 @@ def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", {**DELAY, "value": None})]}, "Timing delay"),
         ({"verdict": "explained", "mechanisms": 12 * [mechanism("timing_delay")]}, "12 mechanisms are missing (97 %)"),
         ({"verdict": "ambiguous", "findings": SIGN},
-         "Sign reversed; many explanations remain, the best: nothing missing (97 %)"),
+         "Sign reversed; nothing missing (97 %), not settled"),
         ({"verdict": "unexplained"}, "Something is missing that no known mechanism describes (97 %)"),
         ({"verdict": "insufficient_data", "statement": "Too little: one FRF. Add more."}, "Too little: one FRF"),
         ({"verdict": "insufficient_data", "statement": 21 * "much "}, "Nothing can be concluded from these recordings"),

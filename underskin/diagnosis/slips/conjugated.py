@@ -19,7 +19,6 @@ from functools import partial
 from math import comb, log
 
 import numpy as np
-from scipy.stats import norm
 
 from underskin.diagnosis.slips.comparison import LEAST_RECORDINGS, times
 from underskin.diagnosis.slips.levels import Alternative, Undone
@@ -130,11 +129,16 @@ def _of_two_signs(phase: Floats, weight: Floats, signs: Floats) -> float:
     two_signs, one_sign = [], []
     for varied in _VARIED:
         spread = np.sqrt(1 / information[informative] + varied**2)
-        parts = (log(size) + norm.logpdf(amplitude, sign, spread) for size, sign in ((1 - share, 1.0), (share, -1.0)))
+        parts = (log(size) + _log_density(amplitude, sign, spread) for size, sign in ((1 - share, 1.0), (share, -1.0)))
         two_signs.append(float(np.logaddexp(*parts).sum()))
         mean = float(np.average(amplitude, weights=spread**-2))
-        one_sign.append(float(norm.logpdf(amplitude, mean, spread).sum()))
+        one_sign.append(float(_log_density(amplitude, mean, spread).sum()))
     return max(two_signs) - max(one_sign)
+
+
+def _log_density(value: Floats, mean: float, deviation: Floats) -> Floats:
+    """Of a normal distribution, but for the constant."""
+    return np.asarray(-0.5 * ((value - mean) / deviation) ** 2 - np.log(deviation))
 
 
 def _mean_phase(phase: Floats, weight: Floats, signs: Floats) -> Floats:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from underskin.diagnosis.data.names import MOST_QUOTED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
@@ -50,7 +50,7 @@ def curve_spread_findings(problem: FittingProblem, stated: Explanation) -> list[
 
 def _agree(logarithms: Floats) -> bool:
     statistic = np.sum((logarithms - logarithms.mean()) ** 2) / GAIN_RANGE[1] ** 2
-    return bool(chi2.sf(statistic, len(logarithms) - 1) > _CHANCE)
+    return bool(chdtrc(len(logarithms) - 1, statistic) > _CHANCE)
 
 
 def _other_radii(radii: Sequence[float]) -> Iterator[tuple[str, Floats]]:
