@@ -171,7 +171,8 @@ def test_clipped_before_noise_was_added(kind: str) -> None:
         random = np.random.default_rng(seed)
         force, gain = _whole(kind, random, 8192), 7.4
         noise = random.normal(0.0, 10 ** random.uniform(-3.0, -1.5), (2, len(force)))
-        assert [d for d in defects_of_pair(force + noise[0], gain * (force + noise[1])) if d.kind == "overload"] == []
+        whole = defects_of_pair(force + noise[0], gain * (force + noise[1]))
+        assert {defect.kind for defect in whole} <= {"held_samples", "jump"}
         rail = 0.6 * np.abs(force).max()
         clipped = np.clip(force, -rail, rail) + 0.005 * rail * random.standard_normal(len(force))
         for channel, pair in (("force_n", (clipped, gain * force)), ("charge_pc", (force, gain * clipped))):
@@ -199,3 +200,20 @@ def test_a_drive_of_limited_peaks_is_whole(limit: float, beyond: str) -> None:
     noise = 0.005 * random.standard_normal((2, len(drive)))
     charge = 7.4 * np.fft.irfft(np.fft.rfft(drive) * passed, len(drive))
     assert defects_of_pair(drive + noise[0], charge + noise[1]) == []
+
+
+@pytest.mark.parametrize("power", [0.9, 1.1])
+@pytest.mark.parametrize("kind", ["sine", "noise", "tones"])
+def test_skin_and_noise_limit_no_charge(kind: str, power: float) -> None:
+    """A charge that goes as such a power of a force of 0.3 rms of its preload is whole behind noise of up to 9 %; one
+    limited softly, hard or on one side behind the same noise is not."""
+    for seed in range(6):
+        random = np.random.default_rng([seed, len(kind)])
+        turns = 2 * np.pi * np.outer(random.uniform(0.002, 0.05, 7), np.arange(8192)) + random.uniform(0, 6, (7, 1))
+        force = np.sin(turns).sum(axis=0) if kind == "tones" else _whole(kind, random, 8192)
+        force /= force.std()
+        noise = 0.09 * random.standard_normal(len(force))
+        with_preload = np.maximum(1 + 0.3 * force, 0.0)
+        assert defects_of_pair(with_preload, with_preload**power + 0.3 * noise) == []
+        for charge in (1.2 * np.tanh(force / 1.2), np.clip(force, -0.8, 0.8), np.minimum(force, 0.7)):
+            assert {d.kind for d in defects_of_pair(with_preload, charge + noise)} & {"limited", "overload"}

@@ -72,6 +72,7 @@ class DefectKind(StrEnum):
     """What a run of damaged samples does."""
 
     OVERLOAD = "overload"
+    LIMITED = "limited"
     HELD_SAMPLES = "held_samples"
     JUMP = "jump"
 
@@ -80,6 +81,7 @@ class DefectKind(StrEnum):
         """What the samples do."""
         return {
             DefectKind.OVERLOAD: "stay at the end of the range: overload",
+            DefectKind.LIMITED: "follow the force less the further they go, as behind a limit: overload",
             DefectKind.HELD_SAMPLES: "repeat one value: samples were dropped and the last one held",
             DefectKind.JUMP: "break the signal's course: samples were dropped, or a spike",
         }[self]
