@@ -576,6 +576,11 @@ class Stack:
         columns = (self.values[:, lines], self.coherence[:, lines], self.used[:, lines])
         return Stack(self.rows, self.frequency[lines], *columns)
 
+    def of(self, chosen: Mask) -> "Stack":
+        """The stack of some of its recordings (rows,)."""
+        columns = (self.values[chosen], self.coherence[chosen], self.used[chosen])
+        return Stack(self.rows[chosen], self.frequency, *columns)
+
     @cached_property
     def weights(self) -> Floats:
         """γ²/(1 − γ²) of the used lines (rows, lines), the inverse variance of a line up to a factor, with the expected
