@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.recordings.known_signals import RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
+from underskin.errors import InvalidInput
 from underskin.recordings.frf.estimation import broadband, stepped_sine
 from underskin.recordings.frf.spectra import Frf, defects, defects_of_pair
 from underskin.units import Floats
@@ -176,7 +177,7 @@ def test_clipped_before_noise_was_added(kind: str) -> None:
         rail = 0.6 * np.abs(force).max()
         clipped = np.clip(force, -rail, rail) + 0.005 * rail * random.standard_normal(len(force))
         for channel, pair in (("force_n", (clipped, gain * force)), ("charge_pc", (force, gain * clipped))):
-            found = {d.channel for d in defects_of_pair(*pair) if d.kind == "overload"}
+            found = {d.channel for d in defects_of_pair(*pair) if d.kind in ("overload", "limited")}
             assert found <= {channel}
             clipped_pairs += 1
             seen += bool(found)
@@ -200,6 +201,16 @@ def test_a_drive_of_limited_peaks_is_whole(limit: float, beyond: str) -> None:
     noise = 0.005 * random.standard_normal((2, len(drive)))
     charge = 7.4 * np.fft.irfft(np.fft.rfft(drive) * passed, len(drive))
     assert defects_of_pair(drive + noise[0], charge + noise[1]) == []
+
+
+def test_limited_tones_are_refused_with_the_reason() -> None:
+    random, force = np.random.default_rng(1), dwelling([10.0, 20.0, 30.0], cycles=100)
+    force += 1e-3 * random.standard_normal(len(force))
+    charge = answer_to(force) + 1e-14 * random.standard_normal(len(force))
+    assert len(stepped_sine(force, charge, RATE).frequency) == 3
+    charge -= charge.mean()
+    with pytest.raises(InvalidInput, match="as behind a limit: overload"):
+        stepped_sine(force, charge.std() * np.tanh(charge / charge.std()), RATE)
 
 
 @pytest.mark.parametrize("power", [0.9, 1.1])

@@ -33,6 +33,7 @@ from underskin.recordings.frf.spectra import (
     averaged,
     damaged,
     defects_of_pair,
+    none_undamaged,
     period_of,
     without_drift,
     without_line,
@@ -360,6 +361,8 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         pair = step_amplitudes(force, charge, sample_rate, step, bad)
         if len(pair[0]):
             lines.setdefault(_same_line(step.frequency, lines), []).append(pair)
+    if not lines and defects:
+        raise none_undamaged(defects)
     if not lines:
         raise unusable("force_n", f"{len(defects)} defects", "must dwell on a tone for some undamaged cycles")
     frequency = np.array(sorted(lines))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 from scipy.special import stdtr
 
-from underskin.errors import unusable
+from underskin.errors import InvalidInput, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import DefectKind, Finding
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
@@ -113,18 +113,20 @@ def mean_of(force: Floats) -> float | None:
 
 
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
-    """Every defect of force and charge: those of each by itself that are not physical, and clipping that shows beside
-    the other channel alone."""
+    """Every defect of force and charge: those of each by itself that are not physical, and limits that show beside the
+    other channel alone: all samples of a limited charge, but of blows, which may be whole one by one, and otherwise the
+    clipped samples of either."""
     if not len(force):
         return []
     every = _unphysical(force, charge)
+    clear = all(defect.kind != DefectKind.OVERLOAD for defect in every)
+    if clear and _kurtosis(force) <= _BLOW and _is_limited(force, charge):
+        return [*every, Defect(DefectKind.LIMITED, "charge_pc", len(charge), 0)]
     for channel, signal, other in (("force_n", force, charge), ("charge_pc", charge, force)):
         known = [defect for defect in every if defect.channel == channel]
         if all(defect.kind != DefectKind.OVERLOAD for defect in known):
             clipped = _clipped_in_noise(np.where(damaged(known, len(signal)), np.median(signal), signal), other)
             every += [Defect(DefectKind.OVERLOAD, channel, count, first) for first, count in _runs(clipped)]
-    if all(defect.kind != DefectKind.OVERLOAD for defect in every) and _is_limited(force, charge):
-        every.append(Defect(DefectKind.LIMITED, "charge_pc", len(charge), 0))
     return every
 
 
@@ -510,15 +512,20 @@ class Frf:
         return np.sqrt((1 - self.coherence) / (2 * self.averages * np.maximum(self.coherence, 1e-12)))
 
 
+def none_undamaged(every: Sequence[Defect]) -> InvalidInput:
+    """The error where defects leave no block of a recording, by the first."""
+    first, count = every[0], len(every)
+    words = Finding(Reason.DEFECT, arguments=vars(first)).statement
+    return unusable(first.channel, f"{count} defect{'s' * (count > 1)}", f"no undamaged block: {words}")
+
+
 def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, estimator: Estimator) -> Frf:
     """The average over the undamaged blocks of force [N] and charge [C], sampled at `sample_rate` [Hz]."""
     defects = defects_of_pair(force, charge)
     undamaged = ~blocks.of(damaged(defects, len(force))).any(axis=1)
     count = int(undamaged.sum())
     if not count:
-        first = defects[0]
-        words = Finding(Reason.DEFECT, arguments=vars(first)).statement
-        raise unusable(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
+        raise none_undamaged(defects)
     force_spectra, charge_spectra = (blocks.spectra(signal)[undamaged] for signal in (force, charge))
     frequency: Floats = sample_rate * np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)
