@@ -38,8 +38,7 @@ class NotedConditions:
         """Their effects from the recordings `rows`, of which `sensor`, `load` (numbers) and `d33` are given (rows,)."""
         noted = self.values[rows]
         if not noted.size or len(np.unique(sensor)) < 2:
-            columns = len(self.names)
-            return ConditionEffects(self, np.zeros(columns), np.zeros((columns, columns)))
+            return ConditionEffects(self, np.zeros(len(self.names)), np.zeros((len(self.names), len(self.names))))
         loads = (load[:, None] == np.unique(load)).astype(np.float64)
         members = (sensor[:, None] == np.unique(sensor)).astype(np.float64)
         share = members / members.sum(axis=0)

@@ -340,12 +340,22 @@ _DETERMINED = 0.5  # least share of the cube that a periodic force's lines leave
 
 @dataclass(frozen=True)
 class _Cubic:
-    """How much more an effect follows its cause at small amplitudes than on average (`loss`, relative; below 0 it
-    follows more at large ones), whether `beyond_chance`, and how much of the cube is `left` by the linear response."""
+    """How much more an effect follows its cause at small amplitudes than on average (`loss`, relative), the `chance`
+    of a cubic coefficient as low by noise, and how much of the cube is `left` by the linear response."""
 
     loss: float
-    beyond_chance: bool
+    chance: float
     left: float
+
+    @property
+    def falls_behind(self) -> bool:
+        """Whether the effect follows less at large amplitudes."""
+        return self.loss > _FALLS_BEHIND and self.chance < _LIMITED_BY_CHANCE
+
+    @property
+    def runs_ahead(self) -> bool:
+        """Whether it follows more."""
+        return self.loss < 0 and 1 - self.chance < _LIMITED_BY_CHANCE
 
 
 def _is_limited(force: Floats, charge: Floats) -> bool:
@@ -354,17 +364,21 @@ def _is_limited(force: Floats, charge: Floats) -> bool:
     The charge less its linear response to the force is regressed on the cube of that response, less the cube's own
     linear response, beside the same of its square (Bendat, Nonlinear System Techniques and Applications, 1998): for a
     linear chain the coefficient is 0 by any noise of the charge. Unless the force consists of a few tones a limited
-    charge has the force run ahead of it, too; noise of the force, or a ringing longer than a block, has not.
+    charge has the force run ahead of it, too; noise of the force, or a ringing longer than a block, has not. Where the
+    lines of a periodic force leave little of the cube, that must be beyond chance as well.
     """
     if len(force) < _PIECES * _FEWEST_PILED_UP:
         return False
     period = period_of(force)
     cubic = _cubic(force, charge, period)
-    if period and cubic.left < _DETERMINED:
-        period, cubic = 0, _cubic(force, charge, 0)
-    if not (cubic.beyond_chance and cubic.loss > _FALLS_BEHIND):
+    if period and cubic.left >= _DETERMINED:
+        return cubic.falls_behind
+    if period:
+        cubic = _cubic(force, charge, 0)
+    if not cubic.falls_behind:
         return False
-    return bool(period) or _cubic(charge, force, 0).loss < 0
+    other = _cubic(charge, force, 0)
+    return other.runs_ahead if period else other.loss < 0
 
 
 def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
@@ -379,7 +393,7 @@ def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
     response = responses.of(effect)
     rms = _rms(response[middle])
     if not rms > 0:
-        return _Cubic(0.0, False, 0.0)
+        return _Cubic(0.0, 0.5, 0.0)
     x, rest = response / rms, (effect - response)[middle] / rms
     powers = np.array([(power - responses.of(power - power.mean()))[middle] for power in (x**2, x**3)])
     powers -= powers.mean(axis=1, keepdims=True)
@@ -398,7 +412,7 @@ def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
     chance = stdtr(freedom, coefficients[1] / max(float(np.sqrt(variance)), _TINY))
     by_noise = responses.noise(effect) * max(3 - fourth, 0.0) * fourth / max(cube, _TINY)
     left = cube / max(float(np.mean(x**6)) - fourth**2, _TINY)
-    return _Cubic(float(-coefficients[1] * fourth - by_noise), bool(chance < _LIMITED_BY_CHANCE), left)
+    return _Cubic(float(-coefficients[1] * fourth - by_noise), float(chance), left)
 
 
 def _held(signal: Floats) -> Mask:
