@@ -231,7 +231,7 @@ from underskin.mechanisms import CATALOGUE, compose
 from underskin.parallel import processes
 from underskin.prediction.adopted_model import adopted
 
-name, values = "sample_averaging", {"amplifier_high_pass": (1.0,), "sample_averaging": (0.4,)}
+name, values = "sample_averaging", {"amplifier_high_pass": (1.0, 1.0), "sample_averaging": (0.4,)}
 if __name__ == "__main__":
     names = list(CATALOGUE)
     assert names[names.index(name) - 1] == "timing_delay", names

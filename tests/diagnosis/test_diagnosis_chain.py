@@ -90,7 +90,7 @@ def test_value_bound_search_explains_nothing(table: SigmaTable, monkeypatch: pyt
     """
     mechanism = CATALOGUE["amplifier_high_pass"]
     narrow = replace(mechanism.parameters_stated[0], high=60.0)
-    monkeypatch.setattr(type(mechanism), "parameters_stated", (narrow,))
+    monkeypatch.setattr(type(mechanism), "parameters_stated", (narrow, *mechanism.parameters_stated[1:]))
     left_out = [name for name in CATALOGUE if name not in ("amplifier_high_pass", "timing_delay")]
     report = underskin.diagnose(shaken(charge=high_pass(150.0)), table, without=left_out)
     assert report.verdict != "explained"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, freqs
 
 from proof.cases import DrawnCase
 from rig.description import parse as experiment
@@ -15,7 +16,7 @@ from rig.wide_tails import WIDE
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside, lean_report, whole_report
-from underskin.recordings.campaign import Tolerances, parse
+from underskin.recordings.campaign import FrfRecording, Tolerances, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 pytestmark = pytest.mark.slow
@@ -173,3 +174,27 @@ def test_law_declared_facts_say_stands_among(table: SigmaTable) -> None:
     assert little["effect_percent"] < 1 < much["effect_percent"]
     assert 0.3 < little["probability"] < 0.7
     assert much["probability"] < 0.05  # the campaign is made by the base model, whose contact is a half space's
+
+
+@pytest.mark.parametrize("poles", [1, 2])
+def test_a_chain_of_two_poles_is_explained(poles: int, table: SigmaTable) -> None:
+    """Behind a Butterworth high-pass of one or two poles d33 is quoted, and its interval holds the true one."""
+    made = campaign(Made(sensors=2, repeats=1), table)
+    filters = butter(poles, 2 * np.pi * 4.0, "high", analog=True)
+    recordings = []
+    for recording in made.of(FrfRecording):
+        assert recording.frequency_hz is not None
+        assert recording.frf_re_pc_per_n is not None
+        assert recording.frf_im_pc_per_n is not None
+        _, response = freqs(*filters, 2 * np.pi * np.asarray(recording.frequency_hz))
+        value = response * (np.asarray(recording.frf_re_pc_per_n) + 1j * np.asarray(recording.frf_im_pc_per_n))
+        recordings.append(replace(recording, frf_re_pc_per_n=value.real, frf_im_pc_per_n=value.imag))
+    known = beside("amplifier_high_pass", "sensor_relaxation", "contact_resonance", "timing_delay")
+    report = lean_report(replace(made, recordings=tuple(recordings)), table, *known)
+    (mechanism,) = report["mechanisms"]
+    values = {entry["name"]: entry for entry in mechanism["parameters"]}
+    assert mechanism["name"] == "amplifier_high_pass"
+    assert values["corner"]["value"] == pytest.approx(4.0, rel=0.02)
+    assert values["high_pass_order"]["value"] == pytest.approx(poles, abs=0.1)
+    assert report["d33"]["quotable"]
+    assert report["d33"]["low"] < Made().d33_pc_per_n < report["d33"]["high"]

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 CASES: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
     ((), ()),
     (("moving_contact_edge",), (0.7,)),
-    (("amplifier_high_pass",), (0.5,)),
+    (("amplifier_high_pass",), (0.5, 1.0)),
     (("moving_contact_edge",), (0.05,)),
     (("layered_contact",), ()),
     (("adhesion",), (0.5,)),
@@ -50,7 +50,7 @@ LIKELIHOODS: list[tuple[Made, bool]] = [
     (Made(lines=4, offsets_mm=(0.0, 1.3), preloads_n=(0.5, 2.0)), True),
     (
         Made(
-            ("amplifier_high_pass", "mains_pickup"), (0.5, 0.05, 2.0, 1.0), lines=5, preloads_n=(0.5,),
+            ("amplifier_high_pass", "mains_pickup"), (0.5, 1.0, 0.05, 2.0, 1.0), lines=5, preloads_n=(0.5,),
             offsets_mm=(0.7,), highest_hz=50.0,
         ),
         True,

@@ -245,13 +245,14 @@ def test_lines_of_uneven_power_are_no_mains(quiet: Campaign, table: SigmaTable) 
 
 
 def require_high_pass(campaign: Campaign, table: SigmaTable, within: float) -> dict[str, Any]:
-    """The report, which names a high pass of 1 Hz."""
+    """The report, which names a high pass of 1 Hz and one pole."""
     report = lean_report(campaign, table, *BESIDE_SERIES)
     assert report["verdict"] == "explained"
     (mechanism,) = report["mechanisms"]
-    (corner,) = mechanism["parameters"]
+    corner, order = mechanism["parameters"]
     assert mechanism["name"] == "amplifier_high_pass"
     assert corner["value"] == pytest.approx(1.0, rel=within)
+    assert order["low"] < 1.1
     return report
 
 

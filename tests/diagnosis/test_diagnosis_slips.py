@@ -39,7 +39,7 @@ def a_third(count: int, factor: float, seed: int = 8) -> Floats:
     return np.where(np.random.default_rng(seed).random(count) < 1 / 3, factor, 1.0)
 
 
-PHASES = [("contact_resonance", (30.0, 0.05)), ("timing_delay", (200.0,)), ("amplifier_high_pass", (1.0,))]
+PHASES = [("contact_resonance", (30.0, 0.05)), ("timing_delay", (200.0,)), ("amplifier_high_pass", (1.0, 1.0))]
 
 
 @pytest.mark.parametrize(("mechanism", "parameters"), first(1, PHASES))

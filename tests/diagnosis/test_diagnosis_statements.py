@@ -94,7 +94,7 @@ def test_what_keeps_an_axis_undecidable_is_named(table: SigmaTable) -> None:
 
 def test_mechanism_set_part_misfit(table: SigmaTable) -> None:
     """Each mechanism of a set has its own part of the misfit."""
-    made = Made(("ageing", "amplifier_high_pass"), (0.3, 300.0, 0.0, 0.3))
+    made = Made(("ageing", "amplifier_high_pass"), (0.3, 300.0, 0.0, 0.3, 1.0))
     report = lean_report(campaign(made, table), table, *beside(*made.mechanisms, "timing_delay", "thickness_error"))
     parts = {entry["name"]: entry["explains_percent"] for entry in report["mechanisms"]}
     assert set(parts) == set(made.mechanisms)

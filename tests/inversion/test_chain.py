@@ -1,5 +1,6 @@
 """d33 of time series through chains with delays, filters and noise in the force."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import broadband
 from underskin.recordings.frf.line_choice import without_noise_bias
 from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Floats
 
 pytestmark = pytest.mark.slow
 
@@ -143,6 +145,32 @@ def test_shaken_charge_clipped_before_noise_is_refused(rail: float, table: Sigma
         recordings.append(replace(recording, charge_pc=behind))
     with pytest.raises(NoD33, match="overload"):
         invert(replace(campaign, recordings=tuple(recordings)), table)
+
+
+@pytest.mark.parametrize(
+    "limited",
+    [lambda q: np.clip(q, -0.9, 0.9), lambda q: np.minimum(q, 0.7), lambda q: 1.2 * np.tanh(q / 1.2)],
+    ids=["hard", "one-sided", "soft"],
+)
+def test_shaken_charge_limited_behind_much_noise_is_refused(
+    limited: Callable[[Floats], Floats], table: SigmaTable
+) -> None:
+    """A third of the samples at a limit, behind noise of 9 %, gives no d33; the same noise alone does."""
+    random, campaign = np.random.default_rng(4), shaken(charge_noise=0.0)
+
+    def of(limiter: Callable[[Floats], Floats]) -> Campaign:
+        recordings = []
+        for recording in campaign.of(FrfRecording):
+            charge = np.asarray(recording.charge_pc, dtype=np.float64)
+            rms = charge.std()
+            behind = rms * (limiter(charge / rms) + 0.09 * random.standard_normal(len(charge)))
+            recordings.append(replace(recording, charge_pc=behind))
+        return replace(campaign, recordings=tuple(recordings))
+
+    _, low, high = array_d33(invert(of(lambda charge: charge), table))
+    assert low < D33 < high
+    with pytest.raises(NoD33, match="as behind a limit: overload"):
+        invert(of(limited), table)
 
 
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.08, 0.01), (0.0, 0.2)])

@@ -15,6 +15,7 @@ from underskin.findings.finding import Finding, ImplausibleD33
 from underskin.inversion.invert import Inversion, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Complexes, Floats
 
 
 @pytest.fixture(scope="module")
@@ -303,3 +304,60 @@ def test_exchanged_channels_force_charge_give(table: SigmaTable) -> None:
     assert meant.recordings.ids == ("right", "exchanged")
     (looked_at,) = meant.findings
     assert looked_at.sentence.endswith("force and charge look exchanged.")
+
+
+def at_temperatures(campaign: Campaign, celsius: Floats, per_kelvin: float) -> Campaign:
+    """The campaign at a noted temperature for each FRF recording, which d33 follows about their mean."""
+    factors = 1 + per_kelvin * (celsius - celsius.mean())
+    changed = [
+        replace(times(recording, factor), conditions={"temperature_c": temperature})
+        for recording, factor, temperature in zip(
+            campaign.of(FrfRecording), factors.tolist(), celsius.tolist(), strict=True
+        )
+    ]
+    return replace(campaign, recordings=tuple(changed))
+
+
+def times(recording: FrfRecording, factor: complex | Complexes) -> FrfRecording:
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    value = factor * (np.asarray(recording.frf_re_pc_per_n) + 1j * np.asarray(recording.frf_im_pc_per_n))
+    return replace(recording, frf_re_pc_per_n=value.real, frf_im_pc_per_n=value.imag)
+
+
+@pytest.mark.parametrize("corner_of_band", [0.02, 0.1])
+def test_a_filter_of_one_sensor_is_named_and_kept_from_the_array(corner_of_band: float, table: SigmaTable) -> None:
+    """A sensor behind a high-pass of its own is no noisy one: it is named with its loss, and the array's d33 does
+    without it."""
+    campaign = simulate(table, Rig(d33=np.full(4, 14.0)), np.random.default_rng(6))
+    frequency = np.asarray(campaign.of(FrfRecording)[0].frequency_hz)
+    ratio = corner_of_band * frequency.max() / frequency
+    changed = [times(item, 1 / (1 - 1j * ratio)) if item.sensor == "s2" else item for item in campaign.of(FrfRecording)]
+    found = invert(replace(campaign, recordings=tuple(changed)), table)
+    assert codes(found) == {"s2": ["behind_filter"]}
+    assert "not to be quoted" in found.flags[0].reason
+    assert any("s2" in left.sentence for left in found.left_out)
+    assert found.campaign_d33 is not None
+    assert covered(found.campaign_d33, np.array(14.0))
+    assert found.flags[0].arguments["high_pass_hz"] == pytest.approx(corner_of_band * frequency.max(), rel=0.1)
+
+
+@pytest.mark.parametrize("per_kelvin", [0.0, 0.008])
+def test_a_temperature_that_rises_from_sensor_to_sensor(per_kelvin: float, table: SigmaTable) -> None:
+    """Sensors that are alike are covered, however d33 follows the temperature that rises while they are measured in
+    turn; a temperature that is the same for all sensors says nothing."""
+    outside = said = 0
+    for seed in range(4):
+        random = np.random.default_rng([seed, 7])
+        campaign = simulate(table, Rig(d33=np.full(4, 14.0), gain=0.005), random)
+        count = len(campaign.recordings)
+        warm = 20 + 7 * np.arange(count) / count + 0.3 * random.standard_normal(count)
+        found = invert(at_temperatures(campaign, warm, per_kelvin), table)
+        fields = [finding.field for finding in found.findings if finding.code == FindingCode.CONDITION_DIFFERS]
+        assert fields in ([], ["conditions.temperature_c"])
+        said += len(fields)
+        outside += int((covered(found.sensors, np.array(14.0)) == 0).sum())
+        same = invert(at_temperatures(campaign, 23 + 0.1 * random.standard_normal(count), per_kelvin), table)
+        assert FindingCode.CONDITION_DIFFERS not in {finding.code for finding in same.findings}
+    assert outside <= 2
+    assert said >= 2 or not per_kelvin

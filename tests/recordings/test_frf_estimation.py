@@ -14,7 +14,8 @@ from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import broadband, estimate, lines_of, periodic, resonance, stepped_sine
 from underskin.recordings.frf.estimators import Estimator
-from underskin.recordings.frf.spectra import Frf, find_steps, period_of
+from underskin.recordings.frf.spectra import Frf, period_of
+from underskin.recordings.frf.stepped_sine import find_steps
 from underskin.units import Floats
 
 

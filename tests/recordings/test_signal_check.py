@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.recordings.known_signals import RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
+from underskin.errors import InvalidInput
 from underskin.recordings.frf.estimation import broadband, stepped_sine
 from underskin.recordings.frf.spectra import Frf, defects, defects_of_pair
 from underskin.units import Floats
@@ -171,11 +172,12 @@ def test_clipped_before_noise_was_added(kind: str) -> None:
         random = np.random.default_rng(seed)
         force, gain = _whole(kind, random, 8192), 7.4
         noise = random.normal(0.0, 10 ** random.uniform(-3.0, -1.5), (2, len(force)))
-        assert [d for d in defects_of_pair(force + noise[0], gain * (force + noise[1])) if d.kind == "overload"] == []
+        whole = defects_of_pair(force + noise[0], gain * (force + noise[1]))
+        assert {defect.kind for defect in whole} <= {"held_samples", "jump"}
         rail = 0.6 * np.abs(force).max()
         clipped = np.clip(force, -rail, rail) + 0.005 * rail * random.standard_normal(len(force))
         for channel, pair in (("force_n", (clipped, gain * force)), ("charge_pc", (force, gain * clipped))):
-            found = {d.channel for d in defects_of_pair(*pair) if d.kind == "overload"}
+            found = {d.channel for d in defects_of_pair(*pair) if d.kind in ("overload", "limited")}
             assert found <= {channel}
             clipped_pairs += 1
             seen += bool(found)
@@ -199,3 +201,30 @@ def test_a_drive_of_limited_peaks_is_whole(limit: float, beyond: str) -> None:
     noise = 0.005 * random.standard_normal((2, len(drive)))
     charge = 7.4 * np.fft.irfft(np.fft.rfft(drive) * passed, len(drive))
     assert defects_of_pair(drive + noise[0], charge + noise[1]) == []
+
+
+def test_limited_tones_are_refused_with_the_reason() -> None:
+    random, force = np.random.default_rng(1), dwelling([10.0, 20.0, 30.0], cycles=100)
+    force += 1e-3 * random.standard_normal(len(force))
+    charge = answer_to(force) + 1e-14 * random.standard_normal(len(force))
+    assert len(stepped_sine(force, charge, RATE).frequency) == 3
+    charge -= charge.mean()
+    with pytest.raises(InvalidInput, match="as behind a limit: overload"):
+        stepped_sine(force, charge.std() * np.tanh(charge / charge.std()), RATE)
+
+
+@pytest.mark.parametrize("power", [0.9, 1.1])
+@pytest.mark.parametrize("kind", ["sine", "noise", "tones"])
+def test_skin_and_noise_limit_no_charge(kind: str, power: float) -> None:
+    """A charge that goes as such a power of a force of 0.3 rms of its preload is whole behind noise of up to 9 %; one
+    limited softly, hard or on one side behind the same noise is not."""
+    for seed in range(6):
+        random = np.random.default_rng([seed, len(kind)])
+        turns = 2 * np.pi * np.outer(random.uniform(0.002, 0.05, 7), np.arange(8192)) + random.uniform(0, 6, (7, 1))
+        force = np.sin(turns).sum(axis=0) if kind == "tones" else _whole(kind, random, 8192)
+        force /= force.std()
+        noise = 0.09 * random.standard_normal(len(force))
+        with_preload = np.maximum(1 + 0.3 * force, 0.0)
+        assert defects_of_pair(with_preload, with_preload**power + 0.3 * noise) == []
+        for charge in (1.2 * np.tanh(force / 1.2), np.clip(force, -0.8, 0.8), np.minimum(force, 0.7)):
+            assert {d.kind for d in defects_of_pair(with_preload, charge + noise)} & {"limited", "overload"}

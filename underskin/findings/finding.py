@@ -72,6 +72,7 @@ class DefectKind(StrEnum):
     """What a run of damaged samples does."""
 
     OVERLOAD = "overload"
+    LIMITED = "limited"
     HELD_SAMPLES = "held_samples"
     JUMP = "jump"
 
@@ -80,6 +81,7 @@ class DefectKind(StrEnum):
         """What the samples do."""
         return {
             DefectKind.OVERLOAD: "stay at the end of the range: overload",
+            DefectKind.LIMITED: "follow the force less the further they go, as behind a limit: overload",
             DefectKind.HELD_SAMPLES: "repeat one value: samples were dropped and the last one held",
             DefectKind.JUMP: "break the signal's course: samples were dropped, or a spike",
         }[self]
@@ -224,14 +226,26 @@ def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
     )
 
 
-def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
-    """A band behind filters."""
+def _filters(high_pass_hz: float, low_pass_hz: float) -> str:
     filters = [f"a high-pass of about {in_digits(high_pass_hz, 2)} Hz"] if high_pass_hz > 0 else []
     filters += [f"a low-pass of about {in_digits(low_pass_hz, 2)} Hz"] if low_pass_hz < float("inf") else []
+    return " and ".join(filters)
+
+
+def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
+    """A band behind filters."""
     return (
-        f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind {' and '.join(filters)}, and does not "
-        f"reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a diagnosis "
-        "takes the filter into account, or record a band further off its corner"
+        f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind {_filters(high_pass_hz, low_pass_hz)}, and "
+        f"does not reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a "
+        "diagnosis takes the filter into account, or record a band further off its corner"
+    )
+
+
+def sensor_behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float) -> str:
+    """A sensor behind filters that the others are not behind."""
+    return (
+        f"behind {_filters(high_pass_hz, low_pass_hz)} that the others are not behind: its d33 is too small by about "
+        f"{in_digits(percent, 2)} %, and not to be quoted"
     )
 
 
@@ -577,6 +591,10 @@ ENGLISH: Mapping[Reason, Words] = {
     "and d33 holds only if there is none; record at other frequencies",
     Reason.NOISE_IN_FRF: noise_in_frf,
     Reason.BEHIND_FILTER: behind_filter,
+    Reason.SENSOR_BEHIND_FILTER: sensor_behind_filter,
+    Reason.CONDITION_DIFFERS: "{name} differs between the sensors, {low:.4g} to {high:.4g}, and by the recordings of "
+    "each sensor it changes d33 by {percent:+.2g} ± {unsure:.2g} % per unit: the d33 of sensors are stated at its "
+    "mean, {mean:.4g}, which leaves them unsure by up to {left_percent:.2g} %; measure all sensors under one condition",
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: parameter_at_bound,

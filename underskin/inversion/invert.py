@@ -10,7 +10,7 @@ radius and modulus; `absolute_d33` includes it.
 Recordings far off the others of their sensor (a slip of units, a wrong range) are left out, since the mixed model
 assumes log-normal recordings about their sensor's d33. What a skin may show is no outlier: an effect of a condition on
 all sensors, the scatter of the array, and the effect of a misplaced sphere. Sensors that stand out of the array (dead,
-inverted, weak, strong, noisy or bent) are flagged with the reason. Findings are used all the same.
+inverted, weak, strong, behind a filter, noisy or bent) are flagged with the reason. Findings are used all the same.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,6 +26,7 @@ from underskin.findings.finding import Finding, statement
 from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
 from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
+from underskin.inversion.noted_conditions import NotedConditions, noted_conditions
 from underskin.physics.charge_response import Indenter, gain
 from underskin.prediction import pressed_skin
 from underskin.prediction.answers import OTHER, STATED
@@ -50,7 +51,7 @@ from underskin.recordings.frf.flat_zone import (
     without_chain_phase,
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
-from underskin.recordings.frf.spectra import Frf, left_out_of, mean_of, stacked
+from underskin.recordings.frf.spectra import Frf, Stack, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
@@ -77,7 +78,7 @@ class Flag:
 
     @property
     def code(self) -> str:
-        """dead, inverted, weak, strong, noisy or bent."""
+        """dead, inverted, weak, strong, behind_filter, noisy or bent."""
         return str(self.flagged_for.code)
 
     @property
@@ -302,6 +303,26 @@ def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
     return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
 
 
+def _own_filters(
+    ids: Sequence[str], sensor: Indices, stacks: Sequence[Stack], zone: FlatZone, level: Floats, scatter: Floats
+) -> dict[int, Flag]:
+    """By its number, each sensor of several whose lines scatter more than those of the others because they lie behind
+    a filter of its own.
+
+    `level` [C/N] and `scatter`, relative, of each recording (recordings,) are those of the zone.
+    """
+    of_sensors = [np.abs(level * scatter)[sensor == index] for index in range(len(ids))]
+    of_line = np.array([np.median(lines) for lines in of_sensors])
+    usual = float(np.sort(of_line)[(len(ids) - 1) // 2])
+    flags = {}
+    for index in np.flatnonzero(of_line > _NOISY * usual).tolist():
+        behind = roll_off([stack.of(sensor[stack.rows] == index) for stack in stacks], zone, level)
+        if behind is not None:
+            corners = {"high_pass_hz": behind.filters.high_hz, "low_pass_hz": behind.filters.low_hz}
+            flags[index] = Flag(ids[index], Reason.SENSOR_BEHIND_FILTER, {**corners, "percent": 100 * behind.share})
+    return flags
+
+
 def _preload_contradiction(recording: FrfRecording) -> Finding | None:
     """The finding on a recording whose force has a mean that contradicts the preload."""
     mean = None if recording.force_n is None else mean_of(recording.force_n)
@@ -361,8 +382,8 @@ class Cells:
 @dataclass(frozen=True)
 class Inversion:
     """The array's d33. `campaign_d33` (its interval is relative), `spread` (relative, over sensors), `gain` and
-    `position` [m] come from the sensors that are neither dead, inverted nor weak; None where there is no such
-    sensor."""
+    `position` [m] come from the sensors that are neither dead, inverted, weak, strong nor behind a filter of
+    their own; None where there is no such sensor."""
 
     sensor_ids: tuple[str, ...]
     recordings: RecordingD33
@@ -467,10 +488,13 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         inside=inside,
     )
     common_uncertainty = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
-    inversion = _estimated(ids, rows, contact, zone).wider(common_uncertainty)
-    filtered = of_roll_off(roll_off(frfs, zone, level), zone)
+    behind = roll_off(frfs, zone, level)
+    own_filters = {} if behind else _own_filters(ids, sensor, frfs, zone, level, scatter)
+    noted = noted_conditions(recorded)
+    inversion = _estimated(ids, rows, contact, zone, own_filters, noted).wider(common_uncertainty)
+    filtered = of_roll_off(behind, zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33, units_checked=campaign.units_checked)
-    findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *others)
+    findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *inversion.findings, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
@@ -560,7 +584,14 @@ class _Contact:
         self.declared_percent = np.linalg.norm(changes, axis=0)
 
 
-def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
+def _estimated(
+    ids: tuple[str, ...],
+    rows: RecordingD33,
+    contact: _Contact,
+    zone: FlatZone,
+    filtered: Mapping[int, Flag],
+    noted: NotedConditions,
+) -> Inversion:
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
     outliers = _outliers(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
@@ -571,9 +602,12 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
     good = np.setdiff1d(np.flatnonzero(rows.inside), outliers)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
     unfit, pilot = population_flags(ids, sensor, d33, noise)
+    beyond_filter = [index for index, flag in unfit.items() if flag.flagged_for != Reason.WEAK]
+    unfit |= {index: flag for index, flag in filtered.items() if index not in beyond_filter}
     mean, variance = mean[:, good], variance[:, good]
-    measured = LevelRows(d33, noise, pilot[sensor], mean, variance)
     plain = np.array([index not in unfit for index in sensor])
+    effects = noted.fitted(good[plain], sensor[plain], rows.condition[good[plain]], d33[plain])
+    measured = LevelRows(d33 / effects.gain(good), noise, pilot[sensor], mean, variance)
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]
@@ -589,9 +623,9 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         recordings=rows,
         cells=Cells(
             rows.sensor[where], rows.indenter_radius[where], rows.preload[where], count,
-            scatter.d33(measured, cell, len(where)),
+            scatter.d33(measured, cell, len(where)).wider(effects.unsure(good, cell, len(where))),
         ),
-        sensors=scatter.d33(measured, sensor, len(ids)),
+        sensors=scatter.d33(measured, sensor, len(ids)).wider(effects.unsure(good, sensor, len(ids))),
         flags=tuple(flags),
         zone=zone,
         campaign_d33=model.mean if model else None,
@@ -599,7 +633,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         gain=model.gain if model else None,
         position=model.position if model else None,
         left_out=(*far_off, *unfit.values()),
-        findings=(),
+        findings=tuple(effects.findings(good, sensor, len(ids))),
         declared_percent=float(np.nanmedian(contact.declared_percent[good])),
     )  # fmt: skip
 

@@ -47,8 +47,8 @@ class Estimate:
     low: Floats
     high: Floats
 
-    def wider(self, relative: float) -> "Estimate":
-        """The estimate with a further standard uncertainty, relative to the value."""
+    def wider(self, relative: float | Floats) -> "Estimate":
+        """The estimate with a further standard uncertainty, relative to the value, or to each."""
         further = relative * np.abs(self.value)
         low, high = (np.hypot(side, SDS_OF_95 * further) for side in (self.value - self.low, self.high - self.value))
         return Estimate(self.value, np.hypot(self.uncertainty, further), self.value - low, self.value + high)

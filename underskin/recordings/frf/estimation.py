@@ -33,13 +33,12 @@ from underskin.recordings.frf.spectra import (
     averaged,
     damaged,
     defects_of_pair,
-    find_steps,
+    none_undamaged,
     period_of,
-    settled,
-    step_amplitudes,
     without_drift,
     without_line,
 )
+from underskin.recordings.frf.stepped_sine import find_steps, settled, step_amplitudes
 from underskin.units import Complexes, Floats, Mask, to_si
 
 _LARGEST = 0.25  # largest lag, of a record
@@ -351,7 +350,10 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     defects = [
         defect
         for defect in defects_of_pair(force, charge)
-        if any(settled(step, sample_rate) <= defect.first_sample < step.last - 1 for step in steps)
+        if any(
+            defect.first_sample < step.last - 1 and defect.first_sample + defect.samples > settled(step, sample_rate)
+            for step in steps
+        )
     ]  # between the steps a jump is the step itself
     bad = damaged(defects, len(force))
     lines: dict[float, list[tuple[Complexes, Complexes]]] = {}
@@ -359,6 +361,8 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         pair = step_amplitudes(force, charge, sample_rate, step, bad)
         if len(pair[0]):
             lines.setdefault(_same_line(step.frequency, lines), []).append(pair)
+    if not lines and defects:
+        raise none_undamaged(defects)
     if not lines:
         raise unusable("force_n", f"{len(defects)} defects", "must dwell on a tone for some undamaged cycles")
     frequency = np.array(sorted(lines))

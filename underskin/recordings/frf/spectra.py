@@ -1,4 +1,4 @@
-"""Spectra of time series of force and charge: periods, defects, block averages, stepped sine, and FRFs on common grids.
+"""Spectra of time series of force and charge: periods, defects, block averages, and FRFs on common grids.
 
 Periodic forces (a repeated sweep, burst or noise of period T) and their charge have lines at the multiples of 1/T only.
 Hann's window over two periods is exact there: it mixes a line with those half a line away, which are empty (Pintelon
@@ -6,22 +6,20 @@ and Schoukens, System Identification, 2012, chapter 2). A straight-line fit woul
 the lowest lines; the difference of the means of two periods is drift alone.
 
 Blocks with a defect (overload, held samples, jumps) are left out of the average.
-
-A step of a stepped sine is a run of cycles of one period between rising crossings of the middle; its frequency is
-refined by the advance of the phase over the step. Amplitude X means x = Re(X e^(iωt)).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
+from scipy.special import stdtr
 
-from underskin.errors import unusable
+from underskin.errors import InvalidInput, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import DefectKind, Finding
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
@@ -115,11 +113,15 @@ def mean_of(force: Floats) -> float | None:
 
 
 def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
-    """Every defect of force and charge: those of each by itself that are not physical, and clipping that shows beside
-    the other channel alone."""
+    """Every defect of force and charge: those of each by itself that are not physical, and limits that show beside the
+    other channel alone: all samples of a limited charge, but of blows, which may be whole one by one, and otherwise the
+    clipped samples of either."""
     if not len(force):
         return []
     every = _unphysical(force, charge)
+    clear = all(defect.kind != DefectKind.OVERLOAD for defect in every)
+    if clear and _kurtosis(force) <= _BLOW and _is_limited(force, charge):
+        return [*every, Defect(DefectKind.LIMITED, "charge_pc", len(charge), 0)]
     for channel, signal, other in (("force_n", force, charge), ("charge_pc", charge, force)):
         known = [defect for defect in every if defect.channel == channel]
         if all(defect.kind != DefectKind.OVERLOAD for defect in known):
@@ -291,16 +293,126 @@ def _rms(values: Floats) -> float:
 
 def _linear_response(cause: Floats, effect: Floats) -> Floats:
     """The part of an effect (samples,) that follows its cause linearly, by their spectra averaged over blocks."""
-    from scipy.signal import fftconvolve  # takes 0.3 s to load, which few need
+    return _LinearResponses(cause, max(len(cause) // _PARTS, 2)).of(effect)
 
-    size = max(len(cause) // _PARTS, 2)
-    blocks = Blocks(np.hanning(size), max(size // 2, 1), slice(None), without_line)
-    cause_spectra, effect_spectra = blocks.spectra(cause), blocks.spectra(effect)
-    power = np.mean(np.abs(cause_spectra) ** 2, axis=0)
-    cross = np.mean(np.conj(cause_spectra) * effect_spectra, axis=0)
-    transfer = cross / np.maximum(power + _WEAKEST * power.max(), _TINY)
-    impulse = np.fft.fftshift(np.fft.irfft(transfer, size))
-    return np.asarray(fftconvolve(cause, impulse)[size // 2 : size // 2 + len(cause)])
+
+class _LinearResponses:
+    """Linear responses to a cause (samples,), by spectra averaged over blocks as long as an impulse response.
+
+    `period` makes blocks of two periods, whose even lines are exact, and a response as long as one; otherwise a block
+    has `size` samples.
+    """
+
+    def __init__(self, cause: Floats, size: int, period: int = 0) -> None:
+        self.cause, self.size = cause, period or size
+        if period:
+            self._blocks = Blocks(np.hanning(2 * period + 1)[:-1], period, slice(0, period + 1, 2), without_drift)
+        else:
+            self._blocks = Blocks(np.hanning(size), max(size // 2, 1), slice(None), without_line)
+        self._spectra = self._blocks.spectra(cause)
+        self.power = np.mean(np.abs(self._spectra) ** 2, axis=0)
+
+    def _transfer(self, spectra: Complexes) -> Complexes:
+        cross = np.mean(np.conj(self._spectra) * spectra, axis=0)
+        return np.asarray(cross / np.maximum(self.power + _WEAKEST * self.power.max(), _TINY))
+
+    def of(self, effect: Floats) -> Floats:
+        """The part of the effect that follows (samples,)."""
+        from scipy.signal import fftconvolve  # takes 0.3 s to load, which few need
+
+        impulse = np.fft.fftshift(np.fft.irfft(self._transfer(self._blocks.spectra(effect)), self.size))
+        return np.asarray(fftconvolve(self.cause, impulse)[self.size // 2 : self.size // 2 + len(self.cause)])
+
+    def noise(self, effect: Floats) -> float:
+        """The share of the effect's power that does not follow, at the lines of what does."""
+        spectra = self._blocks.spectra(effect)
+        transfer = self._transfer(spectra)
+        rest = np.mean(np.abs(spectra - transfer * self._spectra) ** 2, axis=0)
+        response = np.abs(transfer) ** 2 * self.power
+        return float((rest / np.maximum(rest + response, _TINY)) @ response / max(float(response.sum()), _TINY))
+
+
+_FALLS_BEHIND = 0.02  # a charge as a power of 1 to 2 of the force loses 1/8 (rms/preload)²: 2 % at an rms of 0.4
+_LIMITED_BY_CHANCE = 1e-6
+_PIECES = 32  # of a record, whose scatter tells the uncertainty: longer than noise stays alike, and enough of them
+_DETERMINED = 0.5  # least share of the cube that a periodic force's lines leave: those of few tones leave 0.8
+
+
+@dataclass(frozen=True)
+class _Cubic:
+    """How much more an effect follows its cause at small amplitudes than on average (`loss`, relative), the `chance`
+    of a cubic coefficient as low by noise, and how much of the cube is `left` by the linear response."""
+
+    loss: float
+    chance: float
+    left: float
+
+    @property
+    def falls_behind(self) -> bool:
+        """Whether the effect follows less at large amplitudes."""
+        return self.loss > _FALLS_BEHIND and self.chance < _LIMITED_BY_CHANCE
+
+    @property
+    def runs_ahead(self) -> bool:
+        """Whether it follows more."""
+        return self.loss < 0 and 1 - self.chance < _LIMITED_BY_CHANCE
+
+
+def _is_limited(force: Floats, charge: Floats) -> bool:
+    """Whether the charge follows the force less at large amplitudes, as behind a limiter with whatever noise.
+
+    The charge less its linear response to the force is regressed on the cube of that response, less the cube's own
+    linear response, beside the same of its square (Bendat, Nonlinear System Techniques and Applications, 1998): for a
+    linear chain the coefficient is 0 by any noise of the charge. Unless the force consists of a few tones a limited
+    charge has the force run ahead of it, too; noise of the force, or a ringing longer than a block, has not. Where the
+    lines of a periodic force leave little of the cube, that must be beyond chance as well.
+    """
+    if len(force) < _PIECES * _FEWEST_PILED_UP:
+        return False
+    period = period_of(force)
+    cubic = _cubic(force, charge, period)
+    if period and cubic.left >= _DETERMINED:
+        return cubic.falls_behind
+    if period:
+        cubic = _cubic(force, charge, 0)
+    if not cubic.falls_behind:
+        return False
+    other = _cubic(charge, force, 0)
+    return other.runs_ahead if period else other.loss < 0
+
+
+def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
+    """The part of an effect that follows the cube of its linear response x of unit power, c₃x³: a loss of −c₃⟨x⁴⟩.
+
+    Noise of the cause, a share α of the response's power, adds α (3 − ⟨x⁴⟩)⟨x⁴⟩/⟨h²⟩ at most, where h is what the
+    linear response leaves of the cube, and is taken off.
+    """
+    cause, effect = cause - cause.mean(), effect - effect.mean()
+    responses = _LinearResponses(cause, len(cause) // _PARTS, period)
+    middle = slice(responses.size // 2, len(cause) - responses.size // 2)  # where all of the impulse response is in
+    response = responses.of(effect)
+    rms = _rms(response[middle])
+    if not rms > 0:
+        return _Cubic(0.0, 0.5, 0.0)
+    x, rest = response / rms, (effect - response)[middle] / rms
+    powers = np.array([(power - responses.of(power - power.mean()))[middle] for power in (x**2, x**3)])
+    powers -= powers.mean(axis=1, keepdims=True)
+    x = x[middle]
+    samples = len(x) // _PIECES * _PIECES
+    pieces = powers[:, :samples].reshape(2, _PIECES, -1)
+    products = np.einsum("ipt,jpt->pij", pieces, pieces)
+    along = np.einsum("ipt,pt->pi", pieces, (rest - rest.mean())[:samples].reshape(_PIECES, -1))
+    inverse = np.linalg.pinv(products.sum(axis=0))
+    coefficients = inverse @ along.sum(axis=0)
+    scatter = along - products @ coefficients
+    variance = (inverse @ (scatter.T @ scatter) @ inverse)[1, 1] * _PIECES / (_PIECES - 1)
+    share = products[:, 1, 1] / max(float(products[:, 1, 1].sum()), _TINY)
+    fourth, cube = float(np.mean(x**4)), float(np.mean(powers[1] ** 2))
+    freedom = max(1 / max(float(share @ share), _TINY) - 1, 1.0)
+    chance = stdtr(freedom, coefficients[1] / max(float(np.sqrt(variance)), _TINY))
+    by_noise = responses.noise(effect) * max(3 - fourth, 0.0) * fourth / max(cube, _TINY)
+    left = cube / max(float(np.mean(x**6)) - fourth**2, _TINY)
+    return _Cubic(float(-coefficients[1] * fourth - by_noise), float(chance), left)
 
 
 def _held(signal: Floats) -> Mask:
@@ -414,15 +526,20 @@ class Frf:
         return np.sqrt((1 - self.coherence) / (2 * self.averages * np.maximum(self.coherence, 1e-12)))
 
 
+def none_undamaged(every: Sequence[Defect]) -> InvalidInput:
+    """The error where defects leave no block of a recording, by the first."""
+    first, count = every[0], len(every)
+    words = Finding(Reason.DEFECT, arguments=vars(first)).statement
+    return unusable(first.channel, f"{count} defect{'s' * (count > 1)}", f"no undamaged block: {words}")
+
+
 def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, estimator: Estimator) -> Frf:
     """The average over the undamaged blocks of force [N] and charge [C], sampled at `sample_rate` [Hz]."""
     defects = defects_of_pair(force, charge)
     undamaged = ~blocks.of(damaged(defects, len(force))).any(axis=1)
     count = int(undamaged.sum())
     if not count:
-        first = defects[0]
-        words = Finding(Reason.DEFECT, arguments=vars(first)).statement
-        raise unusable(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
+        raise none_undamaged(defects)
     force_spectra, charge_spectra = (blocks.spectra(signal)[undamaged] for signal in (force, charge))
     frequency: Floats = sample_rate * np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)
@@ -461,172 +578,6 @@ def _independent_blocks(count: int, taper: Floats, step: int) -> float:
     return count / (1 + excess)
 
 
-_SAME_PERIOD = 0.05
-_DRIFT = 0.025  # of the period, from a run's first half to its second: a sweep's runs drift by about 0.05
-_FEWEST_CYCLES = 4
-_FINE = 8  # samples a cycle
-_COVERED = 0.7  # least share of the time that a stepped-sine force dwells on tones
-_BLOCK = 16  # least number of samples in the whole cycles of a block of the average
-_SETTLING = 0.1  # of a step, and at least one cycle: the transient after the step
-
-
-@dataclass(frozen=True)
-class Step:
-    """Samples `first` to `last` (excluded) of a tone of `frequency` [Hz]."""
-
-    first: int
-    last: int
-    frequency: float
-
-
-def find_steps(force: Floats, sample_rate: float) -> list[Step]:
-    """The dwells of a stepped-sine force.
-
-    Parameters
-    ----------
-    force : (samples,) array
-        [N].
-    sample_rate : float
-        [Hz].
-
-    Returns
-    -------
-    list of Step
-        In order of time; empty where the force does not dwell on tones for most of its time.
-    """
-    crossings = _rising_crossings(force)
-    if len(crossings) > 1 and np.median(np.diff(crossings)) < _FINE:  # too few samples a cycle to place a crossing
-        from scipy.signal import resample_poly  # takes 0.3 s to load, which few need
-
-        crossings = _rising_crossings(resample_poly(force - np.median(force), _FINE, 1)) / _FINE
-    if len(crossings) <= _FEWEST_CYCLES:
-        return []
-    steps = [
-        Step(int(np.ceil(start)), int(end), _refined(force, start, end, cycles) * sample_rate)
-        for start, end, cycles in _even_runs(crossings)
-    ]
-    return steps if sum(step.last - step.first for step in steps) >= _COVERED * len(force) else []
-
-
-def settled(step: Step, sample_rate: float) -> int:
-    """The sample from which the transient after the step has decayed."""
-    return step.first + int(np.ceil(max(sample_rate / step.frequency, _SETTLING * (step.last - step.first))))
-
-
-def step_amplitudes(
-    force: Floats, charge: Floats, sample_rate: float, step: Step, bad: Mask
-) -> tuple[Complexes, Complexes]:
-    """Complex amplitudes of force and charge in each settled, undamaged block of whole cycles.
-
-    Amplitude X of a signal x at the angular frequency ω of the step means x = Re(X e^(iωt)).
-
-    Parameters
-    ----------
-    force, charge : (samples,) arrays
-        [N], [C].
-    sample_rate : float
-        [Hz].
-    step : Step
-        The samples, and the frequency [Hz] that the force dwells on.
-    bad : (samples,) array of bool
-        Which samples are damaged.
-
-    Returns
-    -------
-    force, charge : (blocks,) complex arrays
-        [N], [C]; empty where no block has settled.
-    """
-    period = sample_rate / step.frequency
-    first = settled(step, sample_rate)
-    block = period * np.ceil(_BLOCK / period)
-    blocks = int((step.last - first) / block)
-    if blocks < 1:
-        return np.empty(0, complex), np.empty(0, complex)
-    edges = first + np.round(np.arange(blocks + 1) * block).astype(int)
-    undamaged = np.array([not bad[a:b].any() for a, b in pairwise(edges)])
-    time = np.arange(edges[0], edges[-1]) / sample_rate
-    good = ~bad[edges[0] : edges[-1]]
-    pair = []
-    for signal in (force, charge):
-        part = signal[edges[0] : edges[-1]]
-        level = _level_and_drift(part, time, step.frequency, good)
-        pair.append(_block_amplitudes(part - level, time, step.frequency, edges - edges[0])[undamaged])
-    return pair[0], pair[1]
-
-
-def _level_and_drift(signal: Floats, time: Floats, frequency: float, good: Mask) -> Floats:
-    """DC and drift of a tone: the straight line of a least-squares fit of line, cosine and sine."""
-    angle = 2 * np.pi * frequency * time
-    line = np.column_stack([np.ones_like(time), time - time.mean()])
-    basis = np.column_stack([line, np.cos(angle), np.sin(angle)])
-    if good.sum() < basis.shape[1]:
-        return np.zeros_like(signal)
-    coefficients = np.linalg.lstsq(basis[good], signal[good], rcond=None)[0]
-    return line @ coefficients[:2]
-
-
-def _block_amplitudes(signal: Floats, time: Floats, frequency: float, edges: NDArray[np.int_]) -> Complexes:
-    """Least squares on cosine and sine in each block."""
-    angle = 2 * np.pi * frequency * time
-    cosine, sine = np.cos(angle), np.sin(angle)
-    sums = [
-        np.add.reduceat(product, edges[:-1])
-        for product in (cosine * cosine, cosine * sine, sine * sine, cosine * signal, sine * signal)
-    ]
-    cc, cs, ss, cx, sx = sums
-    determinant = cc * ss - cs**2
-    return ((ss * cx - cs * sx) - 1j * (cc * sx - cs * cx)) / determinant
-
-
-def _rising_crossings(signal: Floats) -> Floats:
-    """Positions (fractional samples) where the signal rises through its median, with hysteresis against noise."""
-    middle = signal - np.median(signal)
-    threshold = 0.3 * np.quantile(np.abs(middle), 0.9)
-    state = np.where(middle > threshold, 1, np.where(middle < -threshold, -1, 0))
-    marks = np.flatnonzero(state)
-    rising = (state[marks[1:]] == 1) & (state[marks[:-1]] == -1)
-    before, rises = marks[:-1][rising], marks[1:][rising]
-    low, high = middle[before], middle[rises]
-    return before + (rises - before) * low / (low - high)
-
-
-def _even_runs(crossings: Floats) -> list[tuple[float, float, int]]:
-    """First and last crossing and number of cycles of each run of nearly equal periods."""
-    places = crossings.tolist()
-    runs, start = [], 0
-    for index in range(1, len(places)):
-        if index + 1 < len(places):
-            mean = (places[index] - places[start]) / (index - start)
-            if abs(places[index + 1] - places[index] - mean) < _SAME_PERIOD * mean:
-                continue
-        if index - start >= _FEWEST_CYCLES and not _drifts(places[start : index + 1]):
-            runs.append((places[start], places[index], index - start))
-        start = index
-    return runs
-
-
-def _drifts(crossings: list[float]) -> bool:
-    """Whether the period changes over a run, as in a sweep, which dwells on no tone."""
-    half = len(crossings) // 2
-    first, second = crossings[half] - crossings[0], crossings[-1] - crossings[-1 - half]
-    return abs(second - first) > _DRIFT * first
-
-
-def _refined(signal: Floats, start: float, end: float, cycles: int) -> float:
-    """Cycles per sample by the phase of the second half of a run relative to the first."""
-    frequency = cycles / (end - start)
-    samples = np.arange(int(np.ceil(start)), int(end))
-    size = int(cycles // 2 / frequency)
-    if size < _BLOCK:
-        return frequency
-    phases = []
-    for part in (samples[:size], samples[-size:]):
-        values = signal[part] - signal[part].mean()
-        phases.append(values @ (np.hanning(len(part)) * np.exp(-2j * np.pi * frequency * part)))
-    advance = np.angle(phases[1] / phases[0])
-    return float(frequency + advance / (2 * np.pi * (samples[-size] - samples[0])))
-
-
 AROUND = 11  # lines whose median γ² is the expected one of the middle line
 
 
@@ -645,6 +596,11 @@ class Stack:
         """The stack at some of the lines (lines,)."""
         columns = (self.values[:, lines], self.coherence[:, lines], self.used[:, lines])
         return Stack(self.rows, self.frequency[lines], *columns)
+
+    def of(self, chosen: Mask) -> "Stack":
+        """The stack of some of its recordings (rows,)."""
+        columns = (self.values[chosen], self.coherence[chosen], self.used[chosen])
+        return Stack(self.rows[chosen], self.frequency, *columns)
 
     @cached_property
     def weights(self) -> Floats:

@@ -1,0 +1,120 @@
+"""What the conditions that a lab notes, such as a temperature, do to the gain of the recordings of an array.
+
+A condition that changes while the sensors are measured in turn looks like a difference between them. Recording i of
+sensor s under the load c (indenter and preload) has
+    ln |d33_i| = a_s + q_c + Σ_k β_k x_ik + ε_i,    q_c ~ N(0, g0²), β_k ~ N(0, g0²), ε_i ~ N(0, g²)
+with flat a_s, the noted numbers x_k in units of their standard deviation over the campaign, and g by the residual:
+before any recording, a condition and what the model leaves of a load are expected to change the gain by as much as
+usually scatters it (g0, `mixed_model.USUAL_GAIN`). So β is told by the recordings of each sensor, and where the
+condition goes with the sensors alone, β keeps its prior, which the d33 of a sensor then is unsure by.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.inversion.mixed_model import USUAL_GAIN
+from underskin.prediction.answers import STATED
+from underskin.recordings.campaign import FrfRecording
+from underskin.units import Floats, Indices, Mask
+
+_PASSES = 3  # of residual and gain scatter, which settle at once
+
+
+@dataclass(frozen=True)
+class NotedConditions:
+    """The lab's numeric columns that vary: `names`, their `mean` and `deviation` (columns,), and the standardised
+    `values` (recordings, columns), 0 where a recording has none."""
+
+    names: tuple[str, ...]
+    mean: Floats
+    deviation: Floats
+    values: Floats
+
+    def fitted(self, rows: Indices, sensor: Indices, load: Indices, d33: Floats) -> "ConditionEffects":
+        """Their effects from the recordings `rows`, of which `sensor`, `load` (numbers) and `d33` are given (rows,)."""
+        noted = self.values[rows]
+        if not noted.size or len(np.unique(sensor)) < 2:
+            return ConditionEffects(self, np.zeros(len(self.names)), np.zeros((len(self.names), len(self.names))))
+        loads = (load[:, None] == np.unique(load)).astype(np.float64)
+        members = (sensor[:, None] == np.unique(sensor)).astype(np.float64)
+        share = members / members.sum(axis=0)
+        columns = np.column_stack([noted, loads])
+        columns -= members @ (share.T @ columns)
+        level = np.log(np.maximum(np.abs(d33), np.finfo(float).tiny))
+        level -= members @ (share.T @ level)
+        variance = USUAL_GAIN**2
+        for _ in range(_PASSES):
+            precision = columns.T @ columns / variance + np.eye(columns.shape[1]) / USUAL_GAIN**2
+            covariance = np.linalg.inv(precision)
+            effects = covariance @ (columns.T @ level) / variance
+            used = members.shape[1] + float(np.trace(covariance @ columns.T @ columns)) / variance
+            if len(level) - used < 1:
+                break
+            variance = max(float(np.sum((level - columns @ effects) ** 2)) / (len(level) - used), np.finfo(float).eps)
+        count = len(self.names)
+        return ConditionEffects(self, effects[:count], covariance[:count, :count])
+
+
+@dataclass(frozen=True)
+class ConditionEffects:
+    """The `effect` of each condition on ln d33 for its standard deviation (columns,), and the effects' covariance."""
+
+    conditions: NotedConditions
+    effect: Floats
+    covariance: Floats
+
+    def gain(self, rows: Indices) -> Floats:
+        """The factor on the d33 of these recordings over that at the conditions' means (rows,)."""
+        return np.asarray(np.exp(self.conditions.values[rows] @ self.effect))
+
+    def unsure(self, rows: Indices, group: Indices, count: int) -> Floats:
+        """The relative uncertainty of the d33 of each of `count` groups of these recordings by the effects (count,)."""
+        mean = self._means(rows, group, count)
+        return np.asarray(np.sqrt(np.einsum("gi,ij,gj->g", mean, self.covariance, mean)))
+
+    def _means(self, rows: Indices, group: Indices, count: int) -> Floats:
+        total = np.zeros((count, len(self.effect)))
+        np.add.at(total, group, self.conditions.values[rows])
+        return total / np.maximum(np.bincount(group, minlength=count), 1)[:, None]
+
+    def findings(self, rows: Indices, sensor: Indices, count: int) -> list[Finding]:
+        """A finding on each condition whose effect on the d33 of a sensor is 1 % or more, root mean square."""
+        means, every = self._means(rows, sensor, count), []
+        for index, name in enumerate(self.conditions.names):
+            largest = float(np.abs(means[:, index]).max())
+            unsure = float(np.sqrt(self.covariance[index, index]))
+            if largest * float(np.hypot(self.effect[index], unsure)) < STATED:
+                continue
+            deviation, centre = self.conditions.deviation[index], self.conditions.mean[index]
+            of_sensors = centre + deviation * means[np.unique(sensor), index]
+            arguments = {
+                "name": name, "low": float(of_sensors.min()), "high": float(of_sensors.max()), "mean": float(centre),
+                "percent": float(100 * self.effect[index] / deviation), "unsure": float(100 * unsure / deviation),
+                "left_percent": 100 * largest * unsure,
+            }  # fmt: skip
+            every.append(Finding(Reason.CONDITION_DIFFERS, "", f"conditions.{name}", arguments))
+        return every
+
+
+def noted_conditions(recorded: Sequence[FrfRecording]) -> NotedConditions:
+    """The numbers among the lab's own columns that are not the same in all recordings."""
+    every = [recording.conditions or {} for recording in recorded]
+    names = dict.fromkeys(name for noted in every for name, value in noted.items() if not isinstance(value, str))
+    columns = []
+    for name in names:
+        values = np.array([_number(noted.get(name)) for noted in every])
+        there: Mask = np.isfinite(values)
+        mean, deviation = float(values[there].mean()), float(values[there].std())
+        if deviation > 0:
+            columns.append((name, mean, deviation, np.where(there, (values - mean) / deviation, 0.0)))
+    kept, means, deviations, standard = zip(*columns, strict=True) if columns else ((), (), (), ())
+    values = np.column_stack(standard) if columns else np.zeros((len(recorded), 0))
+    return NotedConditions(kept, np.array(means), np.array(deviations), values)
+
+
+def _number(value: float | str | None) -> float:
+    return float(value) if isinstance(value, (int, float)) else float("nan")
