@@ -78,8 +78,14 @@ DECIBEL = "decibel"  # the dimension of a logarithm, which no field has
 
 _PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 _BASES = {
-    "m": "length", "N": "force", "Pa": "pressure", "C": "charge", "s": "time", "Hz": "frequency",
-    "V": "voltage", "A": "current",
+    "m": "length",
+    "N": "force",
+    "Pa": "pressure",
+    "C": "charge",
+    "s": "time",
+    "Hz": "frequency",
+    "V": "voltage",
+    "A": "current",
 }
 _GRAM_FORCE = ("force", GRAM_FORCE)  # g of a load cell
 _ROUNDING = 1e-9  # relative, of quotients of prefixes
