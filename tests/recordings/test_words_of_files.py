@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.instrument_files import matlab_5, numpy_file, plain_hdf5
-from underskin import InvalidInput
+from underskin.errors import FileError, InvalidInput
 from underskin.recordings import Reading, read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import stepped_sine
@@ -90,6 +90,13 @@ def test_preload_in_a_column_of_a_time_series() -> None:
     assert [recording.preload_n for recording in reading.campaign.of(FrfRecording)] == [0.5, 1, 2]
     for recording, load in zip(reading.campaign.of(FrfRecording), (0.5, 1, 2), strict=True):
         assert recording.force_n == pytest.approx(load * FORCE, abs=1e-6)
+
+
+def test_sample_is_no_sphere() -> None:
+    """The diameter and the height of a sample are not taken for those of a sphere and a layer."""
+    header = "Diameter [mm];12\nSpecimen thickness [mm];10\nE-Modul (MPa);1,6"
+    with pytest.raises(FileError, match=r"does not say recording.indenter_radius_mm"):
+        read(f"{header}\nStroke [mm];Force [N]\n{rows(TIME, FORCE)}\n")
 
 
 @pytest.mark.parametrize("write", [numpy_file, matlab_5, plain_hdf5])

@@ -19,6 +19,7 @@ _SAMPLE = (
     "|éprouvette|provino|probeta"
 )
 _RADIUS, _DIAMETER = r"radi[ou]|rayon|raggio", r"dia\w*m|durchmesser|diamètre|di[aá]metr|[øØ⌀]"
+_SPHERE = "sphere|ball|bead|tip\\b|indent|kugel|bille|sph[eè]re|sfera|esfera|bola"  # others are those of samples
 _LAST = r"(load cycles|lastwechsel|lastspiele|cycles de charge|cicli di carico|ciclos de carga)"
 _RATE = r"fs|(sampl\w*|data)[ _-]?(rate|freq\w*)|abtast(rate|freq\w*)|\w*chantillonnage|campionamento|muestreo"
 # Of each field the dimension of its unit (none: it has no unit, and the words are all of the name), and words in
@@ -32,10 +33,11 @@ WORDS: tuple[tuple[str, str, str], ...] = (
     ("dynamic_force_n", "force", r"dyn|din[aá]mic|oscill|schwing|wechsellast"),
     ("preload_n", "force", r"pre-?load|stati|stát|vor(last|kraft|spann)|pr[ée]-?(charge|contrainte|tension)|precar"),
     ("sensor_radius_mm", "length", rf"^(?=.*({_SENSOR}))(?=.*({_RADIUS}|{_DIAMETER}))"),
-    ("indenter_radius_mm", "length", rf"^(?!.*({_SENSOR}|{_SAMPLE}))(?=.*({_RADIUS}|{_DIAMETER}))"),
+    ("indenter_radius_mm", "length", rf"^(?!.*({_SENSOR}|{_SAMPLE}))(?=.*({_RADIUS}|({_SPHERE}).*({_DIAMETER})))"),
+    ("indenter_radius_mm", "length", rf"^(?!.*({_SENSOR}|{_SAMPLE})).*({_DIAMETER}).*({_SPHERE})"),
     ("sample_height_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(height|höhe|hauteur|altezza|altura))"),
     ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(dia|durchmesser|diá))"),
-    ("thickness_mm", "length", r"thick|dicke\b|stärke|[ée]paisseur|spessore|espesor|grosor"),
+    ("thickness_mm", "length", rf"^(?!.*({_SAMPLE}))(?=.*(thick|dicke\b|stärke|[ée]paisseur|spessore|espesor|grosor))"),
     ("youngs_modulus_mpa", "pressure", r"young|\be[ _-]?mod|[eé]lasti[ckz]\w*[ -]*mod|m[oó]d\w*.*[eé]lasti"),
     ("position_x_mm", "length", r"^(position x|x[ -]position)( |$)"),
     ("position_y_mm", "length", r"^(position y|y[ -]position)( |$)"),

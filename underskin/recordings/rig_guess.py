@@ -293,7 +293,8 @@ def _row_fields(
         if field or kind != "frf":
             continue
         row_field = _row_field(column)
-        if row_field == "indenter_radius_mm" and is_diameter(column.name) and "'" not in column.name:
+        is_length = _dimension(column) == "length" and ("frequency_hz" in fields or row_field == "indenter_radius_mm")
+        if is_length and is_diameter(column.name) and "'" not in column.name:
             found.setdefault("indenter_radius_mm", {"channel": _RADIUS})
             derived[_RADIUS] = f"'{column.name}' / 2"
         elif "frequency_hz" in fields and not _dimension(column) and OF_SENSORS.search(column.name):
