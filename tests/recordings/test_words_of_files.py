@@ -75,9 +75,9 @@ def test_header_fills_every_field() -> None:
     reading = read(f"{header}\nF (N);Q (pC)\n{rows(FORCE, CHARGE, decimal='.')}\n")
     (recording,), skin = reading.campaign.of(FrfRecording), reading.campaign.skin
     assert (recording.sample_rate_hz, recording.load_cycles, recording.dwell_s) == (2000, 1200, 120)
-    assert recording.position_mm == (1, -2)
-    assert recording.recorded_at == "2026-03-12T00:00:00+00:00"
-    assert (skin.id, skin.d33_pc_per_n) == ("palm-3", 14)
+    assert recording.position_mm == pytest.approx((1, -2))
+    stated = (recording.recorded_at, skin.id, skin.d33_pc_per_n)
+    assert stated == ("2026-03-12T00:00:00+00:00", "palm-3", 14)
 
 
 def test_preload_in_a_column_of_a_time_series() -> None:

@@ -100,7 +100,8 @@ _AXES_OF_FIELDS = ("order", "time_of_day", "previous_preload_n", "x_mm", "y_mm",
 @cache
 def built_in_axes() -> frozenset[str]:
     """The names of fields and axes, which no column of `conditions` may have."""
-    return frozenset(name for kind in KINDS.values() for name in field.checks_of(kind)) | {*_AXES_OF_FIELDS}
+    fields_of_kinds = {model_field.name for kind in KINDS.values() for model_field in fields(kind)}
+    return frozenset(fields_of_kinds | {*_AXES_OF_FIELDS})
 
 
 def further(name: str, value: Any, units_checked: bool) -> dict[str, float | str]:

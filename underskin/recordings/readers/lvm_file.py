@@ -160,7 +160,7 @@ def _starts(segment: _Segment, count: int) -> list[float]:
     """The start of each channel after the first of them [s]: by X0, the first abscissa, or by Date and Time; raises
     FileError where both differ between channels and disagree."""
     moments = map(_moment, segment.cells("Date", count), segment.cells("Time", count))
-    stamps = [when and when.replace(tzinfo=UTC).timestamp() for when in moments]
+    stamps = [None if when is None else when.replace(tzinfo=UTC).timestamp() for when in moments]
     by_x, by_clock = _after_first(segment.numbers("X0", count)), _after_first(stamps)
     if any(by_x) and any(by_clock) and not np.allclose(by_x, by_clock, atol=_SAME_START_S):
         worst = int(np.argmax(np.abs(np.subtract(by_x, by_clock))))
