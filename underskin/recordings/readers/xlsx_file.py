@@ -36,8 +36,8 @@ _SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
 _DECLARATION = re.compile(rb"<!(DOCTYPE|ENTITY)|<\0!\0(D\0O\0C|E\0N\0T)|\0<\0!\0(D\0O\0C|E\0N\0T)")
 _MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s+ref="([A-Z]{1,3})(\d{1,7}):\1(\d{1,7})"')  # down one column
 _NO_VALUE = re.compile(  # a formula without a stored value, which a text formula may have as an empty text
-    rb'<(?:\w+:)?c\s(?![^>]*\bt="str")[^>]*\br="(?P<cell>[A-Z]+\d+)"[^>]*>\s*<(?:\w+:)?f(?:\s[^>]*)?(?:/>|>[^<]*</[^>]*>)\s*'
-    rb"(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</[^>]*>)?\s*</(?:\w+:)?c>"
+    rb'<(?:\w+:)?c\s(?![^<>]*\bt="str")(?>[^<>]*?\br="(?P<cell>[A-Z]+\d+)")[^<>]*+>\s*<(?:\w+:)?f(?:\s[^<>]*)?(?:/>|>[^<]*</[^<>]*>)\s*'
+    rb"(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</[^<>]*>)?\s*</(?:\w+:)?c>"
 )
 _BLANKS = re.compile(r"\s+")
 _Merged = Collection[tuple[int, int, int]]  # column, from 0, first and last row of cells merged down a column
