@@ -99,6 +99,17 @@ def test_sample_is_no_sphere() -> None:
         read(f"{header}\nStroke [mm];Force [N]\n{rows(TIME, FORCE)}\n")
 
 
+@pytest.mark.parametrize("other", ["PVDF thickness: 0.028 mm", "Substrate thickness: 5 mm", "Trägerdicke: 5 mm"])
+def test_another_thickness_is_not_the_skin_s(other: str) -> None:
+    """The thickness of a film or a base is not that of the skin, and two of the skin are one too many."""
+    header = HEADERS["English"].replace("Layer thickness: 2.5 mm", other)
+    table = f"Time (s);F (N);Q (pC)\n{rows(TIME, FORCE, CHARGE, decimal='.')}\n"
+    with pytest.raises(FileError, match=r"does not say skin.thickness_mm"):
+        read(f"{header}\n{table}")
+    with pytest.raises(FileError, match=r"more than one column or property may be thickness_mm"):
+        read(f"{HEADERS['English']}\nSkin thickness: 3 mm\n{table}")
+
+
 @pytest.mark.parametrize("write", [numpy_file, matlab_5, plain_hdf5])
 @pytest.mark.parametrize(("name", "value"), [("fs", RATE), ("Fs", RATE), ("sampling_rate", RATE), ("dt", 1 / RATE)])
 def test_rate_that_an_array_has_beside_it(write: Callable[[Any], bytes], name: str, value: float) -> None:

@@ -22,6 +22,13 @@ _RADIUS, _DIAMETER = r"radi[ou]|rayon|raggio", r"dia\w*m|durchmesser|diamètre|d
 _SPHERE = "sphere|ball|bead|tip\\b|indent|kugel|bille|sph[eè]re|sfera|esfera|bola"  # others are those of samples
 _LAST = r"(load cycles|lastwechsel|lastspiele|cycles de charge|cicli di carico|ciclos de carga)"
 _RATE = r"fs|(sampl\w*|data)[ _-]?(rate|freq\w*)|abtast(rate|freq\w*)|\w*chantillonnage|campionamento|muestreo"
+_THICKNESS = "(?:schicht|haut|elastomer|gummi|silikon)?(?:dicke|stärke)|thickness|[ée]paisseur|spessore|espesor|grosor"
+# What else the names of a thickness and a modulus may hold: others are those of films, glue and bases
+_OF_LAYER = re.compile(
+    rf"{_THICKNESS}|skin|layer|elastomer|rubber|silicone|cover|haut|schicht|gummi|silikon|couche|peau|[ée]lastomère"
+    r"|caoutchouc|strato|pelle|gomma|capa|piel|goma|elast[oó]mero|of|the|der|des|de|du|la|le|di|del|dello|della|d|l|s"
+    r"|nominal|declared|mm|mpa|h|e|youngs?|m[oó]d[uú]l(us|e|o)?|elasti[zc]itätsmodul|[eé]l[aá]sti(c|co|city|que|cità|cité|cidad)"
+)
 # Of each field the dimension of its unit (none: it has no unit, and the words are all of the name), and words in
 # English, German, French, Italian and Spanish, as a pattern of the name in lower case.
 WORDS: tuple[tuple[str, str, str], ...] = (
@@ -33,12 +40,16 @@ WORDS: tuple[tuple[str, str, str], ...] = (
     ("dynamic_force_n", "force", r"dyn|din[aá]mic|oscill|schwing|wechsellast"),
     ("preload_n", "force", r"pre-?load|stati|stát|vor(last|kraft|spann)|pr[ée]-?(charge|contrainte|tension)|precar"),
     ("sensor_radius_mm", "length", rf"^(?=.*({_SENSOR}))(?=.*({_RADIUS}|{_DIAMETER}))"),
-    ("indenter_radius_mm", "length", rf"^(?!.*({_SENSOR}|{_SAMPLE}))(?=.*({_RADIUS}|({_SPHERE}).*({_DIAMETER})))"),
+    (
+        "indenter_radius_mm",
+        "length",
+        rf"^(?!.*({_SENSOR}|{_SAMPLE}|[ck]onta[ck]t))(?=.*({_RADIUS}|({_SPHERE}).*({_DIAMETER})))",
+    ),
     ("indenter_radius_mm", "length", rf"^(?!.*({_SENSOR}|{_SAMPLE})).*({_DIAMETER}).*({_SPHERE})"),
     ("sample_height_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(height|höhe|hauteur|altezza|altura))"),
     ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(dia|durchmesser|diá))"),
-    ("thickness_mm", "length", rf"^(?!.*({_SAMPLE}))(?=.*(thick|dicke\b|stärke|[ée]paisseur|spessore|espesor|grosor))"),
-    ("youngs_modulus_mpa", "pressure", r"young|\be[ _-]?mod|[eé]lasti[ckz]\w*[ -]*mod|m[oó]d\w*.*[eé]lasti"),
+    ("thickness_mm", "length", rf"\b({_THICKNESS})\b"),
+    ("youngs_modulus_mpa", "pressure", r"young|\be[ -]?mod|[eé]l[aá]sti[ckqz]"),
     ("position_x_mm", "length", r"^(position x|x[ -]position)( |$)"),
     ("position_y_mm", "length", r"^(position y|y[ -]position)( |$)"),
     ("dwell_s", "time", r"dwell|hold(ing)? time|haltezeit|maintien|mantenim"),
@@ -74,7 +85,11 @@ def field_by_words(name: str, dimension: str) -> str:
     """The field that the words of a name say, with a unit of this dimension; empty for none."""
     plain = (in_brackets(name) or (name,))[0].lower().replace("_", " ").strip()
     fits = re.search if dimension else re.fullmatch
-    return next((field for field, needed, words in WORDS if dimension == needed and fits(words, plain)), "")
+    field = next((field for field, needed, words in WORDS if dimension == needed and fits(words, plain)), "")
+    is_other = field in ("thickness_mm", "youngs_modulus_mpa") and not all(
+        _OF_LAYER.fullmatch(word) for word in re.findall(r"[^\W\d_]+", plain)
+    )
+    return "" if is_other else field
 
 
 def field_of(name: str) -> tuple[str, bool]:

@@ -182,7 +182,8 @@ def unclear(contents: Contents) -> list[str]:
     if not _entries(columns, guessed(columns, {}, {})):
         for column, field in zip(columns, likely(columns)[1], strict=True):
             by_field.setdefault(field, []).append(column.name)
-    stated = of_contents(contents)["recording"]
+    document = of_contents(contents)
+    stated = {**document["skin"], **document["recording"]}
     by_field |= {
         field: names
         for field, names in _stated_names(contents.properties).items()
