@@ -131,7 +131,7 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     held = HeldArrays(options.most_unfolded_bytes)
     for upload in uploads:
         if upload.field != RIG:
-            more = look(upload, rig, options.most_json_bytes).campaigns
+            more = look(upload, rig, options.most_json_bytes, uploads).campaigns
             more = [file.with_curves_turned() for file in more] if options.turn_curves else more
             files += [file.with_estimator(options.estimator) for file in more]
             held.add(more)

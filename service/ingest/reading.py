@@ -20,6 +20,7 @@ from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
+from underskin.recordings.joined_files import is_of_another
 from underskin.recordings.readers import formats
 from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
@@ -98,8 +99,15 @@ class InspectedFile:
     campaigns: list[ReadCampaign]
 
 
-def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> InspectedFile:
-    """The campaigns of a file, by its content, with its format and channels; JSON may hold one or a list of them."""
+def look(
+    upload: Upload, rig: RigDescription | None, most_json_bytes: int, sent: Sequence[Upload] = ()
+) -> InspectedFile:
+    """The campaigns of a file, by its content, with its format and channels; JSON may hold one or a list of them.
+
+    The other files of a recording, which the rig description names, are among those `sent` with it; they hold no
+    campaign of their own.
+    """
+    beside = {other.label: other.path for other in sent if other.label is not None}
     label = upload.label or _UNLABELLED
     kind, contents = "", None
     try:
@@ -107,7 +115,9 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
             kind = formats.detect(stream, label)
         if kind == "JSON":
             return InspectedFile(kind, None, _read_json(upload, most_json_bytes))
-        held = read_contents(upload.path, label)
+        if rig is not None and rig.join is not None and is_of_another(label, beside, rig.join):
+            return InspectedFile(kind, None, [])
+        held = read_contents(upload.path, label, rig, beside)
         contents = held if isinstance(held, Contents) else None
         reading = _understood(held, label, rig, upload.said)
         _require_usable(reading.campaign)

@@ -9,7 +9,6 @@ from dataclasses import MISSING
 from typing import Any, get_args
 
 from underskin.physics.charge_response import INCOMPRESSIBLE
-from underskin.recordings import validation
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import (
     LINES,
@@ -21,6 +20,8 @@ from underskin.recordings.campaign import (
     Sensor,
     SkinDescription,
     Tolerances,
+    built_in_axes,
+    further,
     read_estimator,
     read_sensors,
     read_tolerances,
@@ -55,13 +56,10 @@ _OF_CHECK: Mapping[Callable[..., Any], Schema] = {
     field.frequencies: _column(minimum=_LOWEST_HZ, maximum=_HIGHEST_HZ),
     field.not_falling: _column(),
     field.coherence: _column(minimum=0, maximum=1 + field.COHERENCE_ROUNDING),
-    validation.further: {
+    further: {
         "type": "object",
-        "maxProperties": validation.MOST_CONDITIONS,
-        "propertyNames": {
-            "pattern": f"^{validation.CONDITION.pattern}$",
-            "not": {"enum": sorted(validation.BUILT_IN_AXES)},
-        },
+        "maxProperties": field.MOST_CONDITIONS,
+        "propertyNames": {"pattern": f"^{field.CONDITION.pattern}$", "not": {"enum": sorted(built_in_axes())}},
         "additionalProperties": {"anyOf": [{"type": "number"}, _NAME, _NULL]},
     },
     read_estimator: {"type": "string", "enum": list(get_args(Estimator))},

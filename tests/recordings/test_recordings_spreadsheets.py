@@ -260,7 +260,9 @@ def test_date_time_day_columns_time(day: str) -> None:
         assert only(read(table(",Date", time))).recorded_at == time
     refused = refusal(table(",Date,Time", ",09:30"))
     assert (refused.place, refused.reason) == ("line 10, column 9", "has a time of day, '09:30', and no Date")
-    assert "is no date and time" in refusal(table(",Date,Time", "31.2.2025,09:30")).reason
+    unread = read(table(",Date,Time", "31.2.2025,09:30"))
+    assert only(unread).recorded_at is None
+    assert "is no date and time" in " ".join(unread.warnings)
 
 
 @pytest.mark.parametrize(
@@ -268,13 +270,15 @@ def test_date_time_day_columns_time(day: str) -> None:
     [
         ("03/02/2025 09:30", "can be two days, 3 February 2025 or 2 March 2025"),
         ("31.2.2025 09:30", "is no date and time"),
+        ("in the morning", "is no date and time that can be read here"),
     ],
 )
-def test_time_two_none_refused(written: str, reason: str) -> None:
-    """A time that can be two or none is refused."""
-    refused = refusal(ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n"))
-    assert refused.place == "line 10, column 9"
-    assert reason in refused.reason
+def test_time_two_none_left_out(written: str, reason: str) -> None:
+    """A time that can be two or none is left out with a note, and the recording is used."""
+    reading = read(ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n"))
+    assert only(reading).recorded_at is None
+    (note,) = reading.warnings
+    assert note.startswith(f"line 10, column 9: recorded_at = {written!r} {reason}")
 
 
 def test_forces_grams_pounds_converted() -> None:

@@ -25,7 +25,7 @@ from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, ou
 from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import validation as field
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
-from underskin.recordings.validation import Further, shown
+from underskin.recordings.validation import shown
 from underskin.units import Complexes, Floats, checked, finite, non_negative, to_si
 
 DEFAULT_KIND = "frf"  # of a recording whose document states none
@@ -91,6 +91,29 @@ class SkinDescription:
     length_mm: field.Declared | None = None
     tolerances: Annotated[Tolerances, read_tolerances] | None = None
     sensors: Sensors = ()
+
+
+# What a diagnosis makes of the fields of recordings, and the words for these axes
+_AXES_OF_FIELDS = ("order", "time_of_day", "previous_preload_n", "x_mm", "y_mm", "phase", "day")
+
+
+@cache
+def built_in_axes() -> frozenset[str]:
+    """The names of fields and axes, which no column of `conditions` may have."""
+    fields_of_kinds = {model_field.name for kind in KINDS.values() for model_field in fields(kind)}
+    return frozenset(fields_of_kinds | {*_AXES_OF_FIELDS})
+
+
+def further(name: str, value: Any, units_checked: bool) -> dict[str, float | str]:
+    """A lab's own columns by name, none of them that of a field or an axis."""
+    noted = field.further(name, value, units_checked)
+    for key in noted.keys() & built_in_axes():
+        allowed = "is the name of a field or an axis of its own; choose another"
+        raise InvalidInput(f"{name}.{key}", key, allowed)
+    return noted
+
+
+Further = Annotated[dict[str, float | str], further]
 
 
 class _OfAKind:
@@ -505,13 +528,7 @@ KINDS: dict[str, type[Recording]] = {
     "compression": CompressionRecording,
 }
 COLUMNS = (
-    "frequency_hz",
-    "frf_re_pc_per_n",
-    "frf_im_pc_per_n",
-    "coherence",
-    "force_n",
-    "charge_pc",
-    "displacement_mm",
+    *("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence", "force_n", "charge_pc", "displacement_mm"),
     "time_s",
 )
 

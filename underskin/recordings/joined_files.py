@@ -5,7 +5,7 @@ with `a_force.csv`. Their clocks align them: the stated starts of both, and the 
 each; `regular_samples.aligned` cuts the channels to the samples in common.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -25,6 +25,12 @@ def files_to_join(file: Path, join: tuple[str, tuple[str, ...]]) -> Iterator[Pat
         raise FileError(str(file), "", f"has no {part!r} in its name, which says what files belong to it (join)")
     for other in others:
         yield file.with_name(other.join(file.name.rsplit(part, 1)))
+
+
+def is_of_another(name: str, names: Iterable[str], join: tuple[str, tuple[str, ...]]) -> bool:
+    """Whether a file belongs to the recording of another one of these names, and is none of its own."""
+    firsts = (Path(first) for first in names if join[0] in first)
+    return any(file.name == name for first in firsts for file in files_to_join(first, join))
 
 
 def joined(contents: Contents, others: Mapping[str, Contents], file: str) -> Contents:

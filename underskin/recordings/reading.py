@@ -165,17 +165,25 @@ def _by_guess(contents: Contents, name: str) -> Reading:
     raise FileError(name, "", f"{reason}; {doubt}{_TEMPLATE if rig_guess.holds_frfs(document) else ''}")
 
 
-def read_contents(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Contents | Document:
+def read_contents(
+    source: Path | str | bytes,
+    name: str,
+    rig: RigDescription | None = None,
+    beside: Mapping[str, Path] | None = None,
+) -> Contents | Document:
     """A file's channels, or its campaign document, before a rig description is applied, with the channels of the files
-    that it names (`join`); raises FileError."""
+    that it names (`join`), in the same folder or `beside` it by their names; raises FileError."""
     contents = _parsed(source, name)
     if rig is None or rig.join is None or isinstance(contents, Document):
         return contents
-    if isinstance(source, bytes):
+    if isinstance(source, bytes) and beside is None:
         raise FileError(name, "", "is no file with others in its folder, which the rig description names (join)")
     others: dict[str, Contents] = {}
-    for file in joined_files.files_to_join(Path(source), rig.join):
-        other = _parsed(file, file.name)
+    first = Path(name) if beside is not None or isinstance(source, bytes) else Path(source)
+    for file in joined_files.files_to_join(first, rig.join):
+        if beside is not None and file.name not in beside:
+            raise FileError(name, "", f"{file.name} belongs to it (join), and was not sent with it")
+        other = _parsed(file if beside is None else beside[file.name], file.name)
         if isinstance(other, Document):
             raise FileError(file.name, "", f"is a campaign document, and no file of channels to join to {name} (join)")
         others[file.name] = other

@@ -46,6 +46,7 @@ from underskin.errors import (
 )
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, DEFAULT_KIND, KINDS, SkinDescription
+from underskin.recordings.field_words import is_diameter, number_of
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.readers import channel_arithmetic, json_file, text
 from underskin.recordings.readers.expressions import Expression
@@ -513,28 +514,32 @@ def common_value(name: str, value: Any | Property, stated: Stated, file: str) ->
     if not isinstance(value, Property):
         return value
     given = _property_value(value, stated, file)
-    converted = text_value(name, given) if isinstance(given, str) else given
-    number = _number(given)
-    if number is None or name in TEXTS:
+    converted = text_value(name, str(given)) if isinstance(given, str) or name == "recorded_at" else given
+    number = number_of(given)
+    if number is None or name in TEXTS or name == "recorded_at":
         return converted
     if name not in LAB:
         return number
     label = labelled_unit(value.property)
+    number *= 0.5 if name.endswith("radius_mm") and is_diameter(value.property) else 1.0
     return number * factor(label, name, file, f"property {value.property!r}") if label else number
 
 
+class UnreadableTime(ValueError):
+    """A time that an instrument wrote and that cannot be read; the message is a note on it."""
+
+
 def text_value(name: str, given: str) -> str | float:
-    """The value of a field that a file states as a text."""
-    return _in_zone(given) if name == "recorded_at" else given
+    """The value of a field that a file states as a text: a time in the lab's zone where it states none.
 
-
-def _in_zone(given: str | float) -> str | float:
-    """A time that an instrument wrote, in the lab's zone where it states none; an invalid time unchanged, to be
-    rejected later."""
-    try:
-        return with_zone(str(given), time_zone())
-    except ValueError:
+    Raises UnreadableTime.
+    """
+    if name != "recorded_at":
         return given
+    try:
+        return with_zone(given, time_zone())
+    except ValueError as error:
+        raise UnreadableTime(f"{name} = {shown(given)!r} {text.no_time(error)}") from None
 
 
 def spring_constant(value: float | Property, stated: Stated, file: str, own_unit: str = "N/m") -> float:
@@ -543,7 +548,7 @@ def spring_constant(value: float | Property, stated: Stated, file: str, own_unit
     if not isinstance(value, Property):
         return value
     place, given = f"property {value.property!r}", _property_value(value, stated, file)
-    number = _number(given)
+    number = number_of(given)
     if number is None or not 0 < number < float("inf"):
         raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a stiffness")
     label = labelled_unit(value.property)
@@ -552,11 +557,6 @@ def spring_constant(value: float | Property, stated: Stated, file: str, own_unit
     if stated_unit is None or stated_unit.dimension != own.dimension:
         raise FileError(file, place, f"its unit {label!r} is not one of {own.dimension}, such as {own_unit}")
     return number * (stated_unit.to_si / own.to_si)
-
-
-def _number(given: str | float) -> float | None:
-    """A number as written, with a decimal point or comma; None where a comma may separate thousands."""
-    return text.number(given, text.decimal_mark([[given]], "\t")) if isinstance(given, str) else given
 
 
 def _property_value(value: Property, stated: Stated, file: str) -> str | float:

@@ -13,20 +13,22 @@ from typing import Any, Protocol
 import numpy as np
 
 from underskin.recordings.channels import Block, Contents
-from underskin.recordings.readers.text import time_zone, with_zone
-from underskin.recordings.readers.unit_labels import (
-    DECIBEL,
-    decibel_reference,
-    in_brackets,
-    lab_field,
-    labelled_unit,
-    unit,
+from underskin.recordings.field_words import (
+    OF_CHANNELS,
+    OF_SENSORS,
+    RECORDED_AT,
+    TIMES,
+    WHEN,
+    field_by_words,
+    field_of,
+    is_diameter,
+    stated_rate,
 )
-from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, SCHEMA, channel_fields
-from underskin.units import LAB
+from underskin.recordings.readers.text import time_zone, with_zone
+from underskin.recordings.readers.unit_labels import DECIBEL, decibel_reference, in_brackets, labelled_unit, unit
+from underskin.recordings.rig_description import AXES, COMPLEX_FRF, MAGNITUDE, PHASE, SCHEMA, channel_fields
 
 _RATE = "sample_rate_hz"
-_RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
 _BY_DIMENSION = {
     "frf": {
         "force": "force_n",
@@ -41,50 +43,17 @@ _BY_DIMENSION = {
 }
 _MAGNITUDES = ("mag", "modulus", "|")  # as analysers call the absolute value of an FRF
 _OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
-_BY_WORD = {
-    "force": "force_n",
-    "load": "force_n",
-    "charge": "charge_pc",
-    "amplifier": "charge_pc",
-    "coh": "coherence",
-    "koh": "coherence",
-    "coer": "coherence",
-    "frequency": "frequency_hz",
-    "phase": PHASE,
-    "displacement": "displacement_mm",
-    "depth": "displacement_mm",
-    "time": "time_s",
-}
 _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
 _DEFLECTIONS = ("deflection", "cantilever", "durchbiegung")
-_TIMES = (
-    *("recorded at", "recorded", "measured at", "acquired at", "date and time", "date/time", "datetime"),
-    *("timestamp", "start time", "date"),
-)  # of a file's properties, in lower case, the surest first
-RECORDED_AT = "recorded_at"
 _OF_RECORDING = {
-    "frf": ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", _RATE, RECORDED_AT),
-    "indentation": ("sensor", "indenter_radius_mm", "stage_stiffness_n_per_mm", RECORDED_AT),
-    "compression": ("sample_height_mm", "sample_diameter_mm", RECORDED_AT),
+    "frf": ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", _RATE, "load_cycles", "dwell_s"),
+    "indentation": ("sensor", "indenter_radius_mm", "stage_stiffness_n_per_mm"),
+    "compression": ("sample_height_mm", "sample_diameter_mm"),
 }
+_OPTIONAL_OF_SKIN = ("id", "width_mm", "length_mm")
 OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius_mm")
 _ONE_SENSOR = {"id": "s01", "x_mm": 0, "y_mm": 0}
-_SENSORS = ("sensor", "taxel", "sensore", "capteur")
-_WHEN = ("time", "date", "zeit", "datum", "heure", "ora", "data")
-# "probe" is German for a sample, English for what presses
-_SAMPLES = (
-    "sample|specimen|proben|(?:der|die) probe|probe(?=.*(?:höhe|durchmesser))|(?:höhe|durchmesser).*probe|prüf"
-    "|éprouvette|provino|probeta"
-)
-_BY_WORDS = (  # of columns beside an FRF, and of properties: field, dimension, and words in instruments' languages
-    ("dynamic_force_n", "force", r"dyn|din[aá]mic"),
-    ("preload_n", "force", r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precar"),
-    ("indenter_radius_mm", "length", rf"^(?!.*(sensor|taxel|{_SAMPLES}))(?=.*(radi[ou]|rayon|raggio))"),
-    ("sample_height_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(height|höhe|hauteur|altezza|altura))"),
-    ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(dia|durchmesser|diá))"),
-)
 _OF_ROWS = ("dynamic_force_n", "preload_n", "indenter_radius_mm")  # fields that may be columns
-_DIAMETER = re.compile(r"dia\w*m|durchmesser|diamètre|[øØ⌀]", re.IGNORECASE)
 _RADIUS = "radius"  # the derived channel
 _IMAGINARY = re.compile(r"imag|\bim\b")
 _QUOTED = re.compile(r"'([^']*)'")
@@ -138,8 +107,13 @@ def of_contents(contents: Contents) -> dict[str, Any]:
     document = guessed(list(columns.values()), contents.properties, {}, list(texts), dated=dated)
     kind = document["kind"]
     document = {**document, **_entries(list(columns.values()), document)}
-    rated = any(block.sample_rate_hz is not None for block in contents.blocks) or "time_s" in document["channels"]
-    optional = [RECORDED_AT, "stage_stiffness_n_per_mm"]
+    document["recording"] = {
+        name: source for name, source in document["recording"].items() if not _is_measured(source, blocks)
+    }
+    rated = "time_s" in document["channels"] or any(
+        block.sample_rate_hz is not None or stated_rate(contents.properties, block.name) for block in contents.blocks
+    )
+    optional = ["stage_stiffness_n_per_mm", "load_cycles", "dwell_s"]
     optional += [_RATE] if rated or "force_n" not in document["channels"] else []
     optional += ["dynamic_force_n"] if "force_n" in document["channels"] else []
     optional += ["sensor"] if kind == "indentation" or "recordings" in document else []
@@ -152,11 +126,17 @@ def of_contents(contents: Contents) -> dict[str, Any]:
         **document,
         "skin": {
             **{name: document["skin"].get(name) for name in skin},
-            **_of_skin(contents.properties),
+            **_of_skin(contents.properties, kind),
             **({"sensors": sensors or [dict(_ONE_SENSOR)]} if kind == "frf" else {}),
         },
         "recording": {**dict.fromkeys(needed), **document["recording"]},
     }
+
+
+def _is_measured(source: Any, blocks: Sequence[Block]) -> bool:
+    """Whether a field of the recording would come from a column of numbers most of which differ: it is measured."""
+    columns = [block.headed(source["channel"]) for block in blocks if "channel" in source]
+    return any(column is not None and 2 * len(np.unique(column.values)) > len(column.values) for column in columns)
 
 
 def _sensors(contents: Contents, document: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -202,7 +182,8 @@ def unclear(contents: Contents) -> list[str]:
     if not _entries(columns, guessed(columns, {}, {})):
         for column, field in zip(columns, likely(columns)[1], strict=True):
             by_field.setdefault(field, []).append(column.name)
-    stated = of_contents(contents)["recording"]
+    document = of_contents(contents)
+    stated = {**document["skin"], **document["recording"]}
     by_field |= {
         field: names
         for field, names in _stated_names(contents.properties).items()
@@ -252,7 +233,7 @@ def guessed(
 
 def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
     """The kind of recording, and the likely field of each channel; empty if there is no indication."""
-    dimensions = [column_unit.dimension if (column_unit := unit(column.unit)) else "" for column in columns]
+    dimensions = [_dimension(column) for column in columns]
     kind = "frf"
     charged = any("charge" in dimension for dimension in dimensions) or any(
         "charge" in column.name.lower() for column in columns
@@ -267,7 +248,7 @@ def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
     fields = []
     for column, dimension in zip(columns, dimensions, strict=True):
         name = column.name.lower()
-        word = next((field for word, field in _BY_WORD.items() if word in name), "")
+        word = next((field for field, words in OF_CHANNELS.items() if re.search(words, name)), "")
         field = COMPLEX_FRF if column.is_complex else _BY_DIMENSION[kind].get(dimension) or word
         if decibel_reference(column.unit) is not None or (dimension == DECIBEL and is_spectrum and phases):
             field = MAGNITUDE
@@ -278,7 +259,24 @@ def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
         if is_spectrum and kind == "frf" and field in ("force_n", "charge_pc", "time_s"):
             field = ""  # of the recording
         fields.append(field if field in channel_fields(kind) else "")
-    return kind, fields
+    if kind != "frf" or is_spectrum:
+        return kind, fields
+    of_rows = [_row_field(column) != "" for column in columns]
+    sampled = {field for field, is_of_row in zip(fields, of_rows, strict=True) if not is_of_row}
+    return kind, [
+        "" if is_of_row and field in sampled else field for field, is_of_row in zip(fields, of_rows, strict=True)
+    ]
+
+
+def _dimension(column: Column) -> str:
+    column_unit = unit(column.unit)
+    return "" if column_unit is None else column_unit.dimension
+
+
+def _row_field(column: Column) -> str:
+    """The field of the recording that a column may hold, by its words and unit; empty for none."""
+    field = field_by_words(column.name, _dimension(column))
+    return field if field in _OF_ROWS else ""
 
 
 def _row_fields(
@@ -288,22 +286,21 @@ def _row_fields(
     found: dict[str, Any] = {}
     derived: dict[str, str] = {}
     for name in texts:
-        lower = name.lower()
-        if any(word in lower for word in _SENSORS):
+        if OF_SENSORS.search(name):
             found.setdefault("sensor", {"channel": name})
-        elif any(word in lower.split() for word in _WHEN):
+        elif any(word in WHEN for word in name.lower().split()):
             found.setdefault(RECORDED_AT, {"channel": name})
     for column, field in zip(columns, fields, strict=True):
-        if field or kind != "frf" or "frequency_hz" not in fields:
+        if field or kind != "frf":
             continue
-        column_unit = unit(column.unit)
-        dimension = column_unit.dimension if column_unit is not None else ""
-        if dimension == "length" and _DIAMETER.search(column.name) and "'" not in column.name:
+        row_field = _row_field(column)
+        is_length = _dimension(column) == "length" and ("frequency_hz" in fields or row_field == "indenter_radius_mm")
+        if is_length and is_diameter(column.name) and "'" not in column.name:
             found.setdefault("indenter_radius_mm", {"channel": _RADIUS})
             derived[_RADIUS] = f"'{column.name}' / 2"
-        elif not dimension and any(word in column.name.lower() for word in _SENSORS):
+        elif "frequency_hz" in fields and not _dimension(column) and OF_SENSORS.search(column.name):
             found.setdefault("sensor", {"channel": column.name})
-        elif (row_field := _field_by_words(column.name, dimension)) in _OF_ROWS:
+        elif row_field:
             found.setdefault(row_field, {"channel": column.name})
     return found, derived
 
@@ -332,49 +329,42 @@ def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str
 
 def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
     """The recording's fields that the file itself states."""
-    bare = {(in_brackets(stated) or (stated,))[0].lower().replace(" ", "_"): stated for stated in properties}
-    named = bare | {field: names[0] for field, names in _stated_names(properties).items()}
-    rate = next((stated for name, stated in bare.items() if name in _RATES), None)
-    if rate is not None:
-        named[_RATE] = rate
+    named = {field: {"property": names[0]} for field, names in _stated_names(properties).items()}
     when = None if dated else _time_stated(properties)
-    named = {name: stated for name, stated in named.items() if name != RECORDED_AT}
-    named |= {} if when is None else {RECORDED_AT: when}
-    return {name: {"property": named[name]} for name in _OF_RECORDING[kind] if name in named}
+    found = {name: named[name] for name in _OF_RECORDING[kind] if name in named}
+    position = [named[f"position_{axis}"] for axis in AXES if f"position_{axis}" in named]
+    return {
+        **found,
+        **({} if when is None else {RECORDED_AT: {"property": when}}),
+        **({"position_mm": position} if len(position) == len(AXES) and kind == "frf" else {}),
+    }
 
 
-def _stated_names(properties: Mapping[str, Any]) -> dict[str, list[str]]:
+def _stated_names(properties: Mapping[str, Any], *, own_only: bool = False) -> dict[str, list[str]]:
     """The properties that may state a field, by field: those called as it is, else those that their words suggest."""
     by_name: dict[str, list[str]] = {}
     by_words: dict[str, list[str]] = {}
     for name in properties:
-        field = (lab_field(name) or (name,))[0]
-        label = unit(labelled_unit(name))
-        if field != name or name in LAB or label is None:
-            if field != "indenter_radius_mm" or not _DIAMETER.search(name):  # of which the radius is half
-                by_name.setdefault(field, []).append(name)
-        elif likely_field := _field_by_words(name, label.dimension):
-            by_words.setdefault(likely_field, []).append(name)
+        field, is_own = field_of(name)
+        if field and (is_own or not own_only):
+            (by_name if is_own else by_words).setdefault(field, []).append(name)
     return by_words | by_name
 
 
-def _field_by_words(name: str, dimension: str) -> str:
-    """The field of a recording by words of a heading and the dimension of its unit; empty for none."""
-    fields = (field for field, needed, words in _BY_WORDS if dimension == needed and re.search(words, name.lower()))
-    return next(fields, "")
-
-
-def _of_skin(properties: Mapping[str, Any]) -> dict[str, Any]:
-    """The skin's fields that the file states under their own names, `skin.thickness_mm` or `Thickness [mm]`."""
-    names = {name: name.removeprefix("skin.") for name in properties}
-    fields = {(lab_field(bare) or (bare,))[0]: name for name, bare in names.items()}
-    return {name: {"property": fields[name]} for name in OF_SKIN if name in fields}
+def _of_skin(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    """The skin's fields that the file states; of curves, whose instruments report moduli, under their own names."""
+    names = _stated_names(properties, own_only=kind != "frf")
+    if kind == "indentation":
+        names = {name: given for name, given in _stated_names(properties).items() if name == "thickness_mm"} | names
+    of_skin = {name: {"property": names[name][0]} for name in (*OF_SKIN, "d33_pc_per_n") if name in names}
+    own = {name: {"property": f"skin.{name}"} for name in _OPTIONAL_OF_SKIN if f"skin.{name}" in properties}
+    return of_skin | own
 
 
 def _time_stated(properties: Mapping[str, Any]) -> str | None:
     """The property of a file with its time of recording; None if no usable one exists."""
     by_name = {name.lower().replace("_", " ").strip(): name for name in properties}
-    return next((by_name[name] for name in _TIMES if name in by_name and _is_time(properties[by_name[name]])), None)
+    return next((by_name[name] for name in TIMES if name in by_name and _is_time(properties[by_name[name]])), None)
 
 
 def _is_time(value: Any) -> bool:

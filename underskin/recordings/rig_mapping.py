@@ -18,6 +18,7 @@ from underskin.recordings.campaign import KINDS, SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values, text_left_out
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.damaged_readings import marks, spikes
+from underskin.recordings.field_words import stated_rate
 from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.channel_arithmetic import FIELD
 from underskin.recordings.readers.unit_labels import (
@@ -50,10 +51,12 @@ from underskin.recordings.rig_description import (
     TEXTS,
     ChannelMapping,
     CurveChannel,
+    Property,
     RigDescription,
     SignalMapping,
     Stated,
     Trim,
+    UnreadableTime,
     common_value,
     factor,
     spring_constant,
@@ -148,10 +151,18 @@ class MappedBlock:
 
     def _of_kind(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Curves with the times that the sample rate gives."""
-        rate = self.block.sample_rate_hz
+        rate = self._rate()
         if rate is not None and "time_s" not in columns:
             columns["time_s"] = np.arange(len(columns[next(iter(columns))])) / rate
         return columns
+
+    def _rate(self) -> float | None:
+        """Samples a second by the block, else by a property of the file."""
+        stated = stated_rate(self.stated) if self.block.sample_rate_hz is None else None
+        if stated is None:
+            return self.block.sample_rate_hz
+        self.taken["sample_rate_hz"] = f"property {stated[0]!r}: {stated[1]:.6g} Hz"
+        return stated[1]
 
     def _is_series(self, columns: Mapping[str, Floats]) -> bool:  # noqa: ARG002
         """Whether the samples are those of a time series that must not have gaps."""
@@ -192,6 +203,16 @@ class MappedBlock:
             if stated_unit is not None and stated_unit.dimension == DECIBEL:
                 raise self._error(f"property {name!r}", f"is {value!r}: {_NO_DECIBELS}")
 
+    def common_values(self) -> dict[str, Any]:
+        """The fields that a recording has once, without a time that cannot be read, which a warning names."""
+        values = {}
+        for field, value in self.rig.recording.items():
+            try:
+                values[field] = common_value(field, self.row_value(field, value), self.stated, self.file)
+            except UnreadableTime as error:
+                self.warnings.append(str(error))
+        return values
+
     def row_value(self, field: str, value: Any) -> Any:
         """The value of a field that a column holds in all rows of this recording, in the field's unit; of lists and
         mappings of each part; others as they are."""
@@ -213,6 +234,8 @@ class MappedBlock:
         assert channel is not None
         self.taken[field] = repr(channel.name)
         number = float(channel.values[0].real)
+        if field == "recorded_at":
+            return text_value(field, f"{number:.15g}")
         return f"{number:g}" if field in TEXTS else number
 
     def spring(self) -> dict[str, float]:
@@ -457,8 +480,10 @@ class FrfBlock(MappedBlock):
         if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
             self.warnings.append("the line at 0 Hz is left out")
             return {name: column[1:] for name, column in columns.items()}
-        rate = self.block.sample_rate_hz if time is None else None
         stated = self.rig.recording.get("sample_rate_hz")
+        is_rated = time is not None or "force_n" not in columns or isinstance(stated, Property)
+        rate = self.block.sample_rate_hz if time is None else None
+        rate = self._rate() if rate is None and not is_rated else rate
         if "force_n" in columns and stated is None:
             if time is not None:
                 columns, rate = self._evenly_sampled(columns, time)
@@ -587,10 +612,7 @@ def _applied(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
         stated = _stated(contents, block, block_name)
         mapped = _BLOCKS[rig.kind](rig, block, stated, file)
-        common = {
-            name: common_value(name, mapped.row_value(name, value), stated, file)
-            for name, value in rig.recording.items()
-        }
+        common = mapped.common_values()
         skins.append({name: common_value(name, value, stated, file) for name, value in rig.skin.items()})
         recorded_at = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
         estimated = {} if rig.estimator is None else {"estimator": rig.estimator}

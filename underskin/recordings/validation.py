@@ -2,7 +2,7 @@
 
 A check takes the field's name and value and returns the value of the model, or raises InvalidInput that names the
 field, the value and what is allowed. A model names the check of each field in its annotation, by one of the types at
-the end. `further` checks a lab's own columns, whose names must not be those of a field or an axis.
+the end.
 """
 
 import math
@@ -335,15 +335,6 @@ Coherence = Annotated[Floats, coherence]
 
 CONDITION = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 MOST_CONDITIONS = 100
-BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
-    (
-        *("id", "kind", "sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "recorded_at", "load_cycles"),
-        *("dwell_s", "position_mm", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence", "conditions"),
-        *("sample_rate_hz", "force_n", "charge_pc", "displacement_mm", "time_s", "stage_stiffness_n_per_mm"),
-        *("sample_height_mm", "sample_diameter_mm", "order", "time_of_day", "previous_preload_n", "x_mm", "y_mm"),
-        *("phase", "day"),
-    )
-)
 
 
 def further(field: str, value: Any, units_checked: bool) -> dict[str, float | str]:
@@ -356,13 +347,8 @@ def further(field: str, value: Any, units_checked: bool) -> dict[str, float | st
         place = f"{field}.{named(key)}"
         if not isinstance(key, str) or not CONDITION.fullmatch(key):
             raise InvalidInput(place, shown(key), "must be a name of letters, digits and underscores")
-        if key in BUILT_IN_AXES:
-            raise InvalidInput(place, shown(key), "is the name of a field or an axis of its own; choose another")
         if isinstance(item, str):
             noted[key] = name(place, item, units_checked)
         elif item is not None:
             noted[key] = number(place, item)
     return noted
-
-
-Further = Annotated[dict[str, float | str], further]

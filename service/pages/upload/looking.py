@@ -36,7 +36,8 @@ def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFi
         raise Missing("There is no such file in this upload.")
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending_uploads.in_use(pending):
-        inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
+        most_bytes = request.app.state.settings.max_body_bytes
+        inspected = look(pending.files[number], pending.rig, most_bytes, pending.files)
     campaigns = [campaign.with_estimator(pending.estimator) for campaign in inspected.campaigns]
     return replace(
         inspected, campaigns=[campaign.with_curves_turned() for campaign in campaigns] if pending.turned else campaigns

@@ -7,6 +7,7 @@ import httpx
 import orjson
 import pytest
 
+from tests.service.pages.forms import BROWSING, token_of
 from tests.support.instrument_files import CHARGE, FORCE, lvm, tdms
 from tests.support.store_server import Server, campaign
 from underskin import Client, ServiceError
@@ -169,3 +170,41 @@ def test_the_client_and_the_command(server: Server, tmp_path: Path) -> None:
     missing = server.place.command("import", *files, str(tmp_path / "missing.json"), *there)
     assert (missing.returncode, "missing.json cannot be opened" in missing.stderr) == (2, True)
     assert len(server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3
+
+
+def halves() -> list[tuple[str, tuple[str, str]]]:
+    """A rig description that joins the force and the charge of a recording, and two recordings of each two files."""
+    channels = "channels:\n  force_n: {channel: Force}\n  charge_pc: {channel: Charge}\njoin: {_force: _charge}\n"
+    rig = RIG.partition("channels:")[0].replace("preload_n: 1", "preload_n: 1, sample_rate_hz: 1000") + channels
+    written = [
+        (f"{name}_{kind}.csv", "\n".join([f"Time [s];{heading}", *(f"{k / 1000};{k % 7}" for k in range(200))]))
+        for name in ("a", "b")
+        for kind, heading in (("charge", "Charge [pC]"), ("force", "Force [N]"))
+    ]
+    return [("rig", ("bench.yaml", rig)), *(("file", half) for half in written)]
+
+
+def test_files_of_one_recording_are_joined(server: Server) -> None:
+    """The force and the charge of one recording come in files of their own, which the rig description joins."""
+    rig, *files = halves()
+    answer = server.http.post("/v1/campaigns?skin=halves", files=[rig, *files])
+    assert answer.status_code == 201, answer.text
+    kept = answer.json()["campaigns"]
+    assert [(one["file"], one["errors"]) for one in kept] == [("a_force.csv", []), ("b_force.csv", [])]
+    alone = server.http.post("/v1/campaigns?skin=halves", files=[rig, files[1]])
+    assert alone.status_code == 422
+    assert "a_charge.csv belongs to it (join), and was not sent with it" in alone.text
+
+
+def test_files_of_one_recording_are_joined_on_the_page(server: Server) -> None:
+    """So they are on the page of an upload, which keeps one campaign of each pair."""
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as browser:
+        token = token_of(browser.get("/upload").text)
+        address = browser.post("/upload", data={"form_token": token}, files=halves()).headers["location"]
+        shown = browser.get(address)
+        assert shown.status_code == 200
+        assert "lacks" not in shown.text
+        kept = browser.post(f"{address}/keep", data={"form_token": token_of(shown.text), "skin": "pages"})
+        assert kept.status_code in (200, 303), kept.text
+    campaigns = server.http.get("/v1/campaigns?skin=pages").json()["campaigns"]
+    assert len(campaigns) == 2

@@ -28,6 +28,7 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.recordings.frf.spectra import (
     Blocks,
+    Defect,
     Frf,
     Stack,
     averaged,
@@ -364,7 +365,11 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     if not lines and defects:
         raise none_undamaged(defects)
     if not lines:
-        raise unusable("force_n", f"{len(defects)} defects", "must dwell on a tone for some undamaged cycles")
+        worst = max(("force_n", "charge_pc"), key=lambda name: sum(_samples(defect, name) for defect in defects))
+        of_worst = [defect for defect in defects if defect.channel == worst]
+        kinds = "; ".join(dict.fromkeys(defect.kind.words for defect in of_worst))
+        seen = f"{len(of_worst)} defects, samples that {kinds}" if of_worst else "no tone"
+        raise unusable(worst, seen, "must dwell on a tone for some undamaged cycles")
     frequency = np.array(sorted(lines))
     values, coherence, averages = np.empty(len(lines), complex), np.empty(len(lines)), np.empty(len(lines))
     spectra = [tuple(np.concatenate(part)[:, None] for part in zip(*lines[line], strict=True)) for line in frequency]
@@ -374,6 +379,11 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         values[index], averages[index] = value[0], len(tone)
         coherence[index] = gamma2[0] if len(tone) > 1 else np.nan
     return Frf(frequency, values, coherence, averages, tuple(defects))
+
+
+def _samples(defect: Defect, channel: str) -> int:
+    """The damaged samples of a channel."""
+    return defect.samples if defect.channel == channel else 0
 
 
 def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Complexes]]]) -> float:

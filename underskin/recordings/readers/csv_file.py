@@ -266,7 +266,11 @@ def _text_column_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
 def _texts(reader: RowReader, found: Headings, rows: slice) -> tuple[TextColumn, ...]:
     """The columns of words in these of all rows."""
     return tuple(
-        TextColumn(found.names[column][0], tuple(words.texts), np.array(words.codes[rows], dtype=np.intp))
+        TextColumn(
+            found.names[column][0],
+            tuple(text.with_day_first(words.texts, reader.table.decimal)),
+            np.array(words.codes[rows], dtype=np.intp),
+        )
         for column, words in reader.texts.items()
         if words.kept and words.example
     )
@@ -298,7 +302,7 @@ def _properties(lines: Iterable[str], table: Table) -> tuple[dict[str, str | flo
     for line in lines:
         stated = _stated(tables.uncommented(line).strip(), table)
         if stated is not None:
-            values.setdefault(stated[0], []).append(stated[1])
+            values.setdefault(stated[0], []).extend(text.with_day_first(stated[1:], table.decimal))
     ambiguous = {
         name: different
         for name, stated_values in values.items()

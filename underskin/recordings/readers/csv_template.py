@@ -21,6 +21,7 @@ import math
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
+from datetime import datetime
 from difflib import get_close_matches
 from itertools import islice, takewhile
 from operator import itemgetter
@@ -192,7 +193,7 @@ class _Template:
         self.rows = self._rows_to_headings()
         self.stated: dict[str, int] = {}  # line indices of the fields above the table
         self.warnings: list[str] = []
-        self.has_local_times = False
+        self.has_local_times = self.has_unreadable_times = False
 
     def _lines(self, start: int = 0) -> Iterator[tuple[int, list[str]]]:
         """The index of each line from `start` on, and its cells; one empty cell of a blank line or comment."""
@@ -339,12 +340,18 @@ class _Template:
             where += "; decimals of this file are written with a comma"
         return CellText(cell, where)
 
-    def _time(self, cell: str, place: tuple[int, int]) -> str:
+    def _time(self, cell: str, place: tuple[int, int]) -> str | None:
+        """A time with its zone; None, with a note on the first, of one that cannot be read."""
         zone = time_zone()
         try:
-            time = iso_time(cell, zone)
+            (time,) = (iso_time(day, zone) for day in text.with_day_first([cell], self.decimal))
+            datetime.fromisoformat(time)
         except ValueError as error:
-            raise self.error(place[0], f"recorded_at = {cell!r} {error}", place[1]) from None
+            if not self.has_unreadable_times:
+                where = f"line {place[0] + 1}, column {place[1] + 1}"
+                self.warnings.append(f"{where}: recorded_at = {cell!r} {text.no_time(error)}")
+            self.has_unreadable_times = True
+            return None
         if time != cell and not self.has_local_times:
             self.has_local_times = True
             self.warnings.append(f"times such as {cell} are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)")

@@ -33,22 +33,8 @@ _TABLES = ("CSV template", "CSV", "LVM")
 BINARY = ("TDMS", "UFF", "MATLAB", "HDF5", "XLSX", "NumPy", "WAV")
 GROUP = "underskin.readers"
 _SUFFIXES = (  # of the formats of MODULES
-    *(
-        ".json",
-        ".csv",
-        ".tdms",
-        ".lvm",
-        ".uff",
-        ".unv",
-        ".mat",
-        ".h5",
-        ".hdf5",
-        ".xlsx",
-        ".xlsm",
-        ".npy",
-        ".npz",
-        ".wav",
-    ),
+    *(".json", ".csv", ".tdms", ".lvm", ".uff", ".unv", ".mat", ".h5", ".hdf5", ".xlsx", ".xlsm", ".npy", ".npz"),
+    ".wav",
 )
 _HEAD_BYTES = 4096
 _JSON_LIST = re.compile(r"\[(?!\s*[A-Za-z])")  # not [Header], which begins some instruments' texts

@@ -199,29 +199,48 @@ def in_lab(moment: datetime) -> datetime:
         return zoned
 
 
-_WRITTEN = re.compile(
-    r"(?P<one>\d{1,2})(?P<mark>[./])(?P<two>\d{1,2})(?P=mark)(?P<year>\d{4})"
-    r"(?:[ ,T]+(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}))?)?"
+_CLOCK = (
+    r"(?:[ ,T]+(?:um |à )?(?P<hour>\d{1,2})[:h](?P<minute>\d{2})(?:[:m](?P<second>\d{2})(?:[.,]\d+)?)?"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?)?"
 )
-_MONTHS = 12
+_WORD = r"(?P<word>[^\W\d_]{3,})\.?"
+_WRITTEN = [
+    re.compile(form + _CLOCK)
+    for form in (
+        r"(?P<day>\d{1,2})(?P<mark>[./])(?P<month>\d{1,2})(?P=mark)(?P<year>\d{4})",
+        r"(?P<year>\d{4})(?P<mark>[./])(?P<month>\d{1,2})(?P=mark)(?P<day>\d{1,2})",
+        rf"(?:[^\W\d_]+[., ]+)?(?P<day>\d{{1,2}})(?:\.|er|º|°)?[ -]?(?:de )?{_WORD}[ -]?(?:del? )?(?P<year>\d{{4}})",
+        rf"(?:[^\W\d_]+[., ]+)?{_WORD} (?P<day>\d{{1,2}})(?:st|nd|rd|th)?,? (?P<year>\d{{4}})",
+    )
+]
+_SLASHED = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{4})(?!\d)")
+_MONTHS = (  # how their names begin, in English, French, German, Italian and Spanish
+    *("jan gen ene", "feb fév fev", "mar mär mrz", "apr avr abr", "may mai mag", "jun juin giu", "jul juil lug"),
+    *("aug aoû aou ago", "sep set", "oct okt ott", "nov", "dec déc dez dic"),
+)
 _ISO_DATE = re.compile(r"(\d{4})-(\d{2})-(\d{2})")
 
 
 def iso_time(cell: str, zone: tzinfo) -> str:
     """A date and time in a zone as ISO 8601; other texts are unchanged.
 
-    With points the day comes first; with slashes it may be the month. Raises ValueError where that is ambiguous, or
-    where there is no such day or time.
+    With points the day comes first; with slashes it may be the month, which may be a word of one of five languages.
+    Raises ValueError where that is ambiguous, or where there is no such day or time.
     """
-    match = _WRITTEN.fullmatch(cell.strip())
+    match = next((found for form in _WRITTEN if (found := form.fullmatch(cell.strip()))), None)
     if match is None:
         return cell
-    day, month = int(match["one"]), int(match["two"])
-    if match["mark"] == "/" and day != month:
-        if max(day, month) <= _MONTHS:
+    written = match.groupdict()
+    day, month = int(match["day"]), _month(written["word"]) if "word" in written else int(match["month"])
+    if month is None:
+        return cell
+    if written.get("mark") == "/" and match.start("year") and day != month:
+        if max(day, month) <= len(_MONTHS):
             raise ValueError(_two_days(match))
-        day, month = (day, month) if month <= _MONTHS else (month, day)
+        day, month = (day, month) if month <= len(_MONTHS) else (month, day)
     hour, minute, second = (int(match[part] or 0) for part in ("hour", "minute", "second"))
+    if match["half"]:
+        hour = hour % 12 + 12 * (match["half"] in "pP")
     try:
         time = f"{match['year']}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
         return datetime.fromisoformat(time).replace(tzinfo=zone).isoformat()
@@ -229,9 +248,27 @@ def iso_time(cell: str, zone: tzinfo) -> str:
         raise ValueError(f"is no date and time: {error}") from None
 
 
+def _month(name: str) -> int | None:
+    """The number of a month by its name or the beginning of it; None for another word."""
+    begins = (number for number, words in enumerate(_MONTHS, 1) if name.lower().startswith(tuple(words.split())))
+    return next(begins, None)
+
+
+def with_day_first(cells: Iterable[str], decimal: str) -> list[str]:
+    """The cells of a column, dates with slashes written with points where the day comes first in them: where one of
+    them has no other reading, and in files with decimal commas, which no country writes that puts the month first."""
+    written = list(cells)
+    dates = [(int(date[1]), int(date[2])) for cell in written if (date := _SLASHED.match(cell.strip()))]
+    leads = max((first for first, _ in dates), default=0) > len(_MONTHS)
+    trails = max((second for _, second in dates), default=0) > len(_MONTHS)
+    if trails or not (leads or decimal == ","):
+        return written
+    return [_SLASHED.sub(r"\1.\2.\3", cell) for cell in written]
+
+
 def _two_days(match: re.Match[str]) -> str:
     """The message that a date is ambiguous, with both days and their ISO forms."""
-    numbers = int(match["one"]), int(match["two"])
+    numbers = int(match["day"]), int(match["month"])
     clock = f"T{int(match['hour']):02}:{match['minute']}" if match["hour"] else ""
     days = [date(int(match["year"]), month, day) for day, month in (numbers, numbers[::-1])]
     named = " or ".join(f"{day.day} {day:%B %Y}" for day in days)
@@ -246,6 +283,12 @@ def with_zone(text: str, zone: tzinfo) -> str:
     text_with_zone = iso_time(text.strip(), zone)
     moment = datetime.fromisoformat(text_with_zone)
     return text_with_zone if moment.tzinfo is not None else moment.replace(tzinfo=zone).isoformat()
+
+
+def no_time(error: ValueError) -> str:
+    """The end of a note that a time is not used."""
+    known = str(error).startswith(("can be", "is no date"))
+    return f"{error if known else 'is no date and time that can be read here'}; it, and others like it, are left out"
 
 
 def of_two_cells(day: str, clock: str) -> str:

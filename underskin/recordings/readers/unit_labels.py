@@ -31,45 +31,19 @@ _SI_WORDS: Mapping[str, str] = {
     "V": "volt volts voltio voltios вольт вольты в wolt wolty 볼트 伏特 伏 ボルト",
     "A": "amps ampere amperes ampère ampères amperio amperios ампер",
 }
-_PREFIX_WORDS: Mapping[str, float] = {
-    "pico": 1e-12,
-    "piko": 1e-12,
-    "nano": 1e-9,
-    "micro": 1e-6,
-    "mikro": 1e-6,
-    "milli": 1e-3,
-    "mili": 1e-3,
-    "zenti": 1e-2,
-    "centi": 1e-2,
-    "kilo": 1e3,
-    "chilo": 1e3,
-    "mega": 1e6,
-    "giga": 1e9,
-    "пико": 1e-12,
-    "нано": 1e-9,
-    "микро": 1e-6,
-    "милли": 1e-3,
-    "кило": 1e3,
-    "мега": 1e6,
-    "п": 1e-12,
-    "н": 1e-9,
-    "мк": 1e-6,
-    "к": 1e3,
-    "皮": 1e-12,
-    "纳": 1e-9,
-    "微": 1e-6,
-    "毫": 1e-3,
-    "厘": 1e-2,
-    "千": 1e3,
-    "兆": 1e6,
-    "ミリ": 1e-3,
-    "キロ": 1e3,
+_PREFIX_WORDS: Mapping[float, str] = {
+    1e-12: "pico piko пико п 皮",
+    1e-9: "nano нано н 纳",
+    1e-6: "micro mikro микро мк 微",
+    1e-3: "milli mili милли 毫 ミリ",
+    1e-2: "zenti centi 厘",
+    1e3: "kilo chilo кило к 千 キロ",
+    1e6: "mega мега 兆",
+    1e9: "giga",
 }
 _OTHERS: Mapping[tuple[str, float], str] = {
-    (
-        "force",
-        POUND_FORCE,
-    ): "lb lbs lbf lbsf lb-f pound pounds pound-force pounds-force pfund libra libras livre livres",
+    ("force", POUND_FORCE): "lb lbs lbf lbsf lb-f pound pounds pound-force pounds-force pfund libra libras livre "
+    "livres",
     ("force", POUND_FORCE / 16): "oz ozf ounce ounces",
     ("force", 1e-5): "dyne dynes",
     ("force", STANDARD_GRAVITY): "kg kgf kp kilopond kilogram kilograms kilogram-force kilogramm",
@@ -102,21 +76,6 @@ _OTHERS: Mapping[tuple[str, float], str] = {
 DECIBEL = "decibel"  # the dimension of a logarithm, which no field has
 
 
-def _words(dimensions: Mapping[str, str]) -> Iterator[tuple[str, tuple[str, float]]]:
-    for symbol, words in _SI_WORDS.items():
-        for word in words.split():
-            yield word, (dimensions[symbol], 1.0)
-            for prefix, size in _PREFIX_WORDS.items():
-                yield f"{prefix}{word}", (dimensions[symbol], size)
-    for unit, words in _OTHERS.items():
-        yield from ((word, unit) for word in words.split())
-
-
-def dictionary(dimensions: Mapping[str, str]) -> dict[str, tuple[str, float]]:
-    """Dimension and factor to SI by each word in small letters; `dimensions` are those of the SI units."""
-    return dict(_words(dimensions))
-
-
 _PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 _BASES = {
     "m": "length",
@@ -142,25 +101,21 @@ _COMPOUND_UNITS = {
     "m/s^2": ("acceleration", 1.0),
     "m/s2": ("acceleration", 1.0),
     "g": ("acceleration", STANDARD_GRAVITY),
-    "N/m^2": ("pressure", 1.0),
-    "N/m2": ("pressure", 1.0),
-    "kN/m^2": ("pressure", 1e3),
-    "kN/m2": ("pressure", 1e3),
-    "N/mm^2": ("pressure", 1e6),
-    "N/mm2": ("pressure", 1e6),
-    "N/cm^2": ("pressure", 1e4),
-    "N/cm2": ("pressure", 1e4),
+    **{
+        f"{force}N/{length}{mark}2": ("pressure", size / area)
+        for force, size in (("", 1.0), ("k", 1e3))
+        for length, area in (("m", 1.0), ("cm", 1e-4), ("mm", 1e-6))
+        for mark in ("", "^")
+    },
 }
-_WORDS = dictionary(_BASES)
-_USUAL_PREFIXES = {
-    "Pa": "kMG",
-    "Hz": "mkMG",
-    "N": "mkMun",
-    "V": "mkun",
-    "m": "mun",
-    "C": "pnum",
-    "s": "mun",
-}  # usual prefixes
+_WORDS = {
+    f"{prefix}{word}": (_BASES[symbol], size)
+    for symbol, words in _SI_WORDS.items()
+    for size, prefixes in {1.0: "", **_PREFIX_WORDS}.items()
+    for prefix in prefixes.split() or [""]
+    for word in words.split()
+} | {word: unit for unit, words in _OTHERS.items() for word in words.split()}
+_USUAL_PREFIXES = {"Pa": "kMG", "Hz": "mkMG", "N": "mkMun", "V": "mkun", "m": "mun", "C": "pnum", "s": "mun"}
 _DIAMETER, _RADIUS = "indenter_diameter", "indenter_radius"
 _DECIBEL_WORD = r"d[eé][cz]ib[eè]l\w*|дБ|децибел\w*|分贝|デシベル"  # in the languages of instruments
 _DECIBEL = re.compile(

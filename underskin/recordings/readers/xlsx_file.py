@@ -10,7 +10,7 @@ ZIP archive of XML: its unpacked size is limited, and XML that declares entities
 import re
 import warnings
 import zipfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date, datetime, time
 from typing import Any, BinaryIO
@@ -22,7 +22,6 @@ from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import Contents, Document, together
 from underskin.recordings.readers import csv_file, csv_template, text
 from underskin.recordings.readers.parsing_limits import EXPANSION, ParsingLimits
-from underskin.recordings.readers.text import time_zone
 
 SEPARATOR = "\t"
 _WORKBOOK = "xl/workbook.xml"
@@ -34,130 +33,98 @@ _OTHERS = {
     "ppt/presentation.xml": "is a presentation: save the table as .xlsx or CSV",
 }
 _SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
-_FORMULA = re.compile(rb"<(\w+:)?f[\s/>]")
 _DECLARATION = re.compile(rb"<!(DOCTYPE|ENTITY)|<\0!\0(D\0O\0C|E\0N\0T)|\0<\0!\0(D\0O\0C|E\0N\0T)")
 _MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s+ref="([A-Z]{1,3})(\d{1,7}):\1(\d{1,7})"')  # down one column
-_BLOCK, _OVERLAP = 1 << 20, 64
+_NO_VALUE = re.compile(  # a formula without a stored value, which a text formula may have as an empty text
+    rb'<(?:\w+:)?c\s(?![^<>]*\bt="str")(?>[^<>]*?\br="(?P<cell>[A-Z]+\d+)")[^<>]*+>\s*<(?:\w+:)?f(?:\s[^<>]*)?(?:/>|>[^<]*</[^<>]*>)\s*'
+    rb"(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</[^<>]*>)?\s*</(?:\w+:)?c>"
+)
 _BLANKS = re.compile(r"\s+")
+_Merged = Collection[tuple[int, int, int]]  # column, from 0, first and last row of cells merged down a column
 
 
-class WorkbookSheets:
-    """The visible sheets of an open workbook; `notes`: warnings for the user.
-
-    Raises FileError where it is none, is damaged, or unpacks to more than the settings allow.
-    """
-
-    def __init__(self, stream: BinaryIO, file: str) -> None:
-        self._file = file
-        self._zone = time_zone()
-        self.notes: list[str] = []
-        self._merged: dict[str, set[tuple[int, int, int]]] = {}  # of each part: column, first and last row
+def _texts(stream: BinaryIO, file: str) -> tuple[dict[str, str], list[str]]:
+    """The text of each visible sheet that has any cell, and notes; raises FileError that names sheet and cell, where
+    the file is no workbook, is damaged, or unpacks to more than the settings allow."""
+    texts: dict[str, str] = {}
+    notes: dict[str, None] = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about unread parts
         with damage_said(file, "", lambda error: f"is a damaged workbook or ZIP archive: {error}"):
             with zipfile.ZipFile(stream) as archive:
-                has_formulas = self._inspected(archive, stream.seek(0, 2))
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # about unread parts
-                self._books = [self._opened(stream, values=True)]
-                if has_formulas:
-                    self._books.append(self._opened(stream, values=False))
-
-    @staticmethod
-    def _opened(stream: BinaryIO, *, values: bool) -> Any:
-        return openpyxl.load_workbook(stream, read_only=True, data_only=values, keep_links=False)
-
-    def _inspected(self, archive: zipfile.ZipFile, size: int) -> bool:
-        """Whether any sheet has a formula; every part is unpacked once, before it is parsed."""
-        names = archive.namelist()
-        if _WORKBOOK not in names:
-            descriptions = (what for name, what in _OTHERS.items() if name in names)
-            raise FileError(self._file, "", next(descriptions, "is a ZIP archive: send the files in it"))
-        remaining = most = ParsingLimits.from_environment().content_bytes(size)
-        formulas = False
-        for name in names:
-            with archive.open(name) as part:
-                end = b""
-                while data := part.read(_BLOCK):
-                    remaining -= len(data)
-                    if remaining < 0:
-                        reason = f"it unfolds to more than {most / 1e6:.0f} MB, too much for a file of its size"
-                        raise FileError(self._file, name, f"{reason} ({EXPANSION})")
-                    seen, end = end + data, data[-_OVERLAP:]
-                    if _DECLARATION.search(seen):
-                        raise FileError(self._file, name, "declares a document type or entities, as no workbook does")
-                    if _SHEETS.fullmatch(name):
-                        formulas = formulas or bool(_FORMULA.search(seen))
-                        self._merged.setdefault(name, set()).update(map(_span, _MERGED.finditer(seen)))
-        return formulas
-
-    def texts(self) -> Iterator[tuple[str, str]]:
-        """Each visible sheet that has any cell: its name and its text; raises FileError that names sheet and cell."""
-        for index, sheet in enumerate(self._books[0].worksheets):
+                parts = _inspected(archive, stream.seek(0, 2), file)
+            book = openpyxl.load_workbook(stream, read_only=True, data_only=True, keep_links=False)
+        for sheet in book.worksheets:
+            place = f"sheet {sheet.title!r}"
             if sheet.sheet_state != "visible":
-                self.notes.append(f"sheet {sheet.title!r} is hidden, and is left out")
+                notes[f"{place} is hidden, and is left out"] = None
                 continue
-            with (
-                warnings.catch_warnings(),
-                damage_said(self._file, f"sheet {sheet.title!r}", lambda error: f"is damaged: {error}"),
-            ):
-                warnings.simplefilter("ignore")
-                sheets = [book.worksheets[index] for book in self._books]
-                merged = self._merged.get(sheet._worksheet_path.lstrip("/"), set())
-                filled = _filled(self._rows(sheets), merged) if merged else self._rows(sheets)
-                rows = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in filled]
+            merged, unvalued = parts.get(sheet._worksheet_path.lstrip("/"), ((), ""))
+            if unvalued:
+                reason = "holds a formula without a value: open the workbook in a spreadsheet program and save it"
+                raise FileError(file, f"{place}, cell {unvalued}", reason)
+            with damage_said(file, place, lambda error: f"is damaged: {error}"):
+                sheet.reset_dimensions()  # what is declared may be wrong
+                filled = _filled(sheet.iter_rows(values_only=True), merged)
+                rows = [SEPARATOR.join(_text(cell, notes) for cell in row).rstrip(SEPARATOR) for row in filled]
             width = max((row.count(SEPARATOR) for row in rows), default=0)
-            lines = [row + SEPARATOR * (width - row.count(SEPARATOR)) for row in rows]
-            while lines and not lines[-1].strip():
-                lines.pop()
-            if lines:
-                yield sheet.title, "\n".join(lines)
-
-    def _rows(self, sheets: Sequence[Any]) -> Iterator[Sequence[Any]]:
-        """The values of each row of a sheet; `sheets`: the sheet with values and, if there are any, with formulas."""
-        for sheet in sheets:
-            sheet.reset_dimensions()  # what is declared may be wrong
-        if len(sheets) == 1:
-            yield from sheets[0].iter_rows(values_only=True)
-            return
-        for row, written in zip(*(sheet.iter_rows() for sheet in sheets), strict=True):
-            for cell, as_written in zip(row, written, strict=True):
-                # A text formula may have an empty text as its value.
-                if cell.value is None and as_written.data_type == "f" and cell.data_type != "str":
-                    reason = "holds a formula without a value: open the workbook in a spreadsheet program and save it"
-                    raise FileError(self._file, f"sheet {cell.parent.title!r}, cell {cell.coordinate}", reason)
-            yield [cell.value for cell in row]
-
-    def _text(self, value: Any) -> str:
-        """A cell as the CSV would have it."""
-        match value:
-            case None:
-                return ""
-            case bool():
-                return str(value).lower()
-            case int() | float():
-                return repr(value)
-            case datetime():
-                return self._zoned(value)
-            case date() | time():
-                return value.isoformat()
-        written = _BLANKS.sub(" ", str(value)).strip()
-        if "," in written and not text.is_grouped(written) and text.number(written, ",") is not None:
-            return written.replace(",", ".")  # as numbers are written here
-        return f'"{written.replace(chr(34), chr(34) * 2)}"' if '"' in written else written
-
-    def _zoned(self, moment: datetime) -> str:
-        note = f"times in cells are taken to be in the zone {self._zone} (UNDERSKIN_TIME_ZONE)"
-        if note not in self.notes:
-            self.notes.append(note)
-        return moment.replace(microsecond=0, tzinfo=self._zone).isoformat()
+            while rows and not rows[-1].strip():
+                rows.pop()
+            if rows:
+                texts[sheet.title] = "\n".join(row + SEPARATOR * (width - row.count(SEPARATOR)) for row in rows)
+    return texts, list(notes)
 
 
-def _span(merged: re.Match[bytes]) -> tuple[int, int, int]:
-    """Column, from 0, first and last row of cells that are merged down a column."""
-    column, first, last = merged.groups()
-    return column_index_from_string(column.decode()) - 1, int(first), int(last)
+def _inspected(archive: zipfile.ZipFile, size: int, file: str) -> dict[str, tuple[_Merged, str]]:
+    """The merged cells of each sheet, and its first formula without a value; every part is unpacked once, before it is
+    parsed."""
+    names = archive.namelist()
+    if _WORKBOOK not in names:
+        descriptions = (what for name, what in _OTHERS.items() if name in names)
+        raise FileError(file, "", next(descriptions, "is a ZIP archive: send the files in it"))
+    remaining = most = ParsingLimits.from_environment().content_bytes(size)
+    sheets: dict[str, tuple[_Merged, str]] = {}
+    for name in names:
+        with archive.open(name) as part:
+            data = part.read(remaining + 1)
+        remaining -= len(data)
+        if remaining < 0:
+            reason = f"it unfolds to more than {most / 1e6:.0f} MB, too much for a file of its size"
+            raise FileError(file, name, f"{reason} ({EXPANSION})")
+        if _DECLARATION.search(data):
+            raise FileError(file, name, "declares a document type or entities, as no workbook does")
+        if _SHEETS.fullmatch(name):
+            unvalued = _NO_VALUE.search(data)
+            spans = {
+                (column_index_from_string(column.decode()) - 1, int(first), int(last))
+                for column, first, last in _MERGED.findall(data)
+            }
+            sheets[name] = spans, unvalued["cell"].decode() if unvalued else ""
+    return sheets
 
 
-def _filled(rows: Iterator[Sequence[Any]], merged: Collection[tuple[int, int, int]]) -> Iterator[Sequence[Any]]:
+def _text(value: Any, notes: dict[str, None]) -> str:
+    """A cell as the CSV would have it; a note on local times is added."""
+    match value:
+        case None:
+            return ""
+        case bool():
+            return str(value).lower()
+        case int() | float():
+            return repr(value)
+        case datetime():
+            zone = text.time_zone()
+            notes[f"times in cells are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)"] = None
+            return value.replace(microsecond=0, tzinfo=zone).isoformat()
+        case date() | time():
+            return value.isoformat()
+    written = _BLANKS.sub(" ", str(value)).strip()
+    if "," in written and not text.is_grouped(written) and text.number(written, ",") is not None:
+        return written.replace(",", ".")  # as numbers are written here
+    return f'"{written.replace(chr(34), chr(34) * 2)}"' if '"' in written else written
+
+
+def _filled(rows: Iterator[Sequence[Any]], merged: _Merged) -> Iterator[Sequence[Any]]:
     """The rows, where a merged cell counts in every row with numbers that it spans: a heading over two rows does not
     count twice."""
     begins: dict[int, list[tuple[int, int]]] = {}
@@ -166,7 +133,7 @@ def _filled(rows: Iterator[Sequence[Any]], merged: Collection[tuple[int, int, in
     spanning: dict[int, tuple[int, Any]] = {}
     for number, row in enumerate(rows, 1):
         cells = [*row, *[None] * (max([*spanning, -1]) + 1 - len(row))]
-        if any(isinstance(cell, int | float) for cell in cells):
+        if spanning and any(isinstance(cell, int | float) for cell in cells):
             for column, (last, value) in spanning.items():
                 if number <= last and cells[column] is None:
                     cells[column] = value
@@ -177,78 +144,62 @@ def _filled(rows: Iterator[Sequence[Any]], merged: Collection[tuple[int, int, in
 
 def read(stream: BinaryIO, file: str) -> Contents | Document:
     """The campaign or the channels of a workbook; raises FileError that names sheet and line."""
-    book = WorkbookSheets(stream, file)
-    sheets = dict(book.texts())
+    sheets, notes = _texts(stream, file)
     if not sheets:
-        raise FileError(file, "", "; ".join(["has no sheet with anything in it", *book.notes]))
+        raise FileError(file, "", "; ".join(["has no sheet with anything in it", *notes]))
     campaigns = [name for name, text in sheets.items() if csv_template.is_template(text)]
     if len(campaigns) > 1:
-        raise FileError(
-            file, "", f"holds a campaign on each of the sheets {_listed(campaigns)}: save each as a workbook"
-        )
-    if campaigns:
-        document = _campaign(*_with_table(campaigns[0], sheets), file)
-        others = [f"sheet {name!r} is no campaign, and is left out" for name in sheets]
-        return replace(document, warnings=(*document.warnings, *others, *book.notes))
-    contents = _tables(sheets, file)
-    return replace(contents, warnings=(*contents.warnings, *book.notes))
+        several = f"holds a campaign on each of the sheets {_listed(campaigns)}: save each as a workbook"
+        raise FileError(file, "", several)
+    found = _campaign(campaigns[0], sheets, file) if campaigns else _tables(sheets, file)
+    return replace(found, warnings=(*found.warnings, *notes))
 
 
 def sheet_text(stream: BinaryIO, sheet: str | None = None) -> dict[str, Any]:
     """The `text` of a visible non-empty sheet with cells separated by tabs: the named or the only one; raises
     FileError."""
-    sheets = dict(WorkbookSheets(stream, "").texts())
-    wanted = list(sheets) if sheet is None else [name for name in sheets if name == sheet]
+    sheets, _ = _texts(stream, "")
+    wanted = [name for name in sheets if sheet in (None, name)]
     if len(wanted) != 1:
-        available = f"those with anything in them: {_listed(list(sheets))}" if sheets else "none has anything in it"
-        requirement = (
-            "one sheet with columns, or be sent with the name of one" if sheet is None else f"a sheet {sheet!r}"
-        )
-        raise FileError("", "", f"must have {requirement}; {available}")
+        available = f"those with anything in them: {_listed(sheets)}" if sheets else "none has anything in it"
+        one = "one sheet with columns, or be sent with the name of one" if sheet is None else f"a sheet {sheet!r}"
+        raise FileError("", "", f"must have {one}; {available}")
     return {"text": sheets[wanted[0]]}
 
 
-def _listed(names: list[str]) -> str:
+def _listed(names: Collection[str]) -> str:
     return ", ".join(map(repr, names))
 
 
-def _with_table(name: str, sheets: dict[str, str]) -> tuple[str, str]:
-    """Remove the campaign's sheet from `sheets`, with the only sheet that has a table where it has none: its place in
-    words, and its text."""
-    text = sheets.pop(name)
+def _campaign(name: str, sheets: dict[str, str], file: str) -> Document:
+    """The campaign of a sheet, with the table of the only other sheet that has one where it has none itself."""
+    place, written = f"sheet {name!r}", sheets.pop(name)
     tables = [other for other, below in sheets.items() if csv_template.has_table(below.partition("\n")[0])]
-    if csv_template.has_table(text) or len(tables) != 1:
-        return f"sheet {name!r}", text
-    (table,) = tables
-    return f"sheet {name!r} with sheet {table!r} under it", f"{text}\n\n{sheets.pop(table)}"
-
-
-def _campaign(place: str, text: str, file: str) -> Document:
+    if len(tables) == 1 and not csv_template.has_table(written):
+        place, written = f"{place} with sheet {tables[0]!r} under it", f"{written}\n\n{sheets.pop(tables[0])}"
     try:
-        return csv_template.of_text(text, file, place)
+        document = csv_template.of_text(written, file, place)
     except FileError as error:
         raise _at(place, error) from None
-
-
-def _on_sheet(name: str, error: FileError) -> FileError:
-    return _at(f"sheet {name!r}", error)
+    others = [f"sheet {name!r} is no campaign, and is left out" for name in sheets]
+    return replace(document, warnings=(*document.warnings, *others))
 
 
 def _at(place: str, error: FileError) -> FileError:
     return FileError(error.file, ", ".join(filter(None, (place, error.place))), error.reason, code=error.code)
 
 
-def _tables(sheets: dict[str, str], file: str) -> Contents:
+def _tables(sheets: Mapping[str, str], file: str) -> Contents:
     """The tables of all sheets; raises FileError where none holds one."""
     tables: dict[str, Contents] = {}
     errors: list[FileError] = []
     for name, sheet in sheets.items():
         try:
             tables[name] = csv_file.of_text(sheet, file)
-        except csv_file.NoTable as error:
-            errors.append(_on_sheet(name, error))
         except FileError as error:
-            raise _on_sheet(name, error) from None
+            errors.append(_at(f"sheet {name!r}", error))
+            if not isinstance(error, csv_file.NoTable):
+                raise errors[-1] from None
     if not tables:
         raise FileError(file, "", "; ".join(f"{error.place} {error.reason}" for error in errors))
     held = together(tables, "sheet {!r}", "sheet {!r}: {}")
