@@ -8,6 +8,7 @@ called alike but for their first word (`s01 |H|`, `s01 phase`, `s02 |H|`, …) a
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -80,7 +81,11 @@ _BY_WORDS = (  # of columns beside an FRF, and of properties: field, dimension, 
     ("dynamic_force_n", "force", r"dyn|din[aá]mic"),
     ("preload_n", "force", r"pre-?load|static|vorlast|vorkraft|pr[ée]charge|precar"),
     ("indenter_radius_mm", "length", rf"^(?!.*(sensor|taxel|{_SAMPLES}))(?=.*(radi[ou]|rayon|raggio))"),
-    ("sample_height_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(height|höhe|hauteur|altezza|altura))"),
+    (
+        "sample_height_mm",
+        "length",
+        rf"^(?=.*({_SAMPLES}))(?=.*(height|höhe|hauteur|altezza|altura|length|länge|longueur|lunghezza|longitud))",
+    ),
     ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLES}))(?=.*(dia|durchmesser|diá))"),
 )
 _OF_ROWS = ("dynamic_force_n", "preload_n", "indenter_radius_mm")  # fields that may be columns
@@ -233,7 +238,7 @@ def guessed(
 ) -> dict[str, Any]:
     """A first rig description from units and names of channels, columns of words and properties; `skin`: its known
     values; `dated`: whether each part of the file has its own time of recording."""
-    kind, fields = likely(columns)
+    kind, fields = likely(columns, properties)
     channels: dict[str, Any] = {}
     for column, field in zip(columns, fields, strict=True):
         if field and field not in channels:
@@ -250,8 +255,11 @@ def guessed(
     }
 
 
-def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
-    """The kind of recording, and the likely field of each channel; empty if there is no indication."""
+def likely(columns: Sequence[Column], properties: Mapping[str, Any] = MappingProxyType({})) -> tuple[str, list[str]]:
+    """The kind of recording, and the likely field of each channel; empty if there is no indication.
+
+    A file that states a sample's size, and no sphere, is of a sample between plates or clamps.
+    """
     dimensions = [column_unit.dimension if (column_unit := unit(column.unit)) else "" for column in columns]
     kind = "frf"
     charged = any("charge" in dimension for dimension in dimensions) or any(
@@ -259,7 +267,9 @@ def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
     )
     if "length" in dimensions and not charged:
         named = any(words in column.name.lower() for column in columns for words in _OF_COMPRESSION)
-        kind = "compression" if named else "indentation"
+        stated = _stated_names(properties)
+        sized = not stated.keys().isdisjoint(("sample_height_mm", "sample_diameter_mm"))
+        kind = "compression" if named or (sized and "indenter_radius_mm" not in stated) else "indentation"
     elif not charged and any(word in column.name.lower() for column in columns for word in _OF_SPRINGS):
         kind = "indentation"
     phases = "angle" in dimensions or any("phase" in column.name.lower() for column in columns)
