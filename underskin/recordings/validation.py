@@ -323,6 +323,7 @@ NotNegative = Annotated[float, not_negative]
 Declared = Annotated[float, declared]
 PoissonRatio = Annotated[float, poisson_ratio]
 Count = Annotated[int, count]
+Flag = Annotated[bool, flag]
 TimeOfDay = Annotated[str, time_of_day]
 Position = Annotated[tuple[float, float], position]
 Series = Annotated[Floats, series]
@@ -340,6 +341,7 @@ BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
         *("id", "kind", "sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "recorded_at", "load_cycles"),
         *("dwell_s", "position_mm", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence", "conditions"),
         *("sample_rate_hz", "force_n", "charge_pc", "displacement_mm", "time_s", "stage_stiffness_n_per_mm"),
+        "signs_checked",
         *("sample_height_mm", "sample_diameter_mm", "order", "time_of_day", "previous_preload_n", "x_mm", "y_mm"),
         *("phase", "day"),
     )
