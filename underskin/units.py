@@ -75,7 +75,7 @@ LAB: dict[str, LabField] = {
 
 GRAM_FORCE = 9.80665e-3  # N
 POUND_FORCE = 4.4482216152605  # N
-_FORCES = {"mN": 1e-3, "µN": 1e-6, "kN": 1e3, "gf": GRAM_FORCE, "kgf": 1e3 * GRAM_FORCE, "lbf": POUND_FORCE}
+FORCES = {"mN": 1e-3, "µN": 1e-6, "kN": 1e3, "gf": GRAM_FORCE, "kgf": 1e3 * GRAM_FORCE, "lbf": POUND_FORCE}
 _SAME_FORCE = 1.2  # largest ratio of two statements of one force
 _FINER = {"mm": ("µm", "nm"), "N": ("mN", "µN", "nN", "pN")}  # each a thousandth of the one before
 _LEAST_READABLE = 0.1  # of an axis' unit, below which its numbers are hard to read
@@ -225,11 +225,11 @@ def unit_guess(name: str, size: float, usual: tuple[float, float] | None = None)
 
 def force_unit(recorded_n: float, stated_n: float) -> UnitGuess | None:
     """The unit, other than N, in which a recorded force is the stated one; None where there is none."""
-    ratios = {unit: abs(np.log(abs(recorded_n) * factor / stated_n)) for unit, factor in _FORCES.items() if recorded_n}
+    ratios = {unit: abs(np.log(abs(recorded_n) * factor / stated_n)) for unit, factor in FORCES.items() if recorded_n}
     unit = min(ratios, key=ratios.__getitem__, default=None)
     if unit is None or ratios[unit] > np.log(_SAME_FORCE):
         return None
-    return UnitGuess(recorded_n, "N", meant=((recorded_n * _FORCES[unit], unit),))
+    return UnitGuess(recorded_n, "N", meant=((recorded_n * FORCES[unit], unit),))
 
 
 def _nearest(candidates: Sequence[tuple[float, str]], middle: float) -> tuple[tuple[float, str], ...]:

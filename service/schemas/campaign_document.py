@@ -49,6 +49,7 @@ _OF_CHECK: Mapping[Callable[..., Any], Schema] = {
     field.positive: {"type": "number", "exclusiveMinimum": 0},
     field.not_negative: {"type": "number", "minimum": 0},
     field.poisson_ratio: {"type": "number", "minimum": 0, "maximum": INCOMPRESSIBLE},
+    field.flag: {"type": "boolean"},
     field.count: {"type": "integer", "minimum": 0, "maximum": field.LARGEST_COUNT},
     field.time_of_day: {**_NAME, "pattern": r"^\d{4}", "examples": ["2017-05-03T09:00:00Z"]},
     field.position: {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
@@ -106,6 +107,7 @@ _WORDS: Mapping[str, str] = {
     "displacement_mm": "Displacement, one entry a sample, loading and unloading in order, compression positive [mm].",
     "time_s": "Time of each sample, not falling [s].",
     "stage_stiffness_n_per_mm": "Stiffness of a stage or cantilever whose deflection has been subtracted [N/mm].",
+    "signs_checked": "True: force and displacement are compression positive as they stand, and are never turned round.",
     "sample_height_mm": "Height of the cylinder [mm].",
     "sample_diameter_mm": "Diameter of the cylinder [mm].",
 }

@@ -48,11 +48,11 @@ def refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_d
 
 
 def in_words(document: Mapping[str, Any]) -> str:
-    """A report's verdict and headline, and on the next line its statement."""
+    """A report's headline with its verdict, and on the next line its statement."""
     from underskin.diagnosis.reporting.headline import first_and_rest
 
     first, _ = first_and_rest(document)
-    return f"{document['verdict']}: {first}.\n{document['statement']}"
+    return f"{first} ({document['verdict']}).\n{document['statement']}"
 
 
 def write_report(document: dict[str, Any], path: Path) -> None:

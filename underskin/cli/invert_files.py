@@ -40,6 +40,12 @@ _HEADER = (
 )  # fmt: skip
 
 
+_TO_QUOTE = (
+    "this d33 holds if the paper's model describes these recordings, which is assumed here and not tested: before it "
+    "is quoted, `underskin diagnose` should find nothing missing"
+)
+
+
 @dataclass(frozen=True)
 class InvertedFile:
     """An inverted file, or several as one campaign: the reading, its d33 or the reason for none, and its moduli."""
@@ -82,6 +88,7 @@ class InvertedFile:
         ]
         notes += left_out_lines((recording, str(why)) for recording, why in refused)
         if isinstance(self.inversion, Inversion):
+            notes.append(_TO_QUOTE)
             notes += [f"left out: {omission.sentence}" for omission in self.inversion.left_out]
         return notes
 

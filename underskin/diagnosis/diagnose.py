@@ -70,14 +70,14 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        At least two, one of them with FRFs.
+        At least two. Without FRFs their curves are diagnosed as those of one campaign.
     name
         The campaigns' common name in the report.
 
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns, none with FRFs, skins that are declared differently, or FRFs in two campaigns.
+        Fewer than two campaigns, skins that are declared differently, or FRFs in two campaigns.
     """
     campaigns_read = [_campaign(campaign) for campaign in campaigns]
     document = several.diagnose_together(campaigns_read, table or load_table(), name, without, progress)

@@ -19,6 +19,7 @@ from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.modulus import modulus_over_answers
 from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
+from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search
 from underskin.diagnosis.selection.unlisted_search import with_laws
 from underskin.diagnosis.slips.curve_unit_errors import without_inconsistent
@@ -44,12 +45,13 @@ from underskin.diagnosis.validation.signatures import (
 )
 from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
+from underskin.findings.formatting import times_in_words
 from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, ActiveCatalogue
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.curve_course import contact_events
-from underskin.recordings.curve_preparation import prepared
+from underskin.recordings.curve_preparation import as_other_load, prepared
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -172,22 +174,54 @@ def _diagnose_curves(
     progress: Progress,
     limits: RigLimits,
 ) -> DiagnosisResult:
-    mechanisms.bind(campaign, table, kind)
-    rows = replace(curve_lines(campaign, kind), mechanisms=mechanisms)
     partial = partial.with_findings(*(event for curve in campaign.curves for event in contact_events(curve)))
 
-    def fit(
-        curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
-    ) -> tuple[FittingProblem, Search]:
-        problem = FittingProblem(rows, table, curve_likelihood)
-        return problem, search(problem, required_sets=required_sets)
+    def searched(curves: Campaign) -> KindsTogether:
+        active = ActiveCatalogue(mechanisms.without)
+        active.bind(curves, table, kind)
+        rows = replace(curve_lines(curves, kind), mechanisms=active)
 
-    joined = other_kinds.joined(fit)
+        def fit(
+            curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
+        ) -> tuple[FittingProblem, Search]:
+            problem = FittingProblem(rows, table, curve_likelihood)
+            return problem, search(problem, required_sets=required_sets)
+
+        return other_kinds.joined(fit)
+
+    joined = searched(campaign)
+    if (other_load := as_other_load(campaign)) is not None:
+        campaign, joined, findings = _pulled_or_pressed((campaign, joined), (other_load, searched(other_load)))
+        partial = partial.with_findings(*findings)
     problem, result = joined.problem, joined.search
     result = replace(result, laws=tuple(with_laws(problem, result)))
     modulus = modulus_over_answers(result, problem, result.fit_behind(result.answers[0]))
     partial = partial.with_findings(*thickness_findings(campaign, problem, result, modulus))
     return _complete(replace(partial, curves=campaign, joined=joined), problem, result, progress, limits)
+
+
+_Searched = tuple[Campaign, KindsTogether]
+
+
+def _pulled_or_pressed(stated: _Searched, other: _Searched) -> tuple[Campaign, KindsTogether, list[Finding]]:
+    """Blocks by the stated signs or as under the other load, by the evidence of all sets of mechanisms under each, with
+    equal prior odds; and the finding where it is the other, or stays open.
+
+    It is the other if its base model alone outweighs all that the stated signs offer. Mechanisms that may bend a curve
+    either way leave it open.
+    """
+    ours, theirs = stated[1].search, other[1].search
+    least = least_evidence(ours.explanations[0])
+    curve = next(curve for curve, turned in zip(stated[0].curves, other[0].curves, strict=True) if curve is not turned)
+    is_pulled = bool(np.nansum(curve.force_n) < 0)  # by the stated signs
+    is_open = [Finding(Reason.PULLED_OR_PRESSED, curve.id, "force_n", {"pulled": is_pulled})]
+    if theirs.log_total < ours.log_total + least:
+        return *stated, is_open if theirs.log_total > ours.log_total - least else []
+    plain = max(theirs.log_weight(fitted) for fitted in theirs.explanations if not fitted.names) - ours.log_total
+    if plain < least:
+        return *other, is_open
+    arguments = {"pulled": not is_pulled, "less": times_in_words(plain)}
+    return *other, [Finding(Reason.COUNTED_AS_OTHER_LOAD, curve.id, "force_n", arguments)]
 
 
 def _complete(

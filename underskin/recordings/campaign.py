@@ -173,7 +173,8 @@ class IndentationConditions(_OfAKind):
     """A sphere pressed in and drawn back by `displacement_mm`, loading and unloading in order.
 
     `displacement_mm` is that of the sphere. `stage_stiffness_n_per_mm` is that of a stage or cantilever whose
-    deflection has been subtracted; it determines the pull-off of an adhesive contact.
+    deflection has been subtracted; it determines the pull-off of an adhesive contact. `signs_checked`: force and
+    displacement have the signs that they should, whatever the curve looks like.
     """
 
     id: field.Name
@@ -188,6 +189,7 @@ class IndentationConditions(_OfAKind):
     dwell_s: field.NotNegative | None = None
     position_mm: field.Position | None = None
     stage_stiffness_n_per_mm: field.Positive | None = None
+    signs_checked: field.Flag | None = None
     conditions: Further | None = None
 
 
@@ -205,6 +207,7 @@ class CompressionConditions(_OfAKind):
     recorded_at: field.TimeOfDay | None = None
     load_cycles: field.Count | None = None
     dwell_s: field.NotNegative | None = None
+    signs_checked: field.Flag | None = None
     conditions: Further | None = None
     has_sphere = False
 

@@ -24,7 +24,7 @@ from underskin.recordings.campaign import (
     IndentationRecording,
     SkinDescription,
 )
-from underskin.units import Floats, Indices, Mask
+from underskin.units import FORCES, Floats, Indices, Mask
 
 _BEYOND_NOISE = 3.0  # standard deviations; a false jump only ends a mean early
 
@@ -107,6 +107,7 @@ _LOW = 0.3  # of the range of force: the foot of a contact
 _AIR_NOISES, LEAST_CONTACT = 4.0, 1e-3  # standard deviations, and of the largest force: less is out of contact
 _LINE = 3  # samples, of which a straight line leaves scatter
 _RISE = 0.02  # of the range of force: below it a sphere has not yet pressed
+PACE = 0.5  # of the stage's speed: creep is slower
 
 
 @dataclass(frozen=True)
@@ -230,6 +231,20 @@ def foot(displacement: Floats, force: Floats) -> int | None:
         return float(about @ about) - (float(hertz @ about) ** 2 / square if square > 0 else 0.0)
 
     return int(np.argmax(displacement > _least(travel, misfit)[1]))
+
+
+def creeps_under_force(displacement: Floats, force: Floats, time: Floats, noise: Floats) -> bool:
+    """Whether a sphere sinks in under a held force, by samples and their `noise` of force (samples,): up to the deepest
+    one the force stays within noise, over some of the travel and at less than half of the speed before."""
+    turn = int(np.argmax(displacement))
+    off = np.abs(force[: turn + 1] - force[turn]) > _AIR_NOISES * np.hypot(noise[: turn + 1], noise[turn])
+    first = turn + 1 - int(np.argmax(off[::-1])) if off.any() else 0
+    begun = np.flatnonzero(force[:first] > force[turn] / 2)  # the second half of the force's rise
+    if not len(begun) or not time[turn] > time[first] > time[begun[0]]:
+        return False
+    sunk, risen = displacement[turn] - displacement[first], displacement[first] - displacement[begun[0]]
+    slows = sunk / (time[turn] - time[first]) < PACE * risen / (time[first] - time[begun[0]])
+    return bool(slows and sunk > RETURN * np.ptp(displacement))
 
 
 def presses_again(displacement: Floats) -> bool:
@@ -510,15 +525,16 @@ def _is_plausible_drift(
     return noise < _QUIET * float(np.ptp(force))
 
 
-FAR = 100.0  # times the declared modulus, or the other curves'
-_RUBBER_MPA = 0.003, 300.0
-_ELASTOMER_MPA = 0.02, 300.0  # from gels to the hardest polyurethanes
+# Times the declared modulus, or the other curves': half of a gram-force over a newton, the smallest slip that is told
+FAR = 0.5 / FORCES["gf"]
+# Solid elastomers end near 100 MPa (Ashby, Materials Selection in Mechanical Design, 3rd ed., appendix: 0.002 to 0.1
+# GPa); the softest gels that hold a shape have some kPa
+_RUBBER_MPA = 0.003, 100.0
+_ELASTOMER_MPA = 0.02, 100.0  # without the softest gels
 _AS_NEAR = 1.0  # decades: slips within it of the best one are named too
 # For each slip of units, the decades by which force and displacement are corrected
 _SLIPS = {
-    "N for mN": (-3, 0),
-    "N for µN": (-6, 0),
-    "N for kN": (3, 0),
+    **{f"N for {unit}": (float(np.log10(in_newtons)), 0) for unit, in_newtons in FORCES.items()},
     "mm for m": (0, 3),
     "mm for µm": (0, -3),
     "mm for nm": (0, -6),

@@ -24,7 +24,7 @@ from underskin.errors import unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, CurveRecording, samples_of
-from underskin.recordings.curve_course import RETURN, is_one_sided, roughness, turning_points
+from underskin.recordings.curve_course import PACE, RETURN, is_one_sided, roughness, turning_points
 from underskin.recordings.damaged_readings import marks, reading_steps, spikes, without_damaged
 from underskin.recordings.periodic_error import periodic_error
 from underskin.units import Floats, Indices, Mask
@@ -47,13 +47,16 @@ class Orientation:
 
     `turns` are the samples at which the travel turns, with the first and the last. `is_deep_end_known` is whether the
     deep end follows from the stiffness, rather than being assumed from the direction of the first movement.
-    `may_be_pulled`: both columns of a block are negative, which is right for tension.
+    `may_be_pulled`: both columns of a block are negative, which is right for tension. `bends_as_other`: a block has the
+    signs of one load, and its curve bends as under the other: a solid softens as it is pulled and stiffens as it is
+    pressed, a foam the other way round.
     """
 
     negative: tuple[str, ...]
     turns: Indices
     is_deep_end_known: bool
     may_be_pulled: bool = False
+    bends_as_other: bool = False
 
 
 _UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_deep_end_known=False)
@@ -65,9 +68,11 @@ def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
 
 
 def orientation(recording: CurveRecording) -> Orientation:
-    """The signs of a recording by its finite samples; `turns` are indices among these."""
+    """The signs of a recording by its finite samples; `turns` are indices among these. Signs that are checked hold."""
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
     oriented = _oriented(force, travel, sphere=recording.has_sphere)
+    if recording.signs_checked:
+        return replace(oriented, negative=(), may_be_pulled=False, bends_as_other=False)
     is_pulled = oriented.may_be_pulled and np.nanmax(np.abs(travel)) > _LONGEST * recording.height_mm
     return replace(oriented, negative=(), may_be_pulled=False) if is_pulled else oriented
 
@@ -91,8 +96,12 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
         return Orientation((), turns, is_deep_end_known=False)
     if not sphere:
         reversed_columns = _of_block(force, travel, relative_sign)
-        may_be_pulled = len(reversed_columns) > 1 and is_one_sided(force)
-        return Orientation(reversed_columns, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled)
+        one_sided = is_one_sided(force)
+        may_be_pulled = len(reversed_columns) > 1 and one_sided
+        bends_as_other = may_be_pulled or (not reversed_columns and one_sided and _softens(force, travel))
+        return Orientation(
+            reversed_columns, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled, bends_as_other=bends_as_other
+        )
     deep = _deep_side(force, travel, turns, relative_sign)
     side = deep or _first_movement(travel)
     negative = ((FORCE, relative_sign * side < 0), (TRAVEL, side < 0))
@@ -224,6 +233,15 @@ def turned(campaign: Campaign) -> tuple[Campaign, int]:
     return campaign.with_curves(lambda curve: with_turned(curve, counted_negative(curve))), changed
 
 
+def as_other_load(campaign: Campaign) -> Campaign | None:
+    """The campaign with the signs of both columns reversed of all its blocks whose curves bend as under the other load;
+    None without one."""
+    blocks = {curve.id for curve in campaign.curves if not curve.has_sphere and orientation(curve).bends_as_other}
+    if not blocks:
+        return None
+    return campaign.with_curves(lambda curve: with_turned(curve, (FORCE, TRAVEL)) if curve.id in blocks else curve)
+
+
 def with_turned(recording: CurveRecording, fields: tuple[str, ...]) -> CurveRecording:
     """A curve with the signs of these columns reversed."""
     columns = {name: -np.asarray(getattr(recording, name)) for name in fields}
@@ -325,7 +343,7 @@ def _follows(load: Floats, travel: Floats) -> bool:
 _EQUAL = 5  # least number of consecutive equal samples of a saturated force
 _MOVED = 0.02  # of the range of travel: least travel during them
 _LONGER = 4.0  # times the longest run of any other value: steps of a converter are equally long everywhere
-_MOST_OF_WAY, _PACE = 0.75, 0.5  # of the travel at the limit, and of the stage's speed, at least: creep is slower
+_MOST_OF_WAY = 0.75  # of the travel at the limit
 _DEEP = 0.8  # share of the other samples that lie less deep than the saturated ones
 _NOISE_BAND = 7.0  # standard deviations that hold a thousand samples of one value
 _DIGITS, _ROUNDED = 9, 1e-6  # of the range of force, and of a width at its edge: below are errors of rounding
@@ -401,7 +419,7 @@ def _keeps_pace(inside: Floats, outside: Floats) -> bool:
     count = int(np.argmax(moved >= _MOST_OF_WAY * moved.max()))
     outside_count = min(count, len(outside) - 1)
     return outside_count > 0 and bool(
-        moved[count] / count > _PACE * abs(outside[outside_count] - outside[0]) / outside_count
+        moved[count] / count > PACE * abs(outside[outside_count] - outside[0]) / outside_count
     )
 
 

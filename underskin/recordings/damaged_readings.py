@@ -80,5 +80,24 @@ def reading_steps(travel: Floats, force: Floats) -> Floats:
         expected = stiffness * abs(moved[sample])
         is_loaded = loaded[sample] > _SUDDEN * noise and expected > _SUDDEN * max(noise, abs(changed[sample]))
         if is_loaded and len(beside) and abs(moved[sample]) > _SUDDEN * beside.max():
-            steps[sample] = moved[sample] - np.median(moved[sample + 1 : sample + 1 + _BESIDE])
+            steps[sample] = _step(travel, force, sample)
     return steps
+
+
+def _step(travel: Floats, force: Floats, sample: int) -> float:
+    """The jump of the reading before a sample: what it moved beyond the steps on both sides.
+
+    Where the travel turns there, these tell nothing of the step between: the force does, by the straight line over the
+    travel through the samples on either side, of one slope for both.
+    """
+    parts = [slice(max(sample - _BESIDE, 0), sample), slice(sample, sample + _BESIDE)]
+    before, after = (float(np.median(np.diff(travel[part]))) for part in parts)
+    if before * after > 0:
+        return float(travel[sample] - travel[sample - 1]) - after
+    at, load = (np.array([column[part].mean() for part in parts]) for column in (travel, force))
+    away, rest = (
+        np.concatenate([column[part] - mean for part, mean in zip(parts, means, strict=True)])
+        for column, means in ((travel, at), (force, load))
+    )
+    slope = float(away @ rest) / float(away @ away)
+    return float(at[1] - at[0] - (load[1] - load[0]) / slope)

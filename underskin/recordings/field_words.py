@@ -46,7 +46,11 @@ WORDS: tuple[tuple[str, str, str], ...] = (
         rf"^(?!.*({_SENSOR}|{_SAMPLE}|[ck]onta[ck]t))(?=.*({_RADIUS}|({_SPHERE}).*({_DIAMETER})))",
     ),
     ("indenter_radius_mm", "length", rf"^(?!.*({_SENSOR}|{_SAMPLE})).*({_DIAMETER}).*({_SPHERE})"),
-    ("sample_height_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(height|höhe|hauteur|altezza|altura))"),
+    (
+        "sample_height_mm",
+        "length",
+        rf"^(?=.*({_SAMPLE}))(?=.*(height|höhe|hauteur|altezza|altura|length|länge|longueur|lunghezza|longitud))",
+    ),
     ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(dia|durchmesser|diá))"),
     ("thickness_mm", "length", rf"\b({_THICKNESS})\b"),
     ("youngs_modulus_mpa", "pressure", r"young|\be[ -]?mod|[eé]l[aá]sti[ckqz]"),

@@ -207,6 +207,12 @@ class RigDescription:
     join: tuple[str, tuple[str, ...]] | None = None
 
     @property
+    def has_stated_signs(self) -> bool:
+        """Whether it states the signs of force and displacement of a curve, each as 1 or -1."""
+        signs = {self.channels[name].sign for name in _OF_CURVES if name in self.channels}
+        return self.channels.keys() >= set(_OF_CURVES) and signs <= {1, -1}
+
+    @property
     def row_fields(self) -> Iterator[SignalMapping]:
         """The columns that hold fields of the recording, each value once for all rows of one."""
         for value in self.recording.values():

@@ -8,6 +8,7 @@ called alike but for their first word (`s01 |H|`, `s01 phase`, `s02 |H|`, …) a
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -214,7 +215,7 @@ def guessed(
 ) -> dict[str, Any]:
     """A first rig description from units and names of channels, columns of words and properties; `skin`: its known
     values; `dated`: whether each part of the file has its own time of recording."""
-    kind, fields = likely(columns)
+    kind, fields = likely(columns, properties)
     channels: dict[str, Any] = {}
     for column, field in zip(columns, fields, strict=True):
         if field and field not in channels:
@@ -231,8 +232,11 @@ def guessed(
     }
 
 
-def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
-    """The kind of recording, and the likely field of each channel; empty if there is no indication."""
+def likely(columns: Sequence[Column], properties: Mapping[str, Any] = MappingProxyType({})) -> tuple[str, list[str]]:
+    """The kind of recording, and the likely field of each channel; empty if there is no indication.
+
+    A file that states a sample's size, and no sphere, is of a sample between plates or clamps.
+    """
     dimensions = [_dimension(column) for column in columns]
     kind = "frf"
     charged = any("charge" in dimension for dimension in dimensions) or any(
@@ -240,7 +244,9 @@ def likely(columns: Sequence[Column]) -> tuple[str, list[str]]:
     )
     if "length" in dimensions and not charged:
         named = any(words in column.name.lower() for column in columns for words in _OF_COMPRESSION)
-        kind = "compression" if named else "indentation"
+        stated = _stated_names(properties)
+        sized = not stated.keys().isdisjoint(("sample_height_mm", "sample_diameter_mm"))
+        kind = "compression" if named or (sized and "indenter_radius_mm" not in stated) else "indentation"
     elif not charged and any(word in column.name.lower() for column in columns for word in _OF_SPRINGS):
         kind = "indentation"
     phases = "angle" in dimensions or any("phase" in column.name.lower() for column in columns)

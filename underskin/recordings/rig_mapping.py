@@ -147,7 +147,7 @@ class MappedBlock:
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
         self._require_stated_sign(columns)
-        return self._of_kind(columns)
+        return self._of_kind(columns) | ({"signs_checked": True} if self.rig.has_stated_signs else {})
 
     def _of_kind(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Curves with the times that the sample rate gives."""

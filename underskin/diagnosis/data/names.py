@@ -18,6 +18,13 @@ SIMPLEST: Mapping[Kind, str] = {  # the name of the model without mechanisms, fo
 }
 
 
+_PLAIN = {  # of parameters whose names need an explanation
+    "youngs_modulus": "Young's modulus",
+    "second_over_first": "Yeoh's c₂ over c₁",
+    "pickup_charge": "charge picked up",
+}
+
+
 def in_words(names: Sequence[str]) -> str:
     """An answer's names in a sentence."""
     special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something unlisted"}
@@ -27,5 +34,5 @@ def in_words(names: Sequence[str]) -> str:
 def quantity_in_words(parameter: str) -> str:
     """A quantity of a skin, or `mechanism.parameter`, in a sentence: "tip mass of contact resonance"."""
     mechanism, _, name = parameter.rpartition(".")
-    called = {"youngs_modulus": "Young's modulus"}.get(name, name.replace("_", " "))
+    called = _PLAIN.get(name, name.replace("_", " "))
     return f"{called} of {in_words([mechanism])}" if mechanism else called

@@ -41,6 +41,7 @@ from underskin.recordings.campaign import Campaign
 _STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})
 # Mechanisms that stiffen the response with depth, as a layer on a stiff base does
 _STIFFENS = (*_STIFFER_WITH_DEPTH, "compressible_layer")
+_ALONG_CURVE = ("displacement_mm", "force_n")  # axes along which the contact's force grows itself
 _LARGEST_FLOOR = 20.0  # % of the response: noise above which no d33 is quoted
 
 
@@ -106,7 +107,8 @@ class Facts:
             return "ambiguous"
         if self.leader.names == (NOTHING_MISSING,):
             return "no_mismatch"
-        certain = self.leader.probability >= EXPLAINED and not self.idle and not self._may_be_the_other
+        certain = self.leader.probability >= EXPLAINED and not self.idle and not self.doubts
+        certain = certain and not self._may_be_the_other
         return "explained" if certain else "ambiguous"
 
     @cached_property
@@ -128,28 +130,32 @@ class Facts:
         return self.problem.kind == "indentation" and self.problem.lines.campaign.skin.thickness_mm is None
 
     @property
-    def other_thickness(self) -> list[str]:
-        """A clause on a layer of another thickness than the declared one, where the curves show it as well."""
-        return self._statements(Reason.THICKNESS_DIFFERS)
+    def curves_differ(self) -> list[str]:
+        """Clauses on curves whose moduli contradict each other, or that may be of a pulled or of a pressed sample."""
+        reasons = (Reason.CURVES_DIFFER, Reason.PULLED_OR_PRESSED)
+        return [finding.statement for finding in self.diagnosis.findings if finding.reason in reasons]
 
     @property
-    def curves_differ(self) -> list[str]:
-        """A clause on curves whose moduli contradict each other."""
-        return self._statements(Reason.CURVES_DIFFER)
-
-    def _statements(self, reason: Reason) -> list[str]:
-        return [finding.statement for finding in self.diagnosis.findings if finding.reason == reason]
+    def doubts(self) -> list[str]:
+        """Clauses on what speaks against the leading set: `curves_differ`, a layer of another thickness than the
+        declared one that the curves show as well, or held-out parts that the set predicts no better than the base
+        model, and far from their noise."""
+        _, after = cross_validation.total(self.diagnosis.groups)
+        is_far = after.recordings and after.rmse_percent > cross_validation.FAR_ABOVE * after.floor_percent
+        return self.curves_differ + [
+            finding.statement
+            for finding in self.diagnosis.findings
+            if finding.reason == Reason.THICKNESS_DIFFERS
+            or (finding.reason == Reason.HELD_OUT_NO_BETTER and finding.arguments["shows"] and is_far)
+        ]
 
     @property
     def _may_be_the_other(self) -> bool:
-        """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens with depth, or a
-        declared one may be wrong.
+        """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens with depth.
 
         That is so where the evidence of one in place of the other is above that which an idealised contact law may
         have.
         """
-        if self.other_thickness:
-            return True
         names = frozenset(self.shown.names)
         stiffening = names & _STIFFER_WITH_DEPTH
         if not self._has_unknown_thickness or len(stiffening) != 1:
@@ -188,10 +194,11 @@ class Facts:
         after = self._errors(self.shown, self.scores[1], outside[1])
         if self.problem.lines.curves:
             before["youngs_modulus"] = modulus_under(self.problem, self.base)
-            # An unlisted law that predicts held-out parts no better is no description, under which E would hold
-            is_no_better = outside[1].recordings and outside[1].rmse_percent >= outside[0].rmse_percent
             modulus = modulus_over_answers(self.search, self.problem, self.shown)
-            if modulus is not None and not (self.leading is not None and is_no_better):
+            is_no_better = outside[1].recordings and outside[1].rmse_percent >= outside[0].rmse_percent
+            if modulus is not None and not (
+                self._is_open(modulus, before["youngs_modulus"]) or (self.leading is not None and is_no_better)
+            ):
                 after["youngs_modulus"] = modulus
         return {
             "before": before,
@@ -215,6 +222,17 @@ class Facts:
                 "smooth_percent": rounded(100 * levels.smooth),
             },
         }
+
+    def _is_open(self, modulus: Mapping[str, Any], base: Mapping[str, Any]) -> bool:
+        """Whether the curves do not determine E: they may be of a sample that is pulled or pressed, or a force that an
+        unlisted law adds along the depth has taken up part of the contact's own: E by that law then is one of many, and
+        its interval excludes that of the base model."""
+        if any(finding.reason == Reason.PULLED_OR_PRESSED for finding in self.diagnosis.findings):
+            return True
+        law = self.leading
+        if law is None or law.combination[0] != "force" or law.combination[1] not in _ALONG_CURVE:
+            return False
+        return bool(modulus["high"] < base["low"] or modulus["low"] > base["high"])
 
     def _errors(
         self,

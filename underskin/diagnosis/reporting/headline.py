@@ -5,10 +5,10 @@ a reader needs them: a slip in the recordings, the answer, the number to quote, 
 fit is left out.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from underskin.diagnosis.data.names import EXPLAINED, MOST_QUOTED, NAMED, in_words
+from underskin.diagnosis.data.names import EXPLAINED, MOST_QUOTED, NAMED, in_words, quantity_in_words
 from underskin.diagnosis.reporting.numbers import is_known
 from underskin.diagnosis.reporting.statement import SLIPS
 from underskin.diagnosis.reporting.wording import finding, in_its_unit, number, readable, unit
@@ -18,6 +18,8 @@ from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 
 WORDS = 20  # read at a glance
 _DIGITS = 3
+_DOUBTS = (FindingCode.THICKNESS_DIFFERS, FindingCode.PULLED_OR_PRESSED)
+_LAYER = "layered_contact"  # the name of the law, which says little to who reads a headline alone
 
 Document = Mapping[str, Any]
 
@@ -49,10 +51,13 @@ def within_words(parts: Iterable[str], kept: str = "") -> str:
 
 
 def _parts(report: Document) -> Iterator[str]:
-    slips = [entry for entry in report.get("findings", ()) if entry["code"] in (*SLIPS, FindingCode.CURVES_DIFFER)]
-    slip = finding(slips[0]["code"]) if slips else ""
-    yield slip
-    yield next(answer for answer in _answers(report) if len(f"{slip} {answer}".split()) <= WORDS)
+    named = (*SLIPS, FindingCode.CURVES_DIFFER)
+    slips = [finding(entry["code"]) for entry in report.get("findings", ()) if entry["code"] in named]
+    for slip in (*(slips[:1] or _doubts(report)), ""):
+        fitting = [answer for answer in _answers(report) if len(f"{slip} {answer}".split()) <= WORDS]
+        if fitting:
+            yield from (slip, fitting[0])
+            break
     yield _to_quote(report)
     planned = report.get("next_experiment")
     if report["verdict"] == "ambiguous" and planned and planned["recordings"]:
@@ -61,18 +66,24 @@ def _parts(report: Document) -> Iterator[str]:
         yield f"{recordings} may decide ({in_percent(planned['probability_of_deciding'])})"
 
 
+def _doubts(report: Document) -> list[str]:
+    """That the declared thickness or the stated signs may be wrong, which an answer for these would hide."""
+    doubtful = (entry["statement"] for entry in report.get("findings", ()) if entry["code"] in _DOUBTS)
+    return [words.partition(":")[0] for words in doubtful]
+
+
 def _answers(report: Document) -> Iterator[str]:
-    """The answer, the fullest first; the last fits always."""
+    """The answer, the fullest first; the last fits beside any slip."""
     verdict, probability = report["verdict"], in_percent(report["probability"] or 0.0)
     mechanisms = report["mechanisms"]
-    names = in_words([mechanism["name"] for mechanism in mechanisms])
+    names = _named([mechanism["name"] for mechanism in mechanisms])
     if verdict == "insufficient_data":
         first = report["statement"].partition(". ")[0].rstrip(".")
         if "_" not in first:  # names of fields are for those who correct them
             yield first
         yield "nothing can be concluded from these recordings"
     elif verdict == "no_mismatch":
-        rivals = [in_words(rival["mechanisms"]) for rival in _rivals(report)]
+        rivals = [_named(rival["mechanisms"]) for rival in _rivals(report)]
         if (report["probability"] or 0.0) < EXPLAINED and rivals:
             yield f"nothing may be missing ({probability}), or {' or '.join(rivals)}"
         yield (
@@ -83,7 +94,7 @@ def _answers(report: Document) -> Iterator[str]:
     elif verdict == "unexplained":
         law = report.get("unnamed")
         if law is not None:
-            change = f"a change of {acted_on(law['acts_on'], law['axis'])} over {followed(law['axis'])}"
+            change = f"the {acted_on(law['acts_on'], law['axis'])} changes with {followed(law['axis'])}"
             yield f"no known mechanism describes this ({probability}): {change}"
         yield f"something is missing that no known mechanism describes ({probability})"
     elif verdict == "explained":
@@ -95,15 +106,20 @@ def _answers(report: Document) -> Iterator[str]:
     else:
         certain = [group for group in report.get("presence", ()) if group["probability"] >= EXPLAINED]
         for group in certain:
-            either = " or ".join(in_words([name]) for name in group["mechanisms"])
+            either = " or ".join(_named([name]) for name in group["mechanisms"])
             yield f"{either} ({in_percent(group['probability'])}), not settled"
         if (report["probability"] or 0.0) >= EXPLAINED:
             yield f"{names or 'nothing missing'} ({probability}), not settled"
         remaining = (
             "many explanations remain" if not _rivals(report) else f"{1 + len(_rivals(report))} explanations remain"
         )
-        yield f"{remaining}, the best: {names or 'nothing missing'} ({probability})"
+        yield f"{remaining}, best: {names or 'nothing missing'} ({probability})"
         yield remaining
+
+
+def _named(names: Sequence[str]) -> str:
+    """Mechanisms in the words of mechanics."""
+    return in_words(["thin layer" if name == _LAYER else name for name in names])
 
 
 def _rivals(report: Document) -> list[Document]:
@@ -114,7 +130,7 @@ def _with_strength(mechanism: Document) -> str:
     """A mechanism with where it acts and its first parameter whose interval excludes 0: "adhesion, work of adhesion
     148 mJ/m² (145–151)"."""
     of = ", ".join((mechanism.get("scope") or {}).get("sensors") or ())
-    name = in_words([mechanism["name"]]) + (f" of {of}" if of else "")
+    name = _named([mechanism["name"]]) + (f" of {of}" if of else "")
     known = [parameter for parameter in mechanism["parameters"] if parameter["value"] is not None]
     sizes = [parameter for parameter in known if parameter["low"] > 0 or parameter["high"] < 0]
     return ", ".join([name, *map(_value, (sizes or known)[:1])])
@@ -122,7 +138,7 @@ def _with_strength(mechanism: Document) -> str:
 
 def _value(parameter: Document) -> str:
     parameter = in_its_unit(parameter)
-    called = parameter["name"].replace("_", " ")
+    called = quantity_in_words(parameter["name"])
     value, low, high = (number(parameter[end], _DIGITS) for end in ("value", "low", "high"))
     size = f"{value} {unit(parameter['unit'])}".rstrip()
     if parameter.get("at_bound"):

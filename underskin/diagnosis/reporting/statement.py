@@ -19,6 +19,7 @@ from underskin.diagnosis.data.names import (
     NOTHING_MISSING,
     SIMPLEST,
     in_words,
+    quantity_in_words,
 )
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.entries import shape_clause
@@ -65,7 +66,7 @@ def statement(facts: Facts) -> str:
     # A mechanism that was not tried may be what is missing: that comes first
     of_tried = verdict == "unexplained" and bool(facts.untried)
     decides += facts.untried if of_tried else []
-    doubts = (*facts.bounds, *facts.other_thickness, *facts.curves_differ) if verdict == "ambiguous" else ()
+    doubts = (*facts.bounds, *facts.doubts) if verdict == "ambiguous" else ()
     reserves = [finding for finding in facts.findings if finding["statement"] not in doubts]
     open_questions = [*_clauses(reserves, _RESERVES), *([] if of_tried else facts.untried)]
     quoted = [
@@ -229,7 +230,7 @@ def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
             value, low, high = (in_digits(parameter[key], 3) for key in numbers.ENDS)
             unit = "" if parameter["unit"] == "-" else f" {parameter['unit']}"
             interval = "at or beyond the end of its search" if parameter.get("at_bound") else f"{low} to {high}"
-            name = parameter["name"].replace("_", " ")
+            name = quantity_in_words(parameter["name"])
             article = "an" if name[0] in "aeiou" else "a"
             strengths.append(f"{in_words([mechanism['name']])} has {article} {name} of {value}{unit} ({interval})")
     return ", ".join(strengths)
@@ -262,7 +263,7 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     """A clause on E of curves, and on the answers under which it holds."""
     modulus = after.get("youngs_modulus")
     if modulus is None:
-        return "Young's modulus: none, as nothing describes these curves"
+        return "Young's modulus: none that these curves determine"
     if modulus.get("at_bound"):
         bound = f"{modulus['value']:.3g} {modulus['unit']}"
         return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
@@ -321,6 +322,7 @@ _RESERVES = (
         FindingCode.TIP_SHAPE,
         FindingCode.THICKNESS_UNKNOWN,
         FindingCode.THICKNESS_DIFFERS,
+        FindingCode.PULLED_OR_PRESSED,
         FindingCode.IMPLAUSIBLE_D33,
         FindingCode.REMAINDER,
     ),

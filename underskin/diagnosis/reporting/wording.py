@@ -45,7 +45,7 @@ _FINDINGS = {
     "seating": "seating of the sample",
     "series_not_usable": "samples cannot be used",
     "sign_flipped": "sign reversed",
-    "units_off_by_1000": "unit off by a factor of 1000",
+    "units_off_by_1000": "a unit looks wrong",
     "strong": "strong sensor",
     "unusual_magnitude": "unusual size",
     "weak": "weak sensor",

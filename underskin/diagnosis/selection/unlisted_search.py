@@ -39,6 +39,7 @@ from underskin.mechanisms.unlisted.forms import Axis, Shape
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw, Grammar, combination
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.recordings.campaign import curves_of
+from underskin.recordings.curve_course import creeps_under_force
 from underskin.units import Array, Floats, Indices
 
 Law = TypeVar("Law", bound=UnlistedLaw)
@@ -239,7 +240,11 @@ _HOLD = 2e-3  # of the range of displacement: deviation from the deepest sample 
 
 
 class CurveScreening:
-    """The laws of a campaign of indentations."""
+    """The laws of a campaign of indentations.
+
+    None over depth or force where a force is held while the sphere sinks in: the depth is then what the sample answers,
+    and a law by which the force no longer depends on it agrees with any depth.
+    """
 
     def __init__(self, problem: FittingProblem, null: Explanation, best: Explanation) -> None:
         """With the contact points of the null hypothesis; the noise is that of the `best` explanation."""
@@ -259,7 +264,13 @@ class CurveScreening:
             start_times={name: float(time[0]) for name, time in times.items()},
             turn_times={name: float(time[turns[name]]) for name, time in times.items()} if back else {},
         )
-        self.laws = curve_laws(extent, timed=all(curve.time_s is not None for curve in curves))
+        is_timed, force = all(curve.time_s is not None for curve in curves), self._lines.value.real
+        held = is_timed and any(
+            creeps_under_force(curve.displacement_mm, force[rows], times[curve.id], self._lines.deviation[rows])
+            for curve, rows in zip(curves, self._lines.spans, strict=True)
+        )
+        of_depth = () if held else ("displacement_mm", "force_n")
+        self.laws = curve_laws(extent, (*of_depth, "time_s") if is_timed else of_depth)
 
     def scores(self, explanation: Explanation) -> list[Score]:
         """Of every law, averaged over the grid of its shape parameters.

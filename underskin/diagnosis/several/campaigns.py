@@ -61,8 +61,8 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        Two at least, one of them with FRFs; those with FRFs are sorted by the time of their first recordings where all
-        have one.
+        Two at least; those with FRFs are sorted by the time of their first recordings where all have one. Curves alone
+        are diagnosed as those of one campaign.
     table
         σ.
     name
@@ -80,12 +80,14 @@ def diagnose_together(
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns, none with FRFs, skins that are declared differently, or FRFs that are in two
-        campaigns.
+        Fewer than two campaigns, skins that are declared differently, or FRFs that are in two campaigns.
     """
     with_frf, of_curves = by_frfs(curves_once(campaigns, set()))
     _check(with_frf, of_curves)
     refuse_copies(with_frf)
+    if not with_frf:
+        curves = with_curves(replace(of_curves[0], recordings=()), of_curves)
+        return {**reported(diagnose(curves, table, progress, without=without)).document, "campaign": name}
     ordered = in_order(with_frf)
     document = _document(name, ordered, of_curves, table, without, progress)
     return {**document, "campaign": name, "campaigns": [campaign.name for campaign in (*ordered, *of_curves)]}
@@ -250,9 +252,8 @@ def _measured(recording: FrfRecording) -> bytes:
 
 def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
     campaigns = [*with_frf, *of_curves]
-    if not with_frf or len(campaigns) < 2:
-        allowed = "must be two at least, one of them with recordings of kind frf"
-        raise InvalidInput("campaigns", len(campaigns), allowed)
+    if len(campaigns) < 2:
+        raise InvalidInput("campaigns", len(campaigns), "must be two at least, of one skin or material")
     names = [campaign.name for campaign in campaigns]
     for campaign in campaigns:
         if names.count(campaign.name) > 1:

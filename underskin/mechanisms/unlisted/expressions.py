@@ -7,7 +7,7 @@ force, or the time since a recording began. Forms are those of laws over recordi
 a step where the sphere turns back.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
 from operator import add
@@ -99,14 +99,13 @@ class CurveLaw(UnlistedLaw):
         return total if self.description.acts_on in ("force", "position") else 1 + total
 
 
-def curve_laws(extent: Extent, *, timed: bool) -> list[tuple[CurveLaw, float]]:
-    """The laws for a campaign of indentations, each with its log share of the prior; `timed`: the samples have
-    times."""
+def curve_laws(extent: Extent, along: Collection[str]) -> list[tuple[CurveLaw, float]]:
+    """The laws for a campaign of indentations over the axes `along`, each with its log share of the prior."""
     ranges = {"displacement_mm": extent.depth_mm, "force_n": extent.force_n, "time_s": extent.time_s}
     axes = {
         name: Axis(name, {str(index): value for index, value in enumerate(np.linspace(0, high, _LEVELS).tolist())})
         for name, high in ranges.items()
-        if high > 0 and (timed or name != "time_s")
+        if high > 0 and name in along
     }
     combinations = [(acts_on, axes[name], forms) for acts_on, name, forms in _ENTERS if name in axes]
     laws: list[tuple[CurveLaw, float]] = []
