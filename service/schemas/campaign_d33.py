@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 
 # Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
 # change: what an earlier version kept is then computed anew.
-ANSWER_VERSION = 6
+ANSWER_VERSION = 7
 
 
 class D33Value(BaseModel):
@@ -37,7 +37,7 @@ class Band(BaseModel):
 
 
 class SensorFlag(BaseModel):
-    """Something that makes a sensor stand out."""
+    """Why a sensor is marked."""
 
     code: str = Field(description="What, in one word.", examples=["weak"])
     reason: str = Field(description="What shows it.")
@@ -47,7 +47,7 @@ class SensorD33(D33Value):
     """d33 of one sensor, over all indenters and preloads."""
 
     sensor: str = Field(description="Its id.")
-    flags: list[SensorFlag] = Field(description="Where it stands out.")
+    flags: list[SensorFlag] = Field(description="Why it is marked; empty where it is not.")
 
 
 class CellD33(D33Value):

@@ -15,7 +15,7 @@ from service.store import skins as kept_skins
 from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
-_OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision", "recorded_at")
+_OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision", "recorded_at", "refused")
 _LATELY = 12  # campaigns of a trend
 
 
@@ -37,6 +37,7 @@ class Glance:
     # paper's; None where not kept
     adopted_array: Mapping[str, Any] | None = None
     paper_array: Mapping[str, Any] | None = None
+    by_paper: Mapping[str, Any] | None = None  # the whole answer
     # of how many sensors that campaign tells d33, and how many the skin has
     measured: tuple[int, int] | None = None
     title: str | None = None
@@ -97,7 +98,7 @@ def glances(
 
 def _add_d33(connection: Connection, glance: Glance, campaign: AnyRow, table_sha256: str) -> None:
     """Add d33 of the array in a campaign, by the paper's model and by the one in force."""
-    by_paper = inversions.find(connection, campaign, table_sha256)
+    glance.by_paper = by_paper = inversions.find(connection, campaign, table_sha256)
     glance.paper_array = None if by_paper is None else by_paper["array"]
     if glance.model is not None:
         by_model = inversions.find_adopted(connection, campaign, glance.model.model_id, table_sha256)

@@ -218,9 +218,9 @@ def test_figures_pages_need_nothing_else(file: Path, tmp_path: Path) -> None:
     assert re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=", text) == []
     drawn = [json.loads(figure) for figure in re.findall(r'"figure-\d",\s*(\[\{.*?\}\]),\s*\{', text)]
     assert [[trace["name"] for trace in traces if "name" in trace] for traces in drawn] == [
-        ["d33", "not different from the others", "stands out", "stands out"],
+        ["d33", "not different from the others", "marked", "marked"],
         ["R 4 mm, measured", "R 4 mm, model", "R 10 mm, measured", "R 10 mm, model"],
-        ["sensor", "stands out"],
+        ["sensor", "marked"],
     ]
     assert "left out" in text.lower()
     assert "sensor s5: weak" in text

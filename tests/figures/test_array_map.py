@@ -78,7 +78,7 @@ def test_discs_never_overlap_and_carry_their_ids(pitch: float) -> None:
 
 
 def test_stands_out_chosen_rings_every_value() -> None:
-    """Who stands out and who is chosen have rings and every value its interval."""
+    """Marked and chosen sensors have rings and every value its interval."""
     reasons = ["", "", "weak: 21 % of the array's d33"]
     figure = array_map(SENSORS[:3], X[:3], Y[:3], [14.0, 14.1, 3.0], [0.1] * 3, reasons, chosen="s01")
     widths = [shape.line.width for shape in figure.layout.shapes]
@@ -88,8 +88,8 @@ def test_stands_out_chosen_rings_every_value() -> None:
     assert told["s02"].startswith(f"s02: {reasons[2]}")
     assert "95 %: 13.8 to 14.2" in told["s00"]
     names = {trace.name for trace in figure.data}
-    assert names == {"not different from the others", "stands out"}
-    (example,) = [trace for trace in figure.data if trace.name == "stands out" and trace.showlegend is None]
+    assert names == {"not different from the others", "marked"}
+    (example,) = [trace for trace in figure.data if trace.name == "marked" and trace.showlegend is None]
     assert (
         example.marker.line.color == figure.layout.shapes[2].line.color
     )  # the legend shows the ring, whatever the disc's colour

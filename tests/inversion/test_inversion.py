@@ -42,7 +42,7 @@ def test_intervals_cover_often_say_usual_scatter(table: SigmaTable) -> None:
         found = invert(simulate(table, rig, random), table)
         assert found.left_out == ()
         assert found.campaign_d33 is not None
-        accused += bool(found.flags)
+        accused += any(flag.code not in ("weak", "strong") for flag in found.flags)  # sensors do differ
         arrays.append(covered(found.campaign_d33, np.array(array)))
         sensors.append(np.mean(covered(found.sensors, rig.d33)))
         cells.append(np.mean(covered(found.cells.d33, rig.d33[found.cells.sensor])))

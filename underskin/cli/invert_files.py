@@ -175,7 +175,7 @@ def _array(inversion: Inversion, estimators: str) -> Table:
 
 
 def _sensors(inversion: Inversion) -> Table:
-    table = _table("sensor", "d33\npC/N", "±\npC/N", "95 % from\npC/N", "to\npC/N", remark="stands out")
+    table = _table("sensor", "d33\npC/N", "±\npC/N", "95 % from\npC/N", "to\npC/N", remark="remark")
     for name, numbers in zip(inversion.sensor_ids, inversion.sensors.d33_rows(), strict=True):
         reasons = "; ".join(flag.reason for flag in inversion.flags if flag.sensor == name)
         table.add_row(Text(name), *_short(numbers), Text(reasons))

@@ -118,7 +118,7 @@ def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
     if array is not None:
         d33 = f"d33 {significant(array['d33_pc_per_n'], 3)} ± {significant(array['d33_uncertainty_pc_per_n'], 2)} pC/N"
     else:
-        d33 = f"no d33: {answer['reason'] or 'every sensor stands out'}"
+        d33 = f"no d33: {answer['reason'] or 'every sensor is marked'}"
     results = moduli if moduli and answer["status"] == "none" else [d33, *moduli]
     remarks = [f"look at: {finding}" for finding in answer["findings"]]
     for omission in answer["left_out"]:

@@ -89,7 +89,7 @@ def response_per_sensor(
             y0=low_end, y1=high_end, fillcolor=COLOURS[5], opacity=0.22, line_width=0, annotation_text="array, 95 %"
         )
     plain = np.array([not reason for reason in reasons])
-    for name, mask, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):
+    for name, mask, style in (("sensor", plain, 0), ("marked", ~plain, 1)):
         if not mask.any():
             continue
         rows = np.flatnonzero(mask).tolist()

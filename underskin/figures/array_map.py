@@ -61,7 +61,7 @@ _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room f
 _OUTLIER = {"color": COLOURS[1], "width": 3}  # the ring around an outlier
 _ABSENT = {"color": "#5b6670", "width": 2}  # the edge of one that was not measured with the others
 _EDGE = {"color": "#5b6670", "width": 1}  # of the others
-_PALE, _RINGED = ("absent", "unknown"), ("absent", "unknown", "stands out")  # without a colour of a value; with a ring
+_PALE, _RINGED = ("absent", "unknown"), ("absent", "unknown", "marked")  # without a colour of a value; with a ring
 _BELOW = 6  # pixels, of a mark that is not seen, by which an id keeps off the edge of the disc above it
 _FROM_ZERO = ("zero", "bound")
 _SCALE = "Viridis"  # which has no grey: that means alike here
@@ -108,7 +108,7 @@ def array_map(
     sensor_radius_mm: float | None = None,
     absent: Sequence[str] = (),
 ) -> go.Figure:
-    """Map of the sensors; `uncertainties` are standard ones, `reasons` says why a sensor stands out, empty otherwise,
+    """Map of the sensors; `uncertainties` are standard ones, `reasons` says why a sensor is marked, empty otherwise,
     `chosen` is ringed. Discs have the sensors' radius where it is given and large enough (see `disc_size`). `absent`
     says of a sensor that was not measured in this campaign from when its value is; it is not compared, and its disc is
     hollow.
@@ -136,7 +136,7 @@ def array_map(
         ("alike", ~coloured & plain & ~away & ~unknown),
         ("unknown", unknown),
         ("absent", plain & away),
-        ("stands out", ~plain),
+        ("marked", ~plain),
     ):
         if mask.any():
             rows, meta = np.flatnonzero(mask).tolist(), "alike" if name in _PALE else name
@@ -176,7 +176,7 @@ def array_map(
     for name, ringed_mask, border in (
         ("unknown", unknown, _EDGE),
         ("absent", away & plain, _ABSENT),
-        ("stands out", ~plain, _OUTLIER),
+        ("marked", ~plain, _OUTLIER),
     ):
         if ringed_mask.any():
             ringed = {"symbol": "circle-open", "size": 10, "color": border["color"], "line": border}
@@ -231,7 +231,7 @@ def _names(quantity: Quantity) -> dict[str, str]:
         "alike": alike.get(quantity.against, ""),  # without comparison every known value is coloured
         "unknown": f"no {quantity.name} known",
         "absent": "not in this campaign",
-        "stands out": "stands out",
+        "marked": "marked",
     }
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc, chdtri, ndtr, ndtri
 
-from underskin.inversion.invert import is_alive
+from underskin.inversion.invert import error_from_median, is_alive
 from underskin.inversion.mixed_model import LEVEL, mixture_quantile
 from underskin.units import Floats, Indices, Mask
 
@@ -89,7 +89,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 BY_CHANCE = 0.05  # family-wise false-alarm probability
-_OF_MEDIAN = np.pi / 2  # variance of a median of many over that of their mean
 
 
 def threshold(count: int) -> float:
@@ -112,10 +111,8 @@ def differ_from_others(values: Floats, uncertainties: Floats) -> Mask:
     if count == 2:
         differs[valid] = abs(np.diff(values[valid])) > threshold(1) * np.linalg.norm(uncertainties[valid])
     elif count > 2:
-        variance = uncertainties[valid] ** 2
-        of_median = _OF_MEDIAN * np.mean(variance) / count
         gap = np.abs(values[valid] - np.median(values[valid]))
-        differs[valid] = gap > threshold(count) * np.sqrt(variance + of_median)
+        differs[valid] = gap > threshold(count) * error_from_median(uncertainties[valid])
     return differs
 
 
@@ -390,7 +387,7 @@ def departures_in_words(
     if few_dates:
         parts.append(TWO_DATES)
     parts += [
-        f"{sensor} changed by {100 * value:+z.1f} % ({100 * low:+z.1f} to {100 * high:+z.1f}) beside the others"
+        f"{sensor} changed by {100 * value:+z.1f} % ({100 * low:+z.1f} to {100 * high:+z.1f}) relative to the others"
         for sensor, value, low, high in departures[:_MOST_NAMED]
     ]
     parts += [f"{sensor} is dead since {date}" for sensor, date in list(dead.items())[:_MOST_NAMED]]

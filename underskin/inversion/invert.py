@@ -9,8 +9,9 @@ radius and modulus; `absolute_d33` includes it.
 
 Recordings far off the others of their sensor (a slip of units, a wrong range) are left out, since the mixed model
 assumes log-normal recordings about their sensor's d33. What a skin may show is no outlier: an effect of a condition on
-all sensors, the scatter of the array, and the effect of a misplaced sphere. Sensors that stand out of the array (dead,
-inverted, weak, strong, behind a filter, noisy or bent) are flagged with the reason. Findings are used all the same.
+all sensors, the scatter of the array, and the effect of a misplaced sphere. Sensors are flagged with the reason where
+they are dead, inverted, behind a filter, noisy, non-linear in preload (bent), or differ from the median of the others by
+three standard errors and 5 % (weak, strong); far off, they are left out of the array's d33. Findings are used all the same.
 """
 
 from collections.abc import Mapping, Sequence
@@ -65,12 +66,13 @@ _WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
 _LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not distinguished
 _NOISY = 3.0  # times the array's
 _LEAST_CURVATURE = 0.05  # of d33
+_DIFFERS, _LEAST_DIFFERENCE = 3.0, 0.05  # standard errors, and of the array's d33
 _FALSE_ALARMS = 1e-3  # per array
 
 
 @dataclass(frozen=True)
 class Flag:
-    """A sensor that stands out of its array, the reason, and the values of its sentence."""
+    """A sensor that is marked, the reason, and the values of its sentence."""
 
     sensor: str
     flagged_for: Reason
@@ -191,6 +193,32 @@ def scatter_flags(
         elif scatter > _NOISY and chdtrc(freedom, freedom * scatter**2) < alarm:
             flags.append(Flag(name, Reason.NOISY_RECORDINGS, {"times": scatter}))
     return flags
+
+
+_OF_MEDIAN = np.pi / 2  # variance of a median of many over that of their mean
+
+
+def error_from_median(uncertainties: Floats) -> Floats:
+    """Standard error of each value less the median of all, from their standard uncertainties (n,)."""
+    variance = uncertainties**2
+    return np.sqrt(variance + _OF_MEDIAN * np.mean(variance) / len(variance))
+
+
+def difference_flags(ids: tuple[str, ...], sensors: Estimate, unfit: Mapping[int, Flag]) -> list[Flag]:
+    """Sensors that differ from the array's median by three standard errors and 5 %; of the array are all that are not
+    `unfit`, which are flagged already. Fewer than three have no median robust to one of them."""
+    of_array = np.array([number for number in range(len(ids)) if number not in unfit], dtype=int)
+    of_array = of_array[np.isfinite(sensors.value[of_array])]
+    if len(of_array) < _ENOUGH:
+        return []
+    value, deviation = sensors.value[of_array], sensors.uncertainty[of_array]
+    middle = float(np.median(value))
+    gap = np.abs(value - middle)
+    differs = (gap > _DIFFERS * error_from_median(deviation)) & (gap > _LEAST_DIFFERENCE * abs(middle))
+    return [
+        Flag(ids[number], Reason.WEAK if share < 1 else Reason.STRONG, {"percent": 100 * share})
+        for number, share in zip(of_array[differs].tolist(), (value[differs] / middle).tolist(), strict=True)
+    ]
 
 
 def _curvature(residual: Floats, preload: Floats, expected: Floats) -> tuple[float, float, float, int]:
@@ -614,7 +642,8 @@ def _estimated(
         model = mixed_model.fit(measured.part(plain), numbered)
     scatter = model.scatter if model else mixed_model.prior_scatter()
     cell, where, count = _cells(rows, good)
-    flags = list(unfit.values())
+    sensors = scatter.d33(measured, sensor, len(ids)).wider(effects.unsure(good, sensor, len(ids)))
+    flags = [*unfit.values(), *difference_flags(ids, sensors, unfit)]
     if model:
         expected = _expected_scatter(model, measured)[plain]
         flags += scatter_flags(ids, sensor[plain], rows, good[plain], pilot, expected)
@@ -625,7 +654,7 @@ def _estimated(
             rows.sensor[where], rows.indenter_radius[where], rows.preload[where], count,
             scatter.d33(measured, cell, len(where)).wider(effects.unsure(good, cell, len(where))),
         ),
-        sensors=scatter.d33(measured, sensor, len(ids)).wider(effects.unsure(good, sensor, len(ids))),
+        sensors=sensors,
         flags=tuple(flags),
         zone=zone,
         campaign_d33=model.mean if model else None,

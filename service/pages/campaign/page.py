@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from service.dependencies import CampaignId, Store, Table
 from service.pages.campaign.figures import band_query, figures
 from service.pages.shared import same_request, verdicts
+from service.pages.shared.attention import attention
 from service.pages.shared.conditions import condition_columns
 from service.pages.shared.figures import csv_answer, csv_of_rows, file_name
 from service.pages.shared.forms import RefusedForm, in_form_words, number
@@ -93,6 +94,7 @@ def shown(
         row=row,
         state=campaigns.state(row),
         answer=answer,
+        attention=attention(answer, row),
         described=row.about["skin"],
         recordings=recordings,
         conditions=condition_columns(recording.scalars.get("conditions") for recording in recordings),

@@ -12,6 +12,7 @@ from starlette.background import BackgroundTask
 
 from service.dependencies import SkinId, Store, Table, number_of_cursor
 from service.pages.shared import same_request, verdicts
+from service.pages.shared.attention import attention
 from service.pages.shared.figures import Drawn, csv_of_rows, file_name
 from service.pages.shared.forms import RefusedForm
 from service.pages.shared.frf import drawn_frf
@@ -135,6 +136,7 @@ def shown(
         last=last,
         answer=answer,
         is_latest=is_latest,
+        attention=attention(answer, last, dead=[] if history.array is None else list(history.array.dead_since)),
         of_last=None if last is None else verdict_of.get(last.number),
         described=None if last is None else last.about["skin"],
         rows=[

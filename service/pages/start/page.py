@@ -10,6 +10,7 @@ from starlette.background import BackgroundTask
 
 from service.dependencies import Store, Table, number_of_cursor
 from service.pages.shared import same_request, verdicts
+from service.pages.shared.attention import attention
 from service.pages.shared.figures import prepare
 from service.pages.shared.html import page
 from service.pages.start.sparkline import sparkline
@@ -49,6 +50,7 @@ def start(
                 sparkline(glance.d33),
                 None if glance.diagnosis is None else verdict[glance.diagnosis.id],
                 None if glance.model is None else adoptions[glance.model.id],
+                attention(glance.by_paper, glance.last, glance.d33),
                 verdicts.change_percent(_d33(glance.paper_array), _d33(glance.adopted_array)),
             )
             for glance in shown

@@ -28,6 +28,7 @@ KNOWN = {
     4: ("53a90e4aa097fad6", 13.402, 0.105487),  # tolerances of the skin in the array's interval
     5: ("596c8b1b59e43529", 13.402, 0.105487),  # by the solved contact too
     6: ("596c8b1b59e43529", 13.402, 0.105487),  # recordings that are left out by their ids
+    7: ("596c8b1b59e43529", 13.402, 0.105487),  # sensors marked at three standard errors and 5 %
 }
 
 

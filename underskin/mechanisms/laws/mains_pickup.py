@@ -36,8 +36,8 @@ class MainsPickup(Mechanism):
     law = """a charge q at the mains' frequency and a share of q/n at its n-th harmonic, each a line of some width,
     whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on each line.
     It adds its square to the lines' variance."""
-    assumptions = """q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever stands out in
-    the campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from
+    assumptions = """q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever is stronger
+    in the campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from
     the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the
     analyser's window and on how the mains drift: neither is relied on."""
     source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads)."
@@ -85,7 +85,7 @@ def _pickup(conditions: Conditions, design: FrfDesign) -> Pickup:
 
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _outstanding_mains(conditions: Conditions) -> float:
-    """The mains frequency [Hz] whose lines stand out; where none does, the one that has a line nearest."""
+    """The mains frequency [Hz] whose lines are stronger; where none does, the one that has a line nearest."""
     lines = np.concatenate([frequencies(recording) for recording in frf_of(conditions)])
     nearest = {mains: float(np.abs(lines - mains).min()) for mains in MAINS_HZ}
     measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]

@@ -1,0 +1,57 @@
+"""What a visitor reads first: what is wrong with a skin, what two campaigns differ by, what a report says."""
+
+import re
+from typing import Any
+
+import pytest
+
+from tests.service.pages.conftest import Visit
+from tests.support import store_server
+from tests.support.diagnosed import sent
+from tests.support.store_server import Server
+
+WIDTHS = (390, 1440)
+
+
+def array(name: str, year: int, level: float, factors: dict[str, float]) -> dict[str, Any]:
+    """A campaign of six sensors, each with its factor; one of its recordings is refused."""
+    document = store_server.campaign(name, sensors=6, d33=level)
+    for recording in document["recordings"]:
+        recording["recorded_at"] = f"{year}-05-03T09:00:00Z"
+        factor = factors.get(recording["sensor"], 1.0)
+        for part in ("frf_re_pc_per_n", "frf_im_pc_per_n"):
+            recording[part] = [factor * value for value in recording[part]]
+    refused = {**document["recordings"][0], "id": "upside-down", "preload_n": -2.0}
+    return {**document, "recordings": [*document["recordings"], refused]}
+
+
+@pytest.fixture(scope="module")
+def ids(server: Server) -> list[str]:
+    """Two campaigns of a skin: in the second s1 is weak, s2 dead, and all fell by a tenth."""
+    first = sent(server, array("before", 2017, 14.0, {}), "aged")
+    return [first, sent(server, array("after", 2018, 12.6, {"s1": 0.8, "s2": 0.0}), "aged")]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_overviews_name_what_is_wrong(visitor: Visit, ids: list[str], width: int) -> None:
+    """Start, skin and campaign name the weak and the dead sensor, the fall and what was refused, in a line."""
+    page = visitor.page
+    page.set_viewport_size({"width": width, "height": 900})
+    lines = {}
+    for path in ("/", "/skins/aged", f"/campaigns/{ids[1]}"):
+        visitor.go(path)
+        lines[path] = page.locator(".attention").inner_text()
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert "1 recording refused" in lines[path]
+        assert re.search(r"s1 weak: 8\d % of the array's d33", lines[path])
+        visitor.require_accessible()
+    assert "s2 dead" in lines["/"]
+    assert "s2 dead" in lines[f"/campaigns/{ids[1]}"]
+    assert "s2 is dead since 2018-05-03" in (trend := visited(visitor, "/skins/aged", "#array-trend"))
+    assert "fell by" in trend
+    assert re.search(r"median d33 fell by 1\d % since 2017-05-03", lines["/"])
+
+
+def visited(visitor: Visit, path: str, selector: str) -> str:
+    visitor.go(path)
+    return visitor.page.locator(selector).inner_text()
