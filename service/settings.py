@@ -99,13 +99,13 @@ class Settings(BaseSettings):
     )
     hosts: str = Field(
         default="",
-        description="Names, separated by commas, by which clients reach the service, beside localhost, "
+        description="Names, separated by commas, by which clients reach the service, besides localhost, "
         "127.0.0.1, [::1] and the address it is bound to. A request with another Host is refused.",
     )
 
     proxies: str = Field(
         default="",
-        description="Addresses or networks of proxies, separated by commas, beside those on this machine: the client "
+        description="Addresses or networks of proxies, separated by commas, besides those on this machine: the client "
         "of a request through one is the last address in X-Forwarded-For.",
     )
 

@@ -158,7 +158,7 @@ def checked(read: ReadCampaign) -> CheckedCampaign:
     count = len(read.reading.problems)
     unlisted = max(0, count - _MOST_ERRORS)
     if unlisted:
-        notes = [*notes, f"{len(refused)} recordings have {count} errors; the first {_MOST_ERRORS} are told"]
+        notes = [*notes, f"{len(refused)} recordings have {count} errors; the first {_MOST_ERRORS} are listed"]
     entries = [{"id": name, "errors": errors} for name, errors in refused.items()]
     campaign_checked = replace(campaign_checked, refused=entries, notes=notes, unlisted=unlisted)
     if campaign.recordings:

@@ -46,7 +46,7 @@ def read(stream: BinaryIO, most_numbers: int = sys.maxsize) -> Any:
         raise _too_large(f"cannot be read: {error.reason}") from None
     if "plain" in value:
         raise _too_large(
-            f"has {value['plain'] / 1e6:.1f} MB beside its long lists of numbers; {_MOST_PLAIN_BYTES / 1e6:g} MB may be"
+            f"has {value['plain'] / 1e6:.1f} MB besides long lists of numbers; {_MOST_PLAIN_BYTES / 1e6:g} MB may be"
         )
     if "numbers" in value:
         raise _too_large(f"has a list of {value['numbers']:,} numbers; {most_numbers:,} may be in one")

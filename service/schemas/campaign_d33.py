@@ -89,7 +89,7 @@ class D33(BaseModel):
         default=None,
         description="Standard deviation of all d33 together by an adopted model's parameters; not in intervals.",
     )
-    status: Literal["ok", "none"] = Field(description="`none`: no d33 can be told from it; `reason` says why.")
+    status: Literal["ok", "none"] = Field(description="`none`: it has no d33; `reason` says why.")
     reason: str | None = Field(description="Why there is none.")
     band: Band | None = Field(description="The lines that were averaged.")
     array: D33Value | None = Field(

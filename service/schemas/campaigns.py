@@ -66,7 +66,7 @@ class RecordingResult(BaseModel):
     id: str = Field(description="Its id in the campaign, or its place where it has none.", examples=["r1"])
     status: Literal["ok", "refused"] = Field(description="`ok`: kept.")
     errors: list[Refused] = Field(
-        description="Why it was refused; empty where it was kept, and where a note counts what is not told."
+        description="Why it was refused; empty where it was kept, and where a note counts what is not listed."
     )
 
 

@@ -36,7 +36,7 @@ class SkinAnnotation(_Annotation):
     """What the lab writes to a skin; a field that is left out stays as it is."""
 
     title: str | None = Field(
-        default=None, description="What the lab calls it beside its id; null for none.", examples=["left palm"]
+        default=None, description="What the lab calls it besides its id; null for none.", examples=["left palm"]
     )
 
 

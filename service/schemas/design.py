@@ -33,7 +33,7 @@ class DesignRequest(BaseModel):
         gt=0,
         le=100,
         description="How much less a sensor between two loads must read than those on both sides, over the reading of "
-        "a load above a sensor, so that they are told apart [%].",
+        "a load above a sensor, so that they are resolved [%].",
     )
     contact: ContactName = Field(
         default="solved",
@@ -105,7 +105,7 @@ class DesignAnswer(BaseModel):
     )
     response_amid_percent: float | None = Field(description="The same amid four sensors [%].")
     two_point_separation_mm: float | None = Field(
-        description="From this distance on, two equal loads in line with a row of sensors are told apart wherever the "
+        description="From this distance on, two equal loads in line with a row of sensors are resolved wherever the "
         "row lies: a sensor between two others reads less than both by `dip_percent`; null where at this pitch they "
         "never are [mm]."
     )

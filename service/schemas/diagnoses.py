@@ -151,8 +151,8 @@ class ModelEntry(ModelVersion):
     provenance: Annotated[dict[str, Any], DescribedBy(Provenance)] = Field(
         description="Versions, hashes of tables and seed, as in `report/1`."
     )
-    needs: list[str] = Field(description="What `/v1/frf` and `/v1/d33` must be told beside what every skin needs.")
-    depends_on_frequency: bool = Field(description="Whether they must be told `frequency_hz` too.")
+    needs: list[str] = Field(description="What `/v1/frf` and `/v1/d33` need besides what every skin has.")
+    depends_on_frequency: bool = Field(description="Whether they need `frequency_hz` too.")
 
 
 class ModelVersions(BaseModel):

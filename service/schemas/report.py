@@ -207,7 +207,7 @@ class Report(BaseModel):
         default=None, description="Of curves: what the explanation leaves beyond the noise; null where nothing does."
     )
     power: list[Power] = Field(description="What the campaign could have seen.")
-    d33: ReportD33 | None = Field(description="d33 of the sensors; null of curves and where nothing can be told.")
+    d33: ReportD33 | None = Field(description="d33 of the sensors; null of curves and where nothing can be concluded.")
     by_kind: list[KindParameter] | None = Field(
         default=None, description="Of several kinds of recordings: what each alone tells."
     )

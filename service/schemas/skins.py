@@ -22,7 +22,7 @@ class SkinEntry(BaseModel):
     id: str = Field(description="Its id.")
     created_at: str = Field(description="When its first campaign arrived, UTC.")
     campaigns: int = Field(description="How many campaigns it and the skins joined to it have, in any state.")
-    title: str | None = Field(description="What the lab calls it beside its id.")
+    title: str | None = Field(description="What the lab calls it besides its id.")
     tags: list[str] = Field(description="Words that the lab finds it by.")
 
 
@@ -38,7 +38,7 @@ class SkinDetail(BaseModel):
 
     id: str = Field(description="Its id.")
     created_at: str = Field(description="When its first campaign arrived, UTC.")
-    title: str | None = Field(description="What the lab calls it beside its id.")
+    title: str | None = Field(description="What the lab calls it besides its id.")
     remark: str | None = Field(description="What the lab noted of it.")
     tags: list[str] = Field(description="Words that the lab finds it by.")
     discarded_at: str | None = Field(description="When it was put away, UTC; lists leave it out.")
@@ -82,7 +82,7 @@ class TrendAnswer(BaseModel):
 
 
 class SensorDeparture(BaseModel):
-    """The change of a sensor's d33 beside the array's, from its first campaign to its last."""
+    """The change of a sensor's d33 relative to the array's, from its first campaign to its last."""
 
     change_percent: float = Field(description="Relative change [%].")
     change_low_percent: float = Field(description="Lower end of its 95 % interval [%].")
@@ -128,7 +128,7 @@ class SensorHistory(BaseModel):
     )
     departure: SensorDeparture | None = Field(
         default=None,
-        description="Null with fewer than two points, or fewer than three sensors to tell it from the others.",
+        description="Null with fewer than two points, or fewer than three sensors to compare.",
     )
 
 

@@ -59,7 +59,7 @@ class StressRequest(_StressModel):
     length_mm: float | None = Field(
         default=None,
         gt=0,
-        description="Extent along x about the middle of the sensors; loads beside it are refused [mm].",
+        description="Extent along x about the middle of the sensors; loads outside are refused [mm].",
     )
     width_mm: float | None = Field(default=None, gt=0, description="The same along y [mm].")
     sensors: list[StressSensor] = Field(min_length=1, description="The sensors of the array.")

@@ -37,7 +37,7 @@ class SqliteFiles:
         if log.exists():  # an empty database in the place of the one that it has lost would overwrite it
             raise StoreError(
                 f"{self._path} is missing, and its write-ahead log {log.name}, which may hold what was kept last, is "
-                f"there: put {self._path.name} back beside it. To start without it, empty or from a backup, move "
+                f"there: put {self._path.name} back next to it. To start without it, empty or from a backup, move "
                 f"{log.name} and {self._path.name}-shm out of {self._path.parent}."
             )
         self._path.touch()

@@ -167,7 +167,7 @@ def _of_keys(settings: Settings, *, needed: bool | None, made: bool) -> Iterator
     keys = KeyStore(settings.data)
     if not keys.file_exists():
         if needed is None and made:
-            yield Observation("keys", Level.WARNING, f"{keys.path} is missing; whether keys are needed cannot be told",
+            yield Observation("keys", Level.WARNING, f"{keys.path} is missing; whether keys are needed is unknown",
                           "see to the store first")  # fmt: skip
         elif needed:
             yield Observation("keys", Level.CRITICAL, f"they are needed, and {keys.path} is missing",

@@ -21,7 +21,7 @@ def of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
         words = foreign(store, settings.backup_to)
     except (DBAPIError, StoreError, StoreMoved, OSError):
         words = ""
-        yield Observation("backups", Level.WARNING, f"of which store those in {settings.backup_to} are cannot be told",
+        yield Observation("backups", Level.WARNING, f"of which store those in {settings.backup_to} are is unknown",
                           "see to the store first")  # fmt: skip
     if words:
         yield Observation("backups", Level.CRITICAL, f"{words}, and the server makes none there",

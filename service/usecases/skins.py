@@ -128,7 +128,7 @@ def _adopted_history(store: Database, table: SigmaTable, root: str) -> models.Hi
         try:
             answer = d33_cache.adopted_answer(store, table, row, model_in_force, None)
         except InvalidInput as error:
-            unfit[row.id] = f"cannot be told by the adopted model: {error}"
+            unfit[row.id] = f"has no d33 by the adopted model: {error}"
             continue
         for sensor_answer in answer["sensors"]:
             value, uncertainty = sensor_answer["d33_pc_per_n"], sensor_answer["d33_uncertainty_pc_per_n"]

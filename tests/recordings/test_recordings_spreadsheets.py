@@ -166,9 +166,9 @@ def test_magnitude_phase_stand_real_imaginary(heading: str, turn: float) -> None
     alone = refusal(
         ABOVE + HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,coherence") + ROWS
     )
-    assert "needs frf_phase_deg or frf_phase_rad beside it" in alone.reason
+    assert "needs frf_phase_deg or frf_phase_rad with it" in alone.reason
     beside = refusal(ABOVE + head.replace("\n", ",frf_re_pc_per_n\n") + f"r1,s01,4,1.0,0.09,10,{rows[0]},7\n")
-    assert "stands beside real and imaginary parts" in beside.reason
+    assert "is given with real and imaginary parts" in beside.reason
 
 
 def test_a_phase_without_a_magnitude_is_guessed() -> None:

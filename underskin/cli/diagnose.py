@@ -383,7 +383,8 @@ def plan(
     ] = None,
     indenter_radius_mm: Annotated[list[float] | None, typer.Option(help="A sphere at hand [mm]; repeatable.")] = None,
     offset_mm: Annotated[
-        list[float] | None, typer.Option(help="How far beside the sensor the sphere can be put [mm]; repeatable.")
+        list[float] | None,
+        typer.Option(help="How far from the sensor's centre the sphere can be put [mm]; repeatable."),
     ] = None,
     dynamic_force_n: Annotated[
         list[float] | None, typer.Option(help="A dynamic force that the shaker can give [N]; repeatable.")

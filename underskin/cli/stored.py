@@ -121,7 +121,7 @@ def history(
         typer.echo(f"{array['statement']}.")
     has_departures = any(sensor["departure"] is not None for sensor in document["sensors"])
     describe = _departure if has_departures else _trend
-    heading = "beside the array" if has_departures else "trend"
+    heading = "relative to array" if has_departures else "trend"
     write_rows(("sensor", heading), ((sensor["sensor"], describe(sensor)) for sensor in document["sensors"]))
     for omission in document["left_out_campaigns"]:
         typer.echo(f"left out: campaign {omission['campaign_id']}: {omission['reason']}")

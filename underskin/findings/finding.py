@@ -493,10 +493,10 @@ ENGLISH: Mapping[Reason, Words] = {
     f"{{dynamic_force_n:g}}: it "
     f"looks 1000 × too {{too_large:large|small}}; was it given in {{given_in}}?{_LEFT_OUT}",
     Reason.SERIES_DYNAMIC_FORCE: f"{_ALL_AS_IN}{{dynamic_force_n:g}} N looks 1000 × too {{too_large:large|small}} "
-    f"beside the "
+    f"compared with the "
     f"recorded force: was it given in {{given_in}}?{_LEFT_OUT}",
-    Reason.SERIES_PRELOAD: f"{_ALL_AS_IN}{{preload_n:g}} N looks 1000 × too {{too_large:large|small}} beside the "
-    f"recorded force's "
+    Reason.SERIES_PRELOAD: f"{_ALL_AS_IN}{{preload_n:g}} N looks 1000 × too {{too_large:large|small}} "
+    f"compared with the recorded force's "
     f"mean of {{mean_n:.3g}} N: was it given in {{given_in}}?{_LEFT_OUT}",
     Reason.BESIDE_OTHERS: "{value:g} looks 1000 × too {too_large:large|small} against the others: was it given in "
     "{given_in}? "
@@ -581,7 +581,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.DEFECT: DEFECT,
     Reason.DEFECTS_LEFT_OUT: f"{DEFECT}{{more:; {{more}} more like it|}}: those parts were left out",
     Reason.READINGS_MARKED: "{samples} readings of the force ({percent:.2g} %) are {value_n:.4g} N each, far off those "
-    "beside them: the instrument's mark for no reading? They were left out",
+    "next to them: the instrument's mark for no reading? They were left out",
     Reason.READINGS_BEYOND: "{samples} reading(s) of the force, up to {value_n:.4g} N, lie far beyond the range of all "
     "others and last no longer than a sample or two: damaged? They were left out",
     Reason.LINES_LEFT_OUT: lines_left_out,

@@ -369,7 +369,7 @@ def _source(place: str, value: Any, in_columns: bool, has_parts: bool = False) -
     signal = _built(SignalMapping, place, value)
     _require_complete(place, signal)
     if signal.sign == AUTOMATIC:
-        raise conflicting(f"{place}.sign", AUTOMATIC, "is told from curves: must be 1 or -1 here")
+        raise conflicting(f"{place}.sign", AUTOMATIC, "is found from curves: must be 1 or -1 here")
     return signal
 
 
@@ -436,7 +436,7 @@ def _channels(given: Mapping[str, Any]) -> dict[str, ChannelMapping]:
     errors: list[InvalidInput] = []
     for part, counterpart in ((MAGNITUDE, PHASE), (PHASE, MAGNITUDE)):
         if part in given and counterpart not in given:
-            errors.append(required(f"channels.{counterpart}", Requirement("required beside ", Mention(part))))
+            errors.append(required(f"channels.{counterpart}", Requirement("required with ", Mention(part))))
     channels = {}
     with noting(errors):
         channels = all_of({name: partial(_channel, name, value, given.keys()) for name, value in given.items()})
@@ -463,10 +463,10 @@ def _check_automatic_sign(rig: RigDescription, name: str) -> None:
     place = f"channels.{name}.sign"
     if name not in _OF_CURVES or not all(column in rig.channels for column in _OF_CURVES):
         both = Requirement(Mention(_OF_CURVES[0]), " and ", Mention(_OF_CURVES[1]))
-        raise conflicting(place, AUTOMATIC, Requirement("is told from curves, which need ", both))
+        raise conflicting(place, AUTOMATIC, Requirement("is found from curves, which need ", both))
     formula = rig.derived.get(channel_mapping.channel)
     if name == "displacement_mm" and formula is not None and formula.is_sum:
-        turned = f"cannot be told of {formula.text}, whose terms have signs of their own: say them in the formula"
+        turned = f"cannot be found for {formula.text}, whose terms have signs of their own: say them in the formula"
         raise conflicting(place, AUTOMATIC, turned)
 
 
@@ -492,7 +492,7 @@ def _require_fitting_field(name: str, channel_mapping: ChannelMapping, fields_gi
     if channel_mapping.deflection is not None and name != "displacement_mm":
         raise conflicting(f"channels.{name}.deflection", channel_mapping.deflection.channel, _is_for("displacement_mm"))
     if channel_mapping.deflection is not None and stiffness is not None:
-        both = "must not stand beside a deflection, which is subtracted already"
+        both = "must not be given with a deflection, which is subtracted already"
         raise conflicting(f"channels.{name}.stiffness_n_per_mm", _shown(stiffness), both)
     if spring is not None and name != "force_n":
         raise conflicting(f"channels.{name}.spring_constant_n_per_m", _shown(spring), _is_for("force_n"))

@@ -41,7 +41,7 @@ def results(answer: DesignAnswer, other_sigma: float | None = None) -> list[Desi
     point = f"a/h {answer.a_over_h:.3g}, rT/h {answer.rt_over_h:.3g}, L {answer.load_parameter:.2g}"
     if other_sigma is not None:
         point += f"; {WORDS[OTHER[answer.contact]]} σ is {other_sigma:.4g}"
-    anywhere = "wherever the array lies" if apart is not None else "not told apart everywhere at this pitch"
+    anywhere = "wherever the array lies" if apart is not None else "not resolved everywhere at this pitch"
     entries = [
         DesignResult("sigma", "transmission σ", answer.sigma, "", 4, point),
         DesignResult("frf", "FRF", answer.frf_pc_per_n, "pC/N", 4, "what an instrument should show above the sensor"),

@@ -29,7 +29,7 @@ FIELDS = (
     ("indenter_radius_mm", "sphere radius R", "mm", None),
     ("youngs_modulus_mpa", "Young's modulus E", "MPa", None),
     ("d33_pc_per_n", "d33", "pC/N", None),
-    ("dip_percent", "dip that can be told", "%", None),
+    ("dip_percent", "resolvable dip", "%", None),
     ("thinnest_mm", "thinnest layer that can be made", "mm", "0.2"),
     ("least_pitch_mm", "smallest pitch that can be made", "mm", "0.5"),
     ("least_frf_pc_per_n", "least charge over force", "pC/N", "1"),

@@ -25,7 +25,7 @@ SLIDERS = (
     ("youngs_modulus_mpa", "Young's modulus E", "MPa", 0.1, 100),
     ("d33_pc_per_n", "d33", "pC/N", 1, 100),
     ("pitch_mm", "pitch of the array", "mm", 0.5, 50),
-    ("dip_percent", "dip that can be told", "%", 1, 50),
+    ("dip_percent", "resolvable dip", "%", 1, 50),
 )
 LABELS = {name: f"{words} [{unit}]" for name, words, unit, *_ in SLIDERS}
 WORDS = {name: (words, unit) for name, words, unit, *_ in SLIDERS if name != "dip_percent"}

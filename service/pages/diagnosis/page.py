@@ -52,7 +52,7 @@ _ABOUT = {
     "of many sensors the median, the range of 90 % and those that stand apart. They compare sensors and campaigns, "
     "with the mechanisms held as they were found; to quote, take a campaign's own diagnosis.",
     "population": "Each skin's value with its 95 % interval on the grey band in which 95 % of such skins lie.",
-    "parameters": "Each parameter's most probable value and 95 % interval; beside it, what was known before.",
+    "parameters": "Each parameter's most probable value and 95 % interval; next to it, what was known before.",
 }
 _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import
 

@@ -30,7 +30,7 @@ FIELDS = (
     (_LOWEST, "lowest preload", "N", False),
     (_HIGHEST, "highest preload", "N", False),
     ("indenter_radius_mm", "radii of the spheres at hand", "mm", True),
-    ("offset_mm", "distances beside the sensor", "mm", True),
+    ("offset_mm", "distances from the sensor", "mm", True),
     ("dynamic_force_n", "dynamic forces of the shaker", "N", True),
     ("dwell_s", "times to hold the preload", "s", True),
     (_RECORDINGS, "recordings at most (empty: 8)", "", False),

@@ -135,7 +135,7 @@ def number(name: str, typed: str) -> float:
         raise required(name, "fill it in")
     value = _value(typed)
     if value is None:
-        in_unit = " alone, in the unit beside its field" if _WITH_UNIT.fullmatch(typed.strip()) else ""
+        in_unit = " alone, in the unit next to its field" if _WITH_UNIT.fullmatch(typed.strip()) else ""
         raise wrong_type(name, typed.strip()[:80], f"must be a number{in_unit}")
     return value
 

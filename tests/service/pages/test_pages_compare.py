@@ -246,7 +246,7 @@ def test_single_curves_difference(server: Server) -> None:
     for name, modulus, year in (("soft", 2.0, 2030), ("hard", 3.0, 2031)):
         sent(server, pressed(name, [modulus], year), "single")
     text = server.http.get("/compare?skin=single", headers=BROWSING).text
-    assert "it cannot be told how far curves scatter" in text
+    assert "One curve does not show how far curves scatter" in text
     row = re.search(r"<tr><th scope=.row.>Difference</th>.*?</tr>", text, re.DOTALL)
     assert row is not None
     cells = [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td.*?</td>", row[0])]

@@ -8,6 +8,7 @@ import pytest
 from tests.service.pages.conftest import Visit
 from tests.support import store_server
 from tests.support.diagnosed import sent
+from tests.support.repository import ROOT
 from tests.support.store_server import Server
 
 WIDTHS = (390, 1440)
@@ -55,3 +56,16 @@ def test_overviews_name_what_is_wrong(visitor: Visit, ids: list[str], width: int
 def visited(visitor: Visit, path: str, selector: str) -> str:
     visitor.go(path)
     return visitor.page.locator(selector).inner_text()
+
+
+def test_no_vague_words_in_pages() -> None:
+    """Pages and reports use the terms of statistics and of the bench."""
+    templates = [ROOT / "service/pages/templates", ROOT / "underskin/diagnosis/reporting/templates"]
+    vague = re.compile(
+        r"not told from|\bhides\b|by sets|\btold\b|\bbeside\b|without a name|stands? out|at its most", re.I
+    )
+    for file in (file for folder in templates for file in folder.glob("*.html")):
+        text = re.sub(
+            r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}|<script>.*?</script>|<[^>]+>", " ", file.read_text("utf-8"), flags=re.S
+        )
+        assert vague.findall(text) == [], file.name

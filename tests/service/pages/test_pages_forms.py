@@ -95,7 +95,7 @@ def test_design_outside_table_says_limit_old(visitor: Visit) -> None:
     force.fill("900")
     page.get_by_text("exceeds 0.15: at most 38.4 N").wait_for()
     shown = page.locator(".results").inner_text()
-    assert "not told apart everywhere" not in shown
+    assert "not resolved everywhere" not in shown
     assert "outside the table" in shown
     visitor.require_accessible()
     force.fill("9,x")

@@ -117,7 +117,7 @@ def test_texts_in_csv_are_no_formulas(server: Server) -> None:
         ("thickness_mm=nan", "thickness h [mm]"),
         ("youngs_modulus_mpa=-1", "greater than 0"),
         ("pitch_mm=1", "cannot overlap"),
-        ("dip_percent=0", "dip that can be told [%]"),
+        ("dip_percent=0", "resolvable dip [%]"),
         ("preload_n=500", "–"),
     ],
 )

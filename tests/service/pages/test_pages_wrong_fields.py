@@ -65,7 +65,7 @@ CASES = {
             ("thickness_mm", "thickness h [mm]: zwei – must be a number"),
             ("preload_n", "force F [N]: -1.0 – must be finite and greater than 0 (N)"),
             ("pitch_mm", f"pitch of the array [mm]: 1.0 – must be at least 3 mm, {OVERLAP}"),
-            ("dip_percent", "dip that can be told [%]: 500.0 – must be at most 100"),
+            ("dip_percent", "resolvable dip [%]: 500.0 – must be at most 100"),
         ],
     ),
     "search": (

@@ -110,7 +110,7 @@ class ContactCreep(Mechanism):
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
             if time_runs_with_displacement(curves):
-                return "all curves go one way at one speed: time cannot be told from displacement"
+                return "all curves go one way at one speed: time and displacement cannot be separated"
             return None
         dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
         lacking = [name for name, value in dwell.items() if value is None]

@@ -69,7 +69,7 @@ class LiquidDrag(Mechanism):
         if lacking:
             return f"recording {lacking[0]!r} has no time_s"
         if time_runs_with_displacement(curves):
-            return "all curves go one way at one speed: a drag cannot be told from the zero of the force"
+            return "all curves go one way at one speed: a drag and the zero of the force cannot be separated"
         return None
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:

@@ -37,8 +37,8 @@ class MainsPickup(Mechanism):
     whatever the dynamic force: an FRF error of q/Fd, complex, its phase independent in each recording and on each line.
     It adds its square to the lines' variance."""
     assumptions = """q is the standard deviation of each component over recordings; 50 or 60 Hz, whichever is stronger
-    in the campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f from
-    the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the
+    in the campaign's lines; harmonics up to the fifth, all with the same share; lines are bells exp(−½ (f/width)²), f
+    from the multiple. How phases of neighbouring lines hang together, and the lines' shape in detail, depend on the
     analyser's window and on how the mains drift: neither is relied on."""
     source = "Ott, Electromagnetic Compatibility Engineering (2009), section 2.1 (capacitive coupling to leads)."
     stage = Stage.ADDED_CHARGE

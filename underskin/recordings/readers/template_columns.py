@@ -51,7 +51,7 @@ def angle_by_values(heading: str, largest: float) -> float:
 
 def lacking(field: str) -> str:
     """The missing counterpart of magnitude or phase, in words."""
-    return f"needs {_EITHER if field == MAGNITUDE else MAGNITUDE} beside it"
+    return f"needs {_EITHER if field == MAGNITUDE else MAGNITUDE} with it"
 
 
 def _name_and_unit(heading: str) -> tuple[str, str]:
@@ -268,7 +268,7 @@ def _require_complete(by_field: dict[str, Column]) -> None:
     if len(given) == 1:
         raise NoField(given[0].index, f"{given[0].heading!r} {lacking(given[0].field)}")
     if given and any(part in by_field for part in PARTS):
-        raise NoField(given[0].index, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
+        raise NoField(given[0].index, f"{given[0].heading!r} is given with real and imaginary parts: leave out either")
 
 
 _FIRST_LINE = 2000
