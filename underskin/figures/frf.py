@@ -20,6 +20,7 @@ _AXES = ("", "2", "3")  # of the panels
 _UNITS = (" pC/N", "°", "")
 _HEIGHT = 640
 _MOST_IN_LEGEND = 12
+_MOST_PAIRS = _MOST_IN_LEGEND // 2
 _BRIGHTEST = 0.85  # of Viridis; lighter colours are invisible on white
 
 
@@ -60,6 +61,23 @@ def frf_recordings(
         traces += _lines(label(recording.name), str(number), recording.frequency_hz, parts, look)
     figure = _finished(traces, zone_hz, "FRF of each recording")
     return figure.update_layout(showlegend=len(recordings) <= _MOST_IN_LEGEND)
+
+
+def frf_pair(first: Sequence[FrfSpread], second: Sequence[FrfSpread]) -> go.Figure | None:
+    """The medians of two campaigns laid over each other under the conditions that both have, the first dashed, of many
+    conditions some; None without a common one."""
+    of_first = {_condition(spread): spread for spread in first}
+    common = [spread for spread in second if _condition(spread) in of_first]
+    shown = [common[number] for number in sorted({*np.linspace(0, len(common) - 1, _MOST_PAIRS).astype(int).tolist()})]
+    traces: list[PlotlyTrace] = []
+    for number, after in enumerate(shown if common else []):
+        _, look = _look(_condition(after), list(map(_condition, shown)))
+        name = f"R {after.indenter_radius_mm:.3g} mm, {after.preload_n:.3g} N"
+        for which, spread, dash in (("first", of_first[_condition(after)], "dash"), ("second", after, "solid")):
+            parts = (spread.magnitude_pc_per_n[1], spread.phase_deg[1], spread.coherence[0])
+            styled_look = {**look, "line": {**look["line"], "dash": dash}}
+            traces += _lines(f"{which}, {name}", str(number), spread.frequency_hz, parts, styled_look)
+    return _finished(traces, None, "FRFs of both campaigns") if traces else None
 
 
 def _lines(

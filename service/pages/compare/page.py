@@ -17,6 +17,9 @@ from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
 from service.usecases import d33_cache
+from service.usecases.figure_data import measured, spreads, spreads_of
+from underskin.findings.formatting import capital
+from underskin.inversion.array_history import array_change_in_words, array_levels, changes, differ_from_zero
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -27,7 +30,7 @@ _MOST_NAMED = 6  # sensors
 _SAME_POSITION_MM = 0.01
 _COLUMNS = (
     "sensor", "first_pc_per_n", "first_uncertainty_pc_per_n", "second_pc_per_n", "second_uncertainty_pc_per_n",
-    "difference_pc_per_n", "difference_uncertainty_pc_per_n",
+    "difference_pc_per_n", "difference_uncertainty_pc_per_n", "difference_percent", "beyond_chance",
 )  # fmt: skip
 
 KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")
@@ -60,11 +63,14 @@ def compare(
             first, second = _pair(connection, skin, kind, listed, first, second)
         both = [campaigns.find(connection, campaign_id) for campaign_id in (first, second) if campaign_id]
     listed += [row for row in both if row.id not in {campaign.id for campaign in listed}]
-    answers = [d33_cache.answer(store, table, row, None) for row in both]
+    with_numbers = [d33_cache.with_numbers(store, table, row, None) for row in both]
+    answers = [answer for answer, _ in with_numbers]
     is_two = first != second
     rows = _rows(answers) if is_two and kind == "frf" else []
     of_curves = curves.rows(kind, both, answers) if is_two and kind != "frf" else []
     maps = drawn_maps(both, answers, rows)
+    if maps:
+        maps += _overlaid(store, both, [numbers["spreads"] for _, numbers in with_numbers])
     elsewhere = moved(both, rows)
     return page(
         request,
@@ -79,6 +85,7 @@ def compare(
         second=second,
         both=both,
         rows=rows,
+        lead=lead(rows),
         without_common=without_common(answers) if is_two and kind == "frf" else [],
         most_named=_MOST_NAMED,
         moved=elsewhere[:_MOST_NAMED],
@@ -181,7 +188,56 @@ def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             row["difference_pc_per_n"] = row["second_pc_per_n"] - row["first_pc_per_n"]
             both = row["first_uncertainty_pc_per_n"], row["second_uncertainty_pc_per_n"]
             row["difference_uncertainty_pc_per_n"] = float(np.hypot(*both))
-    return list(of_sensor.values())
+            row["difference_percent"] = 100 * row["difference_pc_per_n"] / (row["first_pc_per_n"] or math.nan)
+    rows = list(of_sensor.values())
+    gaps = np.array(
+        [[row[f"difference_{part}"] for part in ("pc_per_n", "uncertainty_pc_per_n")] for row in rows], float
+    )
+    for row, differs in zip(rows, differ_from_zero(*gaps.T).tolist() if rows else [], strict=True):
+        row["beyond_chance"] = differs
+    return rows
+
+
+def lead(rows: Sequence[Mapping[str, Any]]) -> str:
+    """What differs between the campaigns: the change of the array's d33, and the sensors that differ beyond chance;
+    empty where no sensor is in both."""
+    shared = [row for row in rows if row["difference_pc_per_n"] is not None]
+    if not shared:
+        return ""
+    d33, deviation = (
+        np.abs([[row[f"{which}_{part}"] for which in ("first", "second")] for row in shared])
+        for part in ("pc_per_n", "uncertainty_pc_per_n")
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        levels = array_levels(np.log(d33), deviation / d33)
+    change = changes(np.array([0.0, 1.0]), levels.level[None], levels.deviation[None], gain_scatters=True)
+    size, low, high = (float(np.expm1(part[0])) for part in (change.value, change.low, change.high))
+    differ = [row for row in shared if row["beyond_chance"]]
+    largest = sorted(differ, key=lambda row: -abs(row["difference_percent"]))[:_MOST_NAMED]
+    named = ", ".join(f"{row['sensor'][:24]} {row['difference_percent']:+.0f} %" for row in largest)
+    sensors = f"{len(differ) or 'none'} of {len(shared)} sensors differ{'s' if len(differ) == 1 else ''} beyond chance"
+    sensors += f": {named}{', …' if len(differ) > len(largest) else ''}" if differ else ""
+    if not math.isfinite(size):
+        return f"{capital(sensors)}."
+    levels_in_words = np.exp(levels.level).tolist()
+    return (
+        f"{array_change_in_words(size, low, high, levels_in_words, 'from the first to the second', None)}; {sensors}."
+    )
+
+
+def _overlaid(store: Database, both: Sequence[AnyRow], stored: Sequence[Any]) -> list[Drawn]:
+    """The FRFs of both, laid over each other under each sphere and preload that both have."""
+    from underskin.figures.frf import frf_pair
+
+    of_each = [
+        spreads(of_row) if of_row else spreads_of(measured(store.read(campaigns.load, row, with_excluded=False)))
+        for row, of_row in zip(both, stored, strict=True)
+    ]
+    figure = frf_pair(*of_each)
+    about = (
+        "Median magnitude and phase, and lowest coherence, under each sphere (radius R) and preload of both campaigns."
+    )
+    return [] if figure is None else [drawn("frf", figure, about + " Dashed: the first; solid: the second.")]
 
 
 def drawn_maps(

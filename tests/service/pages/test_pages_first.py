@@ -69,3 +69,23 @@ def test_no_vague_words_in_pages() -> None:
             r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}|<script>.*?</script>|<[^>]+>", " ", file.read_text("utf-8"), flags=re.S
         )
         assert vague.findall(text) == [], file.name
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_compare_leads_with_what_differs(visitor: Visit, ids: list[str], width: int) -> None:
+    """A sentence says by how much the array and which sensors differ; rows have percent; FRFs lie over each other."""
+    page = visitor.page
+    page.set_viewport_size({"width": width, "height": 900})
+    visitor.go(f"/compare?first={ids[0]}&second={ids[1]}")
+    lead = page.locator(".lead").inner_text().replace("−", "-")
+    assert re.match(r"d33 of the array fell by \d+\.\d %", lead)
+    assert "s2 -100 %" in lead
+    row = page.get_by_role("row", name=re.compile("^s2"))
+    assert "differs" in row.inner_text()
+    assert "100" in row.get_by_role("cell").first.inner_text()
+    visitor.drawn(4)
+    names = page.locator("#figure-frf .plot").evaluate("plot => plot.data.map((one) => [one.name, one.line.dash])")
+    assert ["first, R 4 mm, 1 N", "dash"] in names
+    assert ["second, R 4 mm, 1 N", "solid"] in names
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    visitor.require_accessible()
