@@ -92,7 +92,7 @@ def test_it_says_all_that_the_report_says(resonant: tuple[dict[str, Any], str]) 
     assert tags.text.index(first) < tags.text.index("Where")
     assert re.findall(r"<h2>(.*?)</h2>", text) == [
         "Where the model and the recordings differ", "What the model lacks, and the values found",
-        "How well the models describe the recordings", "Look at these recordings", "What to measure next", "Made with",
+        "How well the models describe the recordings", "Look at these recordings", "Made with",
     ]  # fmt: skip
     wanted = [report["location"]["statement"], *(entry["why_not"] for entry in report["alternatives"])]
     wanted += [f"{entry['value']:.4g}" for entry in report["mechanisms"][0]["parameters"]]

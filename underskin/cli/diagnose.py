@@ -60,11 +60,13 @@ def write_report(document: dict[str, Any], path: Path) -> None:
     _write(json.dumps(document, ensure_ascii=False, indent=1, allow_nan=False) + "\n", path)
 
 
-def write_page(document: dict[str, Any], path: Path, figures: Mapping[str, Any] | None = None) -> None:
-    """Write a report as a page, with the given figures."""
+def write_page(
+    document: dict[str, Any], path: Path, figures: Mapping[str, Any] | None = None, recorded: str = ""
+) -> None:
+    """Write a report as a page, with the given figures and words on what was recorded."""
     from underskin.diagnosis.reporting.html_report import page
 
-    _write(page(document, figures), path)
+    _write(page(document, figures, recorded), path)
 
 
 def _write(text: str, path: Path) -> None:
@@ -328,8 +330,11 @@ def _diagnose_file(
     write_report(document, output_dir / f"{file.stem}.json")
     if html:
         from underskin.diagnosis.reporting.figures import figures
+        from underskin.diagnosis.reporting.html_report import recorded_in_words
 
-        write_page(document, output_dir / f"{file.stem}.html", figures(diagnosis, document))
+        campaign = reading.campaign
+        recorded = recorded_in_words(vars(campaign.skin), map(vars, campaign.recordings))
+        write_page(document, output_dir / f"{file.stem}.html", figures(diagnosis, document), recorded)
     return _Outcome(str(file), "", in_words(document), tuple(reading_notes(reading)))
 
 

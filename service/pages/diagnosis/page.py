@@ -97,7 +97,7 @@ def diagnosis(
         name=row.name or members[0].name,
         alone=of_campaign,
         members=members,
-        shown=None if report is None else _shown(row, report, figures),
+        shown=None if report is None else _shown(row, report, figures, _recorded(store, row)),
         array=shown_array(store, table, row, figures, sensor) if of_campaign else None,
         lacks_figures=of_campaign and report is not None and report["fit"] is not None and not figures,
         outdated=outdated,
@@ -141,9 +141,10 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
     from underskin.diagnosis.reporting import html_report as file
 
     row, report, texts = _done(store, diagnosis_id)
+    recorded = _recorded(store, row)
     try:
         figures: Mapping[str, go.Figure] | None = {name: plotly.io.from_json(text) for name, text in texts.items()}
-        content = file.page(report, figures or None)
+        content = file.page(report, figures or None, recorded)
     except _ODD:
         _cannot_be_shown(row)
     policy = {"Content-Security-Policy": "sandbox"}  # should anything open it in place
@@ -265,14 +266,27 @@ def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], d
     return row, report, figures
 
 
-def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> tuple[Markup, Markup]:
+def _recorded(store: Database, row: AnyRow) -> str:
+    """What the diagnosed recordings are of; empty for several campaigns, which the page lists."""
+    from underskin.diagnosis.reporting.html_report import recorded_in_words
+
+    if row.kind != "campaign":
+        return ""
+    with store.reading() as connection:
+        campaign = campaigns.find(connection, row.campaign_id)
+        used = [one for one in campaigns.recordings_of(connection, campaign.number) if one.excluded_at is None]
+    skin = {**campaign.about["skin"], "id": row.skin_id}
+    return recorded_in_words(skin, [{**one.scalars, "recorded_at": one.recorded_at} for one in used])
+
+
+def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str], recorded: str) -> tuple[Markup, Markup]:
     """The report in the words of the file, with the page's figures, and its origin."""
     from underskin.diagnosis.reporting import html_report as file
 
     try:
         figures = _drawn(row, report, texts)
         html = {name: render("figure.html", drawn=figure) for name, figure in figures.items()}
-        body = file.body_of(report, html, f"/diagnoses/{row.id}/planned")
+        body = file.body_of(report, html, f"/diagnoses/{row.id}/planned", recorded)
         provenance = file.provenance(report)
     except _ODD:
         _cannot_be_shown(row)

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from tests.service.pages.conftest import Visit
+from tests.service.pages.finished import keep, made
 from tests.support import store_server
 from tests.support.diagnosed import sent
 from tests.support.repository import ROOT
@@ -89,3 +90,32 @@ def test_compare_leads_with_what_differs(visitor: Visit, ids: list[str], width: 
     assert ["second, R 4 mm, 1 N", "solid"] in names
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     visitor.require_accessible()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_first_screen_of_a_report(visitor: Visit, server: Server, width: int) -> None:
+    """Headline, what to quote, what to do, one button; the rest is folded, and no percentage comes twice."""
+    page = visitor.page
+    page.set_viewport_size({"width": width, "height": 900})
+    place = keep(server, f"screen{width}", made())
+    visitor.go(place)
+    summary = page.locator(".summary")
+    assert not summary.locator(".why p").first.is_visible()
+    assert [one.inner_text() for one in summary.locator("> dl > dt").all()][:2] == ["To quote", "Next"]
+    assert summary.locator("> dl").bounding_box()["y"] < 900  # type: ignore[index]
+    whole = page.locator(".report").evaluate("one => one.innerText.slice(0, one.innerText.indexOf('Why, how well'))")
+    percentages = re.findall(r"\d[\d.]* %", whole)
+    assert len(percentages) == len(set(percentages)), whole
+    buttons = page.locator(".head .button:not(.second), .summary .button").all()
+    assert len([button for button in buttons if button.is_visible()]) == 1
+    recorded = page.locator(".recorded").inner_text()
+    assert f"skin screen{width}; h 2.5 mm; E 2 MPa; rT 1.5 mm; spheres of radius" in recorded
+    assert re.search(r"preloads .* N; 12 recordings, .*; underskin .*, table [0-9a-f]{8}", recorded)
+    summary.locator(".why > summary").click()
+    assert summary.locator(".why p").first.is_visible()
+    visitor.require_accessible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.emulate_media(media="print")
+    assert page.locator(".recorded").is_visible()
+    page.emulate_media(media="screen")
+    assert recorded in server.http.get(f"{place}/report.html").text

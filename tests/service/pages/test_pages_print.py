@@ -172,9 +172,10 @@ def test_folded_part_opened_keys_draws(visitor: Visit, server: Server, width: in
     assert "measured less the paper's model, in phase, in percent of it" in heading
     visitor.go(place)
     summary = page.locator(".summary")
+    summary.locator(".why > summary").click()
     assert "No d33" in summary.inner_text()
     assert "by noise alone" in summary.inner_text()
-    assert "These recordings cannot tell whether there is also" in summary.inner_text()
+    assert "These recordings do not show whether there is also" in summary.inner_text()
     visitor.require_accessible()
     assert page.evaluate(_WIDE)
     better = page.locator("details.part > summary", has_text="How well the models describe the recordings")

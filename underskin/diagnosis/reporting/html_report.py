@@ -4,7 +4,7 @@ The template says what the page shows; filters word the names and numbers of the
 escaped, and the page's content policy forbids whatever is not in the file.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 from urllib.parse import quote
@@ -59,6 +59,8 @@ _FILTERS = (
 
 _SCRIPTS = (SCHEME, SCHEME.with_name("narrow.js"), SCHEME.with_name("paper.js"))  # the same as on the service's pages
 _OF_SUMMARY = ("frf", "curve", "where", "explanations", "population", "sensors", "before_after")
+_DECLARED = (("thickness_mm", "h", "mm"), ("youngs_modulus_mpa", "E", "MPa"), ("sensor_radius_mm", "rT", "mm"))
+_MOST_VALUES = 5  # of spheres or preloads, listed one by one
 Report = Mapping[str, Any]
 FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 
@@ -67,6 +69,7 @@ FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 def _templates() -> Environment:
     loader = PackageLoader("underskin.diagnosis.reporting")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+    environment.tests["search"] = lambda text, part: part in text
     environment.filters |= {function.__name__: function for function in (*_FILTERS, csv_address, of_summary)}
     environment.globals |= {"catalogue": CATALOGUE, "EXPLAINED": EXPLAINED}
     return environment
@@ -81,21 +84,38 @@ def of_summary(drawn: FigureHtml) -> list[str]:
     return [name for name in _OF_SUMMARY if name in drawn][:3]
 
 
-def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
+def recorded_in_words(skin: Report, recordings: Iterable[Report]) -> str:
+    """What was recorded: the skin's id, thickness h, modulus E and sensor radius rT, the spheres, preloads, number and
+    dates of recordings; `skin` and `recordings` by the fields of a campaign, those that are unknown left out."""
+    rows = list(recordings)
+    parts = [f"skin {skin['id']}"] if skin.get("id") else []
+    for field, symbol, unit in _DECLARED:
+        parts += [f"{symbol} {skin[field]:g} {unit}"] if skin.get(field) is not None else []
+    for field, name, unit in (("indenter_radius_mm", "spheres of radius", "mm"), ("preload_n", "preloads", "N")):
+        values = sorted({row[field] for row in rows if row.get(field) is not None})
+        shown = values if len(values) <= _MOST_VALUES else [values[0], values[-1]]
+        joint = ", " if shown is values else " to "
+        parts += [f"{name} {joint.join(f'{value:g}' for value in shown)} {unit}"] if values else []
+    days = sorted({str(row["recorded_at"])[:10] for row in rows if row.get("recorded_at")})
+    dates = "" if not days else f", {days[0]}" + (f" to {days[-1]}" if len(days) > 1 else "")
+    return "; ".join([*parts, f"{len(rows)} recording{'' if len(rows) == 1 else 's'}{dates}"])
+
+
+def page(report: Report, figures: Mapping[str, go.Figure] | None = None, recorded: str = "") -> str:
     """The whole page; `figures` are those of `underskin.diagnosis.reporting.figures`, by default those of the report
-    alone."""
+    alone; `recorded`: the text of `recorded_in_words`."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
     scripts = (get_plotlyjs(), *(script.read_text("utf-8") for script in _SCRIPTS)) if drawn else ()
-    return str(_macros("file.html").page(report, drawn, scripts))
+    return str(_macros("file.html").page(report, drawn, scripts, recorded))
 
 
-def body_of(report: Report, drawn: FigureHtml, plan: str | None = None) -> str:
+def body_of(report: Report, drawn: FigureHtml, plan: str | None = None, recorded: str = "") -> str:
     """The page below the title, as HTML: statement, location, mechanisms, improvement, next recordings.
 
     `plan` is the address of the planned recordings without its suffix .csv or .xlsx; without it the CSV is in the page.
     """
-    return str(_macros("report.html").body(report, drawn, plan))
+    return str(_macros("report.html").body(report, drawn, plan, recorded))
 
 
 def csv_address(recordings: Sequence[Mapping[str, Any]]) -> str:
