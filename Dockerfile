@@ -10,7 +10,7 @@ COPY service /app/service
 COPY tablegen /app/tablegen
 COPY rig /app/rig
 COPY tables /app/tables
-COPY docs/glossary.md /app/docs/glossary.md
+COPY docs/*.md /app/docs/
 COPY scripts/client_documents.py scripts/openapi_examples.py /app/scripts/
 RUN /opt/venv/bin/pip install --quiet --no-index --no-build-isolation -e '/app[server,fem]'
 # The root is read-only later, so byte code, machine code and the examples of the OpenAPI document are written now; the

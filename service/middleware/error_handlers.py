@@ -79,7 +79,7 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
         case RequestValidationError():
             return _unreadable(error) or from_validation(error.errors())
         case HTTPException(status_code=404):
-            return Refusal(404, f"There is nothing at {request.url.path}; /openapi.json lists all routes.")
+            return Refusal(404, f"There is nothing at {request.url.path}; /docs lists all routes.")
         case HTTPException(status_code=405):
             allowed = {"Allow": ", ".join(methods(request.app, request.scope["route"].path))}
             return Refusal(405, f"{request.url.path} does not take {request.method}.", headers=allowed)

@@ -12,9 +12,9 @@ from service.pages.design import page as design
 from service.pages.design import search as design_search
 from service.pages.diagnosis import page as diagnosis
 from service.pages.diagnosis import plan
+from service.pages.docs import page as docs
 from service.pages.field import page as field
 from service.pages.fleet import page as fleet
-from service.pages.glossary import page as glossary
 from service.pages.measured import page as measured
 from service.pages.mechanisms import page as mechanisms
 from service.pages.shared import assets, workbooks
@@ -33,7 +33,7 @@ _OF_SKINS = (
 )  # fmt: skip
 _PAGES = (
     *_OF_SKINS, design, design_search, field, loads, pressure_map, measured,
-    tables, mechanisms, glossary, login, sessions, assets,
+    tables, mechanisms, docs, login, sessions, assets,
 )  # fmt: skip
 
 for _page in _PAGES:

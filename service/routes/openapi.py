@@ -51,18 +51,19 @@ class UmbridgeProblem(BaseModel):
 @router.get("/openapi.json", operation_id="openapi", summary="This document")
 async def openapi(request: Request) -> dict[str, Any]:
     """OpenAPI 3.1; says that a key is needed where one is."""
-    document = dict(_document(request.app))
+    described = dict(document(request.app))
     if request.app.state.access.keys_needed():
-        document["security"] = [{"key": []}]
-    return document
+        described["security"] = [{"key": []}]
+    return described
 
 
 def methods(api: FastAPI, path: str) -> list[str]:
     """All methods of a path of the document; none where it has no such path."""
-    return [method.upper() for method in _document(api)["paths"].get(path, ())]
+    return [method.upper() for method in document(api)["paths"].get(path, ())]
 
 
-def _document(api: FastAPI) -> dict[str, Any]:
+def document(api: FastAPI) -> dict[str, Any]:
+    """The OpenAPI document without what depends on the keys."""
     return api.openapi_schema or _describe(api)
 
 
@@ -90,7 +91,7 @@ def _describe(api: FastAPI) -> dict[str, Any]:
 
 
 def _add_examples(operation: dict[str, Any], example: Mapping[str, Any]) -> None:
-    """Put what the server was asked and answered beside the schemas of an operation."""
+    """Put what the server was asked and answered next to the schemas of an operation."""
     for parameter in operation.get("parameters", []):
         if parameter["name"] in example.get("given", {}):
             parameter["example"] = example["given"][parameter["name"]]

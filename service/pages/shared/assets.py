@@ -26,16 +26,20 @@ _FOR_GOOD = "public, max-age=31536000, immutable"
 
 
 @router.get("/static/{name}")
-def asset(name: str, if_none_match: Annotated[str, Header()] = "") -> Response:
-    """One of the files; gzipped, which every browser reads."""
+def asset(
+    name: str, if_none_match: Annotated[str, Header()] = "", accept_encoding: Annotated[str, Header()] = ""
+) -> Response:
+    """One of the files; gzipped where the client reads that, as every browser does."""
     if name not in names():
         raise Refusal(404, f"There is no file {name!r}.")
     tag = f'"{version(name)}"'
-    headers = {"ETag": tag, "Cache-Control": _FOR_GOOD, "X-Content-Type-Options": "nosniff"}
+    headers = {"Vary": "Accept-Encoding", "ETag": tag, "Cache-Control": _FOR_GOOD, "X-Content-Type-Options": "nosniff"}
     if tag in if_none_match:
         return Response(status_code=304, headers=headers)
-    headers["Content-Encoding"] = "gzip"
-    return Response(gzipped(name), headers=headers, media_type=_TYPES[Path(name).suffix])
+    media_type = _TYPES[Path(name).suffix]
+    if "gzip" not in accept_encoding:
+        return Response(_content(name), headers=headers, media_type=media_type)
+    return Response(gzipped(name), headers={**headers, "Content-Encoding": "gzip"}, media_type=media_type)
 
 
 @cache

@@ -22,6 +22,13 @@ from underskin import __version__
 _EMPTY_STYLE = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
 
 
+_DOCUMENTED = {
+    "/skins": "recordings#the-history-of-a-skin", "/campaigns": "recordings#d33-of-an-array", "/upload": "formats",
+    "/diagnoses": "diagnosis", "/fleets": "store#diagnosing-campaigns-together", "/design": "http-api#design-of-a-skin",
+    "/loads": "http-api#several-loads-on-an-array", "/field": "http-api#the-stress-under-a-sphere",
+    "/d33": "http-api#frf-d33-and-σ", "/mechanisms": "extending", "/tables": "how-it-works",
+    "/compare": "store#reading",
+}  # fmt: skip
 _COMPRESSION = 5  # of 9: the rest takes longer than it saves
 
 
@@ -59,8 +66,15 @@ def _templates() -> Environment:
         auto_reload=False,
     )
     templates.filters.update(formats.FILTERS)
-    templates.globals.update(static=address, version=__version__, segment=lambda text: quote(text, safe=""))
+    templates.globals.update(
+        documented=_documented, static=address, version=__version__, segment=lambda text: quote(text, safe="")
+    )
     return templates
+
+
+def _documented(path: str) -> str:
+    """The page of docs/ on a page of this server, and the part of it."""
+    return next((part for start, part in _DOCUMENTED.items() if path.startswith(start)), "quickstart")
 
 
 def render(template: str, **values: Any) -> str:

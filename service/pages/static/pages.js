@@ -21,11 +21,18 @@ function show_times(root) {
 
 // A choice with the pointer takes effect at once; who walks through the choices with keys presses the button. What is
 // chosen empty does not stand in the address.
-function submit(choice) {
-  const form = choice.form;
+const leave_out_empty = (form) => {
   for (const field of form.elements) {
     if ("emptyLeftOut" in field.dataset && field.value === "") field.disabled = true;
   }
+};
+for (const form of document.querySelectorAll("form.request")) {
+  form.addEventListener("submit", () => leave_out_empty(form));
+}
+addEventListener("pageshow", () => document.querySelectorAll("form.request :disabled").forEach((field) => (field.disabled = false)));
+function submit(choice) {
+  const form = choice.form;
+  leave_out_empty(form);
   sessionStorage.setItem("chosen", choice.id);
   form.submit();
 }

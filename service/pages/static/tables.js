@@ -31,6 +31,7 @@ function sort(table, column, heading) {
 
 function sortable(table) {
   [...table.tHead.rows[0].cells].forEach((heading, column) => {
+    if (heading.tagName === "TD") return; // without a name
     const button = document.createElement("button");
     button.type = "button";
     button.className = "sort";

@@ -7,6 +7,7 @@ import pytest
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.finished import keep, made
+from tests.service.pages.forms import BROWSING
 from tests.support import store_server
 from tests.support.diagnosed import sent
 from tests.support.repository import ROOT
@@ -119,3 +120,49 @@ def test_first_screen_of_a_report(visitor: Visit, server: Server, width: int) ->
     assert page.locator(".recorded").is_visible()
     page.emulate_media(media="screen")
     assert recorded in server.http.get(f"{place}/report.html").text
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_documentation_is_served(visitor: Visit, server: Server, ids: list[str], width: int) -> None:
+    """Each page links to its part of the documentation; a route is tried by a click; no link leads nowhere."""
+    page = visitor.page
+    page.set_viewport_size({"width": width, "height": 900})
+    visitor.go("/compare")
+    page.get_by_role("link", name="About this page").click()
+    page.wait_for_url("**/docs/store#reading")
+    assert page.locator("#reading").is_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    visitor.require_accessible()
+    visitor.go("/docs")
+    page.locator("details#list_skins > summary, details#skins > summary").first.click()
+    visitor.require_accessible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.locator("details[open] form button").first.click()
+    page.wait_for_url("**/v1/skins*")
+    assert "aged" in page.locator("body").inner_text()
+    visitor.wrong.clear()  # of JSON the browser asks for an icon at a place of its own
+    for start in (
+        "/",
+        "/skins/aged",
+        f"/campaigns/{ids[0]}",
+        "/upload",
+        "/d33",
+        "/design",
+        "/loads",
+        "/field",
+        "/fleets",
+    ):
+        place = re.search(r'href="(/docs/[^"#]+)(?:#([^"]+))?">About', server.http.get(start, headers=BROWSING).text)
+        assert place is not None
+        text = server.http.get(place[1], headers=BROWSING).text
+        assert place[2] is None or f'id="{place[2]}"' in text, start
+
+
+def test_plain_bytes_for_plain_clients(server: Server) -> None:
+    """A client that does not ask for compression gets none, of pages and of their files."""
+    style = re.search(r'href="(/static/underskin.css[^"]*)"', server.http.get("/docs", headers=BROWSING).text)
+    assert style is not None
+    for path in ("/docs", style[1]):
+        answer = server.http.get(path, headers={**BROWSING, "Accept-Encoding": "identity"})
+        assert "Content-Encoding" not in answer.headers
+        assert "Content-Encoding" in server.http.get(path, headers={**BROWSING, "Accept-Encoding": "gzip"}).headers

@@ -21,7 +21,6 @@ def test_glossary_holds_every_term_filtered(visitor: Visit, width: int) -> None:
     page.get_by_role("link", name="Glossary").click()
     page.wait_for_url("**/glossary")
     assert page.locator("main tbody td:first-child").all_inner_texts() == terms
-    assert page.locator("main a").count() == 0  # its links lead to files that the server does not have
     statistics = page.get_by_role("region", name="Statistics")
     expect(statistics.get_by_role("row", name="likelihood probability density of the measurements y")).to_be_visible()
     page.get_by_label("Filter").first.fill("stiffness")
