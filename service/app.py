@@ -84,6 +84,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
         lifespan=_lifespan,
     )
     api.state.settings = settings
+    api.state.document = openapi.document
     api.state.table = table
     api.state.access = access
     api.state.login_throttle = LoginThrottle()

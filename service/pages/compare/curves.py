@@ -1,30 +1,17 @@
 """Two campaigns of curves side by side: the curves, and Young's modulus of each campaign."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from service.pages.shared.figures import Drawn, columns_of, drawn
 from service.store import AnyRow, Database, campaigns
-from underskin.units import Floats
 
 COLUMNS = ("which", "campaign", "recording", "youngs_modulus_mpa", "youngs_modulus_uncertainty_mpa", "statement")
 _MOST_CURVES = 12  # of each campaign
 _NAMES = ("first", "second")
 _MODULUS = "youngs_modulus_mpa"
-
-
-@dataclass(frozen=True)
-class Mean:
-    """A mean of moduli [MPa], or the difference of two, with its 95 % interval from the scatter of the curves; a
-    single curve has none."""
-
-    curves: int
-    value_mpa: float
-    low_mpa: float | None
-    high_mpa: float | None
 
 
 def rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -37,30 +24,12 @@ def rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]]
     ]
 
 
-def means(of_curves: Sequence[Mapping[str, Any]]) -> list[Mean]:
-    """The mean of each campaign, and the difference second − first (Welch's interval: the variances may differ);
-    empty if one campaign has no modulus."""
-    from scipy import stats
+def means(of_curves: Sequence[Mapping[str, Any]]) -> list[Any]:
+    """The mean modulus of each campaign, and the difference second − first."""
+    from underskin.inversion.comparison import mean_moduli
 
     first, second = (np.array([row[_MODULUS] for row in of_curves if row["which"] == name]) for name in _NAMES)
-    if not (first.size and second.size):
-        return []
-    gap = float(second.mean() - first.mean())
-    both_means = [_mean(first), _mean(second)]
-    if min(first.size, second.size) < 2 or not (np.ptp(first) or np.ptp(second)):
-        return [*both_means, Mean(min(first.size, second.size), gap, None, None)]
-    interval = stats.ttest_ind(second, first, equal_var=False).confidence_interval()
-    return [*both_means, Mean(min(first.size, second.size), gap, float(interval.low), float(interval.high))]
-
-
-def _mean(moduli: Floats) -> Mean:
-    from scipy import stats
-
-    value = float(moduli.mean())
-    if moduli.size < 2:
-        return Mean(1, value, None, None)
-    half = float(stats.t.ppf(0.975, moduli.size - 1) * moduli.std(ddof=1) / np.sqrt(moduli.size))
-    return Mean(moduli.size, value, value - half, value + half)
+    return mean_moduli(first, second)
 
 
 def figures(store: Database, kind: str, both: Sequence[AnyRow], of_curves: Sequence[Mapping[str, Any]]) -> list[Drawn]:

@@ -5,7 +5,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy import Connection
 
@@ -18,8 +17,7 @@ from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
 from service.usecases import d33_cache
 from service.usecases.figure_data import measured, spreads, spreads_of
-from underskin.findings.formatting import capital
-from underskin.inversion.array_history import array_change_in_words, array_levels, changes, differ_from_zero
+from underskin.inversion.comparison import in_words, with_differences
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -85,7 +83,7 @@ def compare(
         second=second,
         both=both,
         rows=rows,
-        lead=lead(rows),
+        lead=in_words(rows),
         without_common=without_common(answers) if is_two and kind == "frf" else [],
         most_named=_MOST_NAMED,
         moved=elsewhere[:_MOST_NAMED],
@@ -183,46 +181,7 @@ def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             row[f"{which}_pc_per_n"] = sensor["d33_pc_per_n"]
             for part in ("uncertainty", "low", "high"):
                 row[f"{which}_{part}_pc_per_n"] = sensor[f"d33_{part}_pc_per_n"]
-    for row in of_sensor.values():
-        if None not in (row["first_pc_per_n"], row["second_pc_per_n"]):
-            row["difference_pc_per_n"] = row["second_pc_per_n"] - row["first_pc_per_n"]
-            both = row["first_uncertainty_pc_per_n"], row["second_uncertainty_pc_per_n"]
-            row["difference_uncertainty_pc_per_n"] = float(np.hypot(*both))
-            row["difference_percent"] = 100 * row["difference_pc_per_n"] / (row["first_pc_per_n"] or math.nan)
-    rows = list(of_sensor.values())
-    gaps = np.array(
-        [[row[f"difference_{part}"] for part in ("pc_per_n", "uncertainty_pc_per_n")] for row in rows], float
-    )
-    for row, differs in zip(rows, differ_from_zero(*gaps.T).tolist() if rows else [], strict=True):
-        row["beyond_chance"] = differs
-    return rows
-
-
-def lead(rows: Sequence[Mapping[str, Any]]) -> str:
-    """What differs between the campaigns: the change of the array's d33, and the sensors that differ beyond chance;
-    empty where no sensor is in both."""
-    shared = [row for row in rows if row["difference_pc_per_n"] is not None]
-    if not shared:
-        return ""
-    d33, deviation = (
-        np.abs([[row[f"{which}_{part}"] for which in ("first", "second")] for row in shared])
-        for part in ("pc_per_n", "uncertainty_pc_per_n")
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        levels = array_levels(np.log(d33), deviation / d33)
-    change = changes(np.array([0.0, 1.0]), levels.level[None], levels.deviation[None], gain_scatters=True)
-    size, low, high = (float(np.expm1(part[0])) for part in (change.value, change.low, change.high))
-    differ = [row for row in shared if row["beyond_chance"]]
-    largest = sorted(differ, key=lambda row: -abs(row["difference_percent"]))[:_MOST_NAMED]
-    named = ", ".join(f"{row['sensor'][:24]} {row['difference_percent']:+.0f} %" for row in largest)
-    sensors = f"{len(differ) or 'none'} of {len(shared)} sensors differ{'s' if len(differ) == 1 else ''} beyond chance"
-    sensors += f": {named}{', …' if len(differ) > len(largest) else ''}" if differ else ""
-    if not math.isfinite(size):
-        return f"{capital(sensors)}."
-    levels_in_words = np.exp(levels.level).tolist()
-    return (
-        f"{array_change_in_words(size, low, high, levels_in_words, 'from the first to the second', None)}; {sensors}."
-    )
+    return with_differences(list(of_sensor.values()))
 
 
 def _overlaid(store: Database, both: Sequence[AnyRow], stored: Sequence[Any]) -> list[Drawn]:

@@ -11,7 +11,6 @@ from markdown_it import MarkdownIt
 
 from service.pages.shared.html import page
 from service.problems import Refusal
-from service.routes.openapi import document
 
 router = APIRouter()
 
@@ -32,7 +31,7 @@ def interface(request: Request) -> Response:
     """Each route of the HTTP interface with its parameters, an example, and a form that sends a request to read."""
     operations = [
         {"path": path, "method": method.upper(), **operation}
-        for path, of_path in document(request.app)["paths"].items()
+        for path, of_path in request.app.state.document(request.app)["paths"].items()
         for method, operation in of_path.items()
     ]
     return page(request, "docs_routes.html", operations=operations, names=_names(), example=_example)
