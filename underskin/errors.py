@@ -102,7 +102,7 @@ class InvalidInput(UnderskinError, ValueError):
         self.index = index
         self.code = code
         self.place = field if index is None else f"{field}[{index}]"
-        super().__init__(f"{self.place} = {value!r}: {allowed}")
+        super().__init__(f"{self.place}{'' if value is None else f' = {value!r}'}: {allowed}")
 
     def at(self, field: str) -> "InvalidInput":
         """The same error under another field name."""

@@ -161,7 +161,7 @@ def test_errors_carry_codes_survive_new_name() -> None:
 def test_errors_kind_sentence_code() -> None:
     """Errors of one kind have one sentence and one code."""
     for error, code, text in (
-        (required("preload_n"), ErrorCode.REQUIRED, "preload_n = None: required"),
+        (required("preload_n"), ErrorCode.REQUIRED, "preload_n: required"),
         (wrong_type("x_mm", "a", index=2), ErrorCode.WRONG_TYPE, "x_mm[2] = 'a': must be a number"),
         (not_one_of("kind", "b", ("frf", "c")), ErrorCode.NOT_ONE_OF, "kind = 'b': must be one of frf, c"),
         (not_one_of("schema", "b", ("rig/1",)), ErrorCode.NOT_ONE_OF, "schema = 'b': must be rig/1"),

@@ -126,7 +126,7 @@ def test_signs_block_told_largest_force(force: int, travel: int) -> None:
             "channels.displacement_mm.sign",
             "whose terms have signs of their own",
         ),
-        ({"channels": {"force_n": {"channel": "load", "sign": "auto"}}}, "channels.force_n.sign", "told from curves"),
+        ({"channels": {"force_n": {"channel": "load", "sign": "auto"}}}, "channels.force_n.sign", "found from curves"),
         ({"channels": {"force_n": {"channel": "load", "sign": "up"}}}, "channels.force_n.sign", "1, -1 or auto"),
         (
             {"channels": {"force_n": {"channel": "a", "tare_percent": 101}}},

@@ -91,12 +91,12 @@ def test_force_falls_depth_needs_sign_said() -> None:
         (("skin",), {"colour": 0.5}, r"skin\.colour = 0\.5: must be one of"),
         (("recording",), {"preload_n": 2.5}, r"recording\.preload_n = 2\.5: must be one of"),
         (("channels",), {"charge_pc": {"channel": "load"}}, r"channels\.charge_pc .*must be one of"),
-        (LOAD, {"channel": None}, r"channels\.force_n\.channel = None: required"),
+        (LOAD, {"channel": None}, r"channels\.force_n\.channel: required"),
         (LOAD, {"sign": 2}, r"channels\.force_n\.sign = 2: must be 1, -1 or auto"),
         (LOAD, {"offset": 2}, r"channels\.force_n\.offset = 2: unknown field"),
-        (LOAD, {"sensitivity": None}, r"channels\.force_n\.sensitivity = None: needs a sensitivity_unit"),
+        (LOAD, {"sensitivity": None}, r"channels\.force_n\.sensitivity: needs a sensitivity_unit"),
         (LOAD, {"stiffness_n_per_mm": 1}, "is for displacement_mm"),
-        (DEPTH, {"unit": None, "labelled": "um"}, r"channels\.displacement_mm\.unit = None: required where labelled"),
+        (DEPTH, {"unit": None, "labelled": "um"}, r"channels\.displacement_mm\.unit: required where labelled"),
     ],
 )
 def test_wrong_rig_description_refused_field(part: tuple[str, ...], changes: dict[str, Any], message: str) -> None:

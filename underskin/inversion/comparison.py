@@ -44,7 +44,9 @@ def in_words(rows: Sequence[Mapping[str, Any]]) -> str:
     differ = sorted((row for row in shared if row["beyond_chance"]), key=lambda row: -abs(row["difference_percent"]))
     named = ", ".join(f"{row['sensor'][:24]} {row['difference_percent']:+.0f} %" for row in differ[:_MOST_NAMED])
     sensors = f"{len(differ) or 'none'} of {len(shared)} sensors differ{'s' if len(differ) == 1 else ''} beyond chance"
-    sensors += f": {named}{', …' if len(differ) > _MOST_NAMED else ''}" if differ else ""
+    sensors += (
+        f": {named}{f' and {len(differ) - _MOST_NAMED} more' if len(differ) > _MOST_NAMED else ''}" if differ else ""
+    )
     if not math.isfinite(size):
         return f"{capital(sensors)}."
     of_array = np.exp(levels.level).tolist()

@@ -166,3 +166,17 @@ def test_plain_bytes_for_plain_clients(server: Server) -> None:
         answer = server.http.get(path, headers={**BROWSING, "Accept-Encoding": "identity"})
         assert "Content-Encoding" not in answer.headers
         assert "Content-Encoding" in server.http.get(path, headers={**BROWSING, "Accept-Encoding": "gzip"}).headers
+
+
+def test_no_menu_of_three_rows_and_no_table_cut(visitor: Visit) -> None:
+    """The menu has a row of its own on a phone; the table of d33 fits a window of 1440 pixels."""
+    page = visitor.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    visitor.go("/d33")
+    rows = {round(link.bounding_box()["y"]) for link in page.locator(".top nav a").all()}  # type: ignore[index]
+    assert len(rows) == 1
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.set_viewport_size({"width": 1440, "height": 900})
+    assert page.get_by_role("region", name="d33 of each measurement").evaluate(
+        "one => one.scrollWidth <= one.clientWidth"
+    )

@@ -56,13 +56,15 @@ def reason_of(
     slope: float,
     left_out_hz: Sequence[float],
     idle: Idle,
+    peaks_hz: Sequence[float],
 ) -> str:
-    """The reason for a zone over `bins` (first, last) of the `curves` (conditions and all, bins) over `middle_hz`."""
+    """The reason for a zone over `bins` (first, last) of the `curves` (conditions and all, bins) over `middle_hz`;
+    `peaks_hz`: where each condition's magnitude is largest above the zone."""
     first, last = bins
     departure = curves / levels_of(curves[:, first : last + 1]) - 1
     parts = [f"{low_hz:.4g} to {high_hz:.4g} Hz: no resonance in any recording"]
     if last + 1 < len(middle_hz):
-        parts.append(_above(high_hz, middle_hz, departure, conditions, last))
+        parts.append(_above(high_hz, peaks_hz, departure, conditions, last))
     elif idle.above:
         parts.append(f"above {high_hz:.4g} Hz {_NOT_EXCITED}")
     if first > 0:
@@ -87,11 +89,15 @@ def levels_of(curves: Floats) -> Floats:
 
 
 def _above(
-    high_hz: float, middle_hz: Floats, departure: Floats, conditions: Sequence[tuple[float, float]], last: int
+    high_hz: float,
+    peaks_hz: Sequence[float],
+    departure: Floats,
+    conditions: Sequence[tuple[float, float]],
+    last: int,
 ) -> str:
     beyond = departure[:-1, last + 1 :]
     peaks = {
-        index: float(middle_hz[last + 1 + int(np.nanargmax(row))])
+        index: peaks_hz[index]
         for index, row in enumerate(beyond)
         if np.isfinite(row).any() and np.nanmax(row) > _PEAK - 1
     }
@@ -207,8 +213,20 @@ def flat_zone(
     idle = Idle(
         bool((idle_hz < low).any()), bool((idle_hz > high).any()), int(((idle_hz > low) & (idle_hz < high)).sum())
     )
-    reason = reason_of(low, high, middle, curves, names, (first, last), slope, mains_in_band, idle)
+    peaks = [_peak_hz(excited_stacks, [condition == name for condition in conditions], high) for name in names]
+    reason = reason_of(low, high, middle, curves, names, (first, last), slope, mains_in_band, idle, peaks)
     return FlatZone(float(low), float(high), reason, mains_in_band, tuple(np.round(idle_hz, 6).tolist()))
+
+
+def _peak_hz(stacks: Sequence[Stack], chosen: Sequence[bool], above_hz: float) -> float:
+    """The line above a frequency at which the mean magnitude of the chosen recordings is largest; NaN without one."""
+    peaks = [(0.0, np.nan)]
+    for stack in stacks:
+        rows, beyond = np.array(chosen)[stack.rows], stack.frequency > above_hz
+        if rows.any() and beyond.any():
+            size = np.nan_to_num(np.abs(stack.values[rows][:, beyond])).mean(axis=0)
+            peaks.append((float(size.max()), float(stack.frequency[beyond][size.argmax()])))
+    return max(peaks, key=lambda peak: peak[0])[1]
 
 
 def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:

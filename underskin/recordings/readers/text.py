@@ -40,6 +40,11 @@ def blocks(written: str) -> Iterator[tuple[int, list[str]]]:
         start = end + 1
 
 
+def _line(data: bytes, byte: int) -> str:
+    """The line that a byte is in."""
+    return f"line {data.count(bytes([10]), 0, byte) + 1}"
+
+
 def decode(data: bytes, file: str) -> str:
     """The text of a file: UTF-8, UTF-16 by a byte order mark or zero bytes, else Latin-1, which older instruments
     write.
@@ -52,10 +57,10 @@ def decode(data: bytes, file: str) -> str:
         try:
             return str(memoryview(data)[len(mark) :], encoding)
         except UnicodeDecodeError as error:
-            raise FileError(file, f"byte {error.start}", f"is no {encoding.upper()} text: {error.reason}") from None
+            raise FileError(file, _line(data, error.start), f"is no {encoding.upper()} text: {error.reason}") from None
     zero = data.find(0)
     if zero >= 0:
-        raise FileError(file, f"byte {zero}", "is no text: it holds a zero byte")
+        raise FileError(file, _line(data, zero), "is no text: it holds a zero byte")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
