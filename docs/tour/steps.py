@@ -92,7 +92,7 @@ STEPS = (
         "Start",
         "An empty server offers an example: a 4 × 2 array over half a year, recorded by the [virtual rig](rig.md) "
         "(`python scripts/make_example.py`). Later this page lists your skins: the last campaign, d33 over time, and "
-        "whether the recordings agree with the model.",
+        "what is to be looked at, and whether the recordings agree with the model.",
         lambda page: page.goto("/"),
     ),
     TourStep(
@@ -123,11 +123,11 @@ STEPS = (
         "diagnosis",
         "A diagnosis",
         "*Diagnose* asks what the model leaves out; for these 64 recordings the answer takes some seconds. The page "
-        f"begins with a summary: the answer in one sentence, here {VERDICT}; what to quote, the error with it and "
-        "without, on recordings that it was not fitted to, and what to mind. Printed, or saved as PDF from the "
+        f"begins with a summary: the answer in one sentence, here {VERDICT}; what to quote, what to do next and "
+        "what was left out; why, and how well it fits, is folded. Printed, or saved as PDF from the "
         "browser's print dialog, the summary and its three figures are the first page. Folded below: where recordings "
-        "and model disagree, the parameters with intervals, the alternatives and why not, what these recordings cannot "
-        "tell, and what to measure next. [How to read it](diagnosis.md), [how it works](how-it-works.md).",
+        "and model disagree, the parameters with intervals, the alternatives and why not, what these recordings do "
+        "not show, and what to measure next. [How to read it](diagnosis.md), [how it works](how-it-works.md).",
         _diagnosis,
     ),
     TourStep(
@@ -143,7 +143,7 @@ STEPS = (
     TourStep(
         "adopted",
         "Adopted",
-        "Adopted, the explanation is the skin's model: skin and start head it, with d33 by it beside the paper's; map "
+        "Adopted, the explanation is the skin's model: skin and start head it, with d33 by it next to the paper's; map "
         "and history show either, and every value says by which. Withdrawn, with a reason, it stays as that version, "
         "and the paper's model is in force again.",
         _adopted,
