@@ -13,7 +13,6 @@ from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.diagnosis.array import shown_array
-from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, is_undecided
 from service.pages.diagnosis.planned import PlannedRow, heads, planned_rows, rig_answer
 from service.pages.shared import same_request, verdicts
@@ -26,6 +25,7 @@ from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
+from underskin.diagnosis.reporting.figure_columns import columns
 from underskin.diagnosis.reporting.wording import planned_columns
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.registry import CATALOGUE

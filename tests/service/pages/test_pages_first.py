@@ -110,7 +110,7 @@ def test_first_screen_of_a_report(visitor: Visit, server: Server, width: int) ->
     buttons = page.locator(".head .button:not(.second), .summary .button").all()
     assert len([button for button in buttons if button.is_visible()]) == 1
     recorded = page.locator(".recorded").inner_text()
-    assert f"skin screen{width}; h 2.5 mm; E 2 MPa; rT 1.5 mm; spheres of radius" in recorded
+    assert f"Skin screen{width}; h 2.5 mm; E 2 MPa; rT 1.5 mm; spheres of radius" in recorded
     assert re.search(r"preloads .* N; 12 recordings, .*; underskin .*, table [0-9a-f]{8}", recorded)
     summary.locator(".why > summary").click()
     assert summary.locator(".why p").first.is_visible()

@@ -20,7 +20,7 @@ from underskin.diagnosis.reporting.figures import explanations, several_figures
 from underskin.diagnosis.reporting.headline import first_and_rest
 from underskin.diagnosis.reporting.page_styles import SCHEME
 from underskin.diagnosis.reporting.statement import lacking_part
-from underskin.findings.formatting import in_percent
+from underskin.findings.formatting import capital, in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 from underskin.prediction.columns import to_spreadsheet
@@ -98,7 +98,7 @@ def recorded_in_words(skin: Report, recordings: Iterable[Report]) -> str:
         parts += [f"{name} {joint.join(f'{value:g}' for value in shown)} {unit}"] if values else []
     days = sorted({str(row["recorded_at"])[:10] for row in rows if row.get("recorded_at")})
     dates = "" if not days else f", {days[0]}" + (f" to {days[-1]}" if len(days) > 1 else "")
-    return "; ".join([*parts, f"{len(rows)} recording{'' if len(rows) == 1 else 's'}{dates}"])
+    return capital("; ".join([*parts, f"{len(rows)} recording{'' if len(rows) == 1 else 's'}{dates}"]))
 
 
 def page(report: Report, figures: Mapping[str, go.Figure] | None = None, recorded: str = "") -> str:
