@@ -114,7 +114,7 @@ def test_next_experiment_planned_within_reader_s(patient: Visit, diagnosing: Ser
         ({"indenter_radius_mm": "4 big"}, r"radii of the spheres at hand \[mm\]: big – must be a number"),
         ({"indenter_radius_mm": "4 nan"}, "must be above 0"),
         ({"indenter_radius_mm": "1 2 3 4 5 6 7 8 9"}, "at most 8 numbers"),
-        ({"offset_mm": "-1"}, "distances beside the sensor.*must be 0 or more"),
+        ({"offset_mm": "-1"}, "distances from the sensor.*must be 0 or more"),
         ({"dynamic_force_n": "inf"}, "dynamic forces of the shaker.*must be above 0"),
         ({"recordings": "0"}, "recordings at most: 0 – must be a whole number from 1 to 50"),
         ({"recordings": "00501"}, "recordings at most: 00501 – must be a whole number from 1 to 50"),
