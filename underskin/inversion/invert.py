@@ -10,8 +10,8 @@ radius and modulus; `absolute_d33` includes it.
 Recordings far off the others of their sensor (a slip of units, a wrong range) are left out, since the mixed model
 assumes log-normal recordings about their sensor's d33. What a skin may show is no outlier: an effect of a condition on
 all sensors, the scatter of the array, and the effect of a misplaced sphere. Sensors are flagged with the reason where
-they are dead, inverted, behind a filter, noisy, non-linear in preload (bent), or differ from the median of the others by
-three standard errors and 5 % (weak, strong); far off, they are left out of the array's d33. Findings are used all the same.
+they are dead, inverted, behind a filter, noisy, non-linear in preload (bent), or differ from the median of the others
+by three standard errors and 5 % (weak, strong); far off, they are left out of the array's d33. Findings are used.
 """
 
 from collections.abc import Mapping, Sequence
