@@ -40,10 +40,7 @@ _HEADER = (
 )  # fmt: skip
 
 
-_TO_QUOTE = (
-    "this d33 holds if the paper's model describes these recordings, which is assumed here and not tested: before it "
-    "is quoted, `underskin diagnose` should find nothing missing"
-)
+_TO_QUOTE = "before you quote d33: it assumes the paper's model, and `underskin diagnose` tests that"
 
 
 @dataclass(frozen=True)
