@@ -253,7 +253,8 @@ def _complete(
     shape = describe(problem, stated) if undescribed else None
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
     determining = frozenset() if partial.joined is None else partial.joined.determining_modulus(stated.names)
-    partial = partial.with_findings(*curve_spread_findings(problem, stated))
+    if leader.explanation is not None:
+        partial = partial.with_findings(*curve_spread_findings(problem, stated))
     return replace(
         partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,

@@ -145,8 +145,7 @@ class Facts:
         return self.curves_differ + [
             finding.statement
             for finding in self.diagnosis.findings
-            if finding.reason == Reason.THICKNESS_DIFFERS
-            or (finding.reason == Reason.HELD_OUT_NO_BETTER and finding.arguments["shows"] and is_far)
+            if finding.reason == Reason.THICKNESS_DIFFERS or (finding.reason == Reason.HELD_OUT_NO_BETTER and is_far)
         ]
 
     @property

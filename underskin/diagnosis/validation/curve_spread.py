@@ -1,12 +1,14 @@
-"""Curves that contradict each other: their moduli differ by more than a poor rig scatters.
+"""Curves that contradict each other: their moduli differ by more than noise and a poor rig scatter.
 
-b_i = ln(Σ f m/d² / Σ m²/d²) of curve i, its force f over the stated model m: its modulus over the common one. Of a
-poor rig b has the standard deviation s = 5 %, so that Σ (b_i − b̄)²/s² is χ² of n − 1 degrees of freedom. A sphere's
-modulus goes with 1/√R, so that exchanged radii, or a diameter for a radius, change b by half a logarithm of a ratio
-that is known.
+b_i = ln(Σ f m/d² / Σ m²/d²) of curve i, its force f over the stated model m: its modulus over the common one. Its
+variance is s² + 1/(Σ m²/d² − (Σ m m′/d²)²/Σ m′²/d²), with s = 5 % of a poor rig, d the noise and m′ the slope over the
+displacement, since its contact point is fitted as well. Σ (b_i − b̄)²/variance, b̄ the weighted mean, is χ² of n − 1
+degrees of freedom. A sphere's modulus goes with 1/√R, so that exchanged radii, or a diameter for a radius, change b by
+half a logarithm of a ratio that is known.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -25,32 +27,60 @@ _CHANCE = 1e-3  # of a poor rig whose curves would be said to contradict each ot
 
 
 def curve_spread_findings(problem: FittingProblem, stated: Explanation) -> list[Finding]:
-    """The modulus of each curve beside the stated one, where they differ beyond what a rig scatters."""
-    lines, recordings = problem.lines, problem.lines.campaign.recordings
+    """The modulus of each curve over their mean, where they differ beyond noise and what a rig scatters."""
+    lines, recordings = problem.lines, problem.lines.campaign.curves
     if not lines.curves or len(recordings) < 2:
         return []
-    model = row_prediction(problem, stated).real
-    weighted = model / lines.deviation**2
-    along, square = (np.add.reduceat(weighted * column, lines.first) for column in (lines.value.real, model))
-    if not (along > 0).all():
+    noise = stated.best.levels.level * lines.deviation
+    measured, model = (column.real / noise for column in (lines.value, row_prediction(problem, stated)))
+    slope = np.concatenate(
+        [
+            _slope(recording.displacement_mm, model[rows])
+            for recording, rows in zip(recordings, lines.spans, strict=True)
+        ]
+    )
+    along, square, across, of_slope = (
+        np.add.reduceat(product, lines.first) for product in (model * measured, model**2, model * slope, slope**2)
+    )
+    known = square - across**2 / of_slope
+    if not (along > 0).all() or not (known > 0).all():
         return []
-    logarithms = np.log(along / square)
-    if _agree(logarithms):
+    moduli = _Moduli(np.log(along / square), GAIN_RANGE[1] ** 2 + 1 / known)
+    if moduli.agree():
         return []
-    curves = [recording for recording in recordings if isinstance(recording, IndentationRecording)]
-    radii = [curve.indenter_radius_mm for curve in curves] if len(curves) == len(recordings) else []
-    remedies = [words for words, changed in _other_radii(radii) if _agree(logarithms - np.log(changed) / 2)]
+    spheres = [recording for recording in recordings if isinstance(recording, IndentationRecording)]
+    radii = [sphere.indenter_radius_mm for sphere in spheres] if len(spheres) == len(recordings) else []
+    remedies = [words for words, changed in _other_radii(radii) if moduli.agree(np.log(changed) / 2)]
     arguments = {
         "ids": [recording.id for recording in recordings],
-        "factors": np.exp(logarithms - logarithms.mean()).tolist(),
+        "factors": np.exp(moduli.about_mean()).tolist(),
         "remedies": remedies[:MOST_QUOTED],
     }
     return [Finding(Reason.CURVES_DIFFER, "", "force_n", arguments)]
 
 
-def _agree(logarithms: Floats) -> bool:
-    statistic = np.sum((logarithms - logarithms.mean()) ** 2) / GAIN_RANGE[1] ** 2
-    return bool(chdtrc(len(logarithms) - 1, statistic) > _CHANCE)
+def _slope(displacement: Floats, model: Floats) -> Floats:
+    """Of a model over the displacement (samples,); 0 where the sample does not move."""
+    step = np.gradient(displacement)
+    return np.asarray(np.divide(np.gradient(model), step, out=np.zeros_like(model), where=step != 0))
+
+
+@dataclass(frozen=True)
+class _Moduli:
+    """Logarithms of the curves' moduli over the common one, and their variances (curves,)."""
+
+    logarithm: Floats
+    variance: Floats
+
+    def about_mean(self, moved: Floats | float = 0.0) -> Floats:
+        """The logarithms less `moved`, about their weighted mean."""
+        logarithm = self.logarithm - moved
+        return logarithm - np.average(logarithm, weights=1 / self.variance)
+
+    def agree(self, moved: Floats | float = 0.0) -> bool:
+        """Whether the logarithms less `moved` differ by no more than chance."""
+        statistic = np.sum(self.about_mean(moved) ** 2 / self.variance)
+        return bool(chdtrc(len(self.variance) - 1, statistic) > _CHANCE)
 
 
 def _other_radii(radii: Sequence[float]) -> Iterator[tuple[str, Floats]]:
