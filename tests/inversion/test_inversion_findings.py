@@ -1,5 +1,6 @@
 """Marked sensors and recordings are named with the reason, and others are not."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -373,3 +374,37 @@ def test_a_temperature_that_rises_from_sensor_to_sensor(per_kelvin: float, table
         assert FindingCode.CONDITION_DIFFERS not in {finding.code for finding in same.findings}
     assert outside <= 2
     assert said >= 2 or not per_kelvin
+
+
+def turned(campaign: Campaign, factor: Callable[[Floats], Complexes]) -> Campaign:
+    """The campaign with each FRF times a factor of its frequencies [Hz]."""
+    recordings = []
+    for recording in campaign.of(FrfRecording):
+        assert recording.frequency_hz is not None
+        assert recording.frf_re_pc_per_n is not None
+        assert recording.frf_im_pc_per_n is not None
+        values = (recording.frf_re_pc_per_n + 1j * recording.frf_im_pc_per_n) * factor(recording.frequency_hz)
+        recordings.append(replace(recording, frf_re_pc_per_n=values.real, frf_im_pc_per_n=values.imag))
+    return replace(campaign, recordings=tuple(recordings))
+
+
+@pytest.mark.parametrize("degrees", [20.0, -60.0, 85.0])
+def test_constant_phase_leaves_d33(table: SigmaTable, degrees: float) -> None:
+    """A phase that is the same over frequency is stated, and d33 is that of the magnitude; a delay, a pole and a small
+    phase are none."""
+    campaign = simulate(table, Rig(d33=np.full(4, 14.0)), np.random.default_rng(5))
+    plain = invert(campaign, table)
+    found = invert(turned(campaign, lambda f: np.exp(1j * np.deg2rad(degrees)) + 0 * f), table)
+    (finding,) = [finding for finding in found.findings if finding.code == FindingCode.CONSTANT_PHASE]
+    assert finding.arguments["phase_deg"] == pytest.approx(degrees, abs=1)
+    assert "late" not in found.zone.reason
+    assert found.campaign_d33 is not None
+    assert plain.campaign_d33 is not None
+    assert float(found.campaign_d33.value) == pytest.approx(float(plain.campaign_d33.value), rel=0.01)
+    for factor in (
+        lambda f: np.exp(-2j * np.pi * f * np.deg2rad(abs(degrees)) / 1000),
+        lambda f: 1 / (1 - 1j * 0.05 * abs(degrees) / f),
+        lambda f: np.exp(0.05j) + 0 * f,
+    ):
+        others = invert(turned(campaign, factor), table).findings
+        assert FindingCode.CONSTANT_PHASE not in [finding.code for finding in others]

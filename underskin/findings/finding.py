@@ -600,6 +600,10 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CONDITION_DIFFERS: "{name} differs between the sensors, {low:.4g} to {high:.4g}, and by the recordings of "
     "each sensor it changes d33 by {percent:+.2g} ± {unsure:.2g} % per unit: the d33 of sensors are stated at its "
     "mean, {mean:.4g}, which leaves them unsure by up to {left_percent:.2g} %; measure all sensors under one condition",
+    Reason.CONSTANT_PHASE: "the FRFs have a phase of {phase_deg:.0f}°, the same over frequency and more than any loss "
+    "of a skin: the reference phase of a lock-in amplifier, or another shift in the chain; it was taken off, so that "
+    "d33 is that of the magnitude (the real part alone would be {lost_percent:.2g} % less), and its sign is known but "
+    "for half a turn",
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: parameter_at_bound,

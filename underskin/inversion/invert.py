@@ -1,9 +1,9 @@
 """d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and for
 the campaign (Seminara 2018, section 3.2 and equation 15).
 
-Each recording's Re FRF, corrected for the common delay and the bias by noise, is averaged over the flat zone and
-divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then estimates the scatter of recordings, and so the
-precision of each d33. These intervals are relative: they hold for the declared skin and the base model.
+Each recording's Re FRF, corrected for the common delay or phase and the bias by noise, is averaged over the flat zone
+and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then estimates the scatter of recordings, and so
+the precision of each d33. These intervals are relative: they hold for the declared skin and the base model.
 `declared_percent` is the standard deviation of all d33 together by the tolerances of the declared thickness, sensor
 radius and modulus; `absolute_d33` includes it.
 
@@ -479,7 +479,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     if not recorded:
         raise _none_usable(campaign, left_out)
     conditions = [(item.indenter_radius_mm, item.preload_n) for item in recorded]
-    frfs, delay = without_chain_phase(stacked(measured), conditions)
+    frfs, delay, phase = without_chain_phase(stacked(measured), conditions)
     zone = flat_zone(frfs, conditions, band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
@@ -522,8 +522,16 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     inversion = _estimated(ids, rows, contact, zone, own_filters, noted).wider(common_uncertainty)
     filtered = of_roll_off(behind, zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33, units_checked=campaign.units_checked)
-    findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *inversion.findings, *others)
+    at_start = (*at_reading(campaign), *unusual_values, *of_recordings, *_rotated(phase))
+    findings = (*at_start, *filtered, *inversion.findings, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
+
+
+def _rotated(phase: float) -> list[Finding]:
+    """A finding on the constant phase [rad] that was removed; none for 0."""
+    degrees = float(np.rad2deg(phase))
+    lost = {"phase_deg": degrees, "lost_percent": 100 * (1 - float(np.cos(phase)))}
+    return [Finding(Reason.CONSTANT_PHASE, "", "frf_im_pc_per_n", lost)] if phase else []
 
 
 def _delayed(delay: float) -> str:
