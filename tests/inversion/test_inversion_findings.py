@@ -11,7 +11,7 @@ from tests.support.shaken_series import shaken
 from tests.support.simulated_campaign import Rig, simulate
 from underskin.diagnosis.slips.inspection import inspect
 from underskin.errors import InvalidInput
-from underskin.findings.codes import FindingCode
+from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding, ImplausibleD33
 from underskin.inversion.invert import Inversion, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -408,3 +408,21 @@ def test_constant_phase_leaves_d33(table: SigmaTable, degrees: float) -> None:
     ):
         others = invert(turned(campaign, factor), table).findings
         assert FindingCode.CONSTANT_PHASE not in [finding.code for finding in others]
+
+
+@pytest.mark.parametrize(("higher", "factor"), [((2, 3), 4.0), ((1, 2, 3), 5.0), ((2, 3), 3.4), ((1,), 1000.0)])
+def test_two_ranges_of_an_amplifier(table: SigmaTable, higher: tuple[int, ...], factor: float) -> None:
+    """Two groups of sensors a factor apart are named, none is left out as weak or dead, and the array has no d33."""
+    campaign = simulate(table, Rig(d33=np.array([8.0, 8.3, 7.9, 8.1])), np.random.default_rng(5))
+    for row, recording in enumerate(campaign.of(FrfRecording)):
+        if recording.sensor in [f"s{number}" for number in higher]:
+            campaign = scaled(campaign, row, factor)
+    found = invert(campaign, table)
+    (finding,) = [finding for finding in found.findings if finding.reason == Reason.TWO_GROUPS]
+    assert finding.arguments["factor"] == pytest.approx(factor, rel=0.1)
+    assert finding.arguments["higher"] == [f"s{number}" for number in higher]
+    assert found.flags == found.left_out == ()
+    assert found.campaign_d33 is None
+    assert float(found.sensors.value[0]) == pytest.approx(8e-12, rel=0.1)
+    assert found.gain is not None
+    assert float(found.gain.value) < 0.06

@@ -158,6 +158,7 @@ class Reason(StrEnum):
     LABELS_CONTRADICT_PLACES = "sensors_exchanged.contradict_places"
     SILENT_TOGETHER = "sensors_exchanged.silent_together"
     AMPLITUDE_FACTOR = "gain_steps"
+    TWO_GROUPS = "gain_steps.sensors"
     WARM_UP = "warm_up"
     CHANNELS_SWAPPED = "channels_swapped"
     PRELOAD_AND_RADIUS_EXCHANGED = "channels_swapped.preload_and_radius"

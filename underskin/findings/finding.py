@@ -553,6 +553,9 @@ ENGLISH: Mapping[Reason, Words] = {
     "others': is their "
     "dynamic force or charge given as {meant} instead of peak? Put right by this factor ({of:listed recordings})"
     "{left_out:; {left_out} that do not tell were left out|}",
+    Reason.TWO_GROUPS: "{lower:listed sensors} and {higher:listed sensors} are two groups, alike within and "
+    "{factor:.3g} times apart: was the charge of one not divided by its amplifier's range, or given in another unit or "
+    "peak-to-peak? Which group is right shows in no recording: no d33 of the array is to be quoted",
     Reason.WARM_UP: "the response drifts by {percent:+z.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "

@@ -379,6 +379,8 @@ class Facts:
                 and finding.arguments["affected"] == finding.arguments["recordings"]
                 for finding in diagnosis.findings
             ),
+            "its sensors are two groups a factor apart": Reason.TWO_GROUPS
+            in [item.reason for item in diagnosis.findings],
             "no PVDF has such a value": plausibility.implausibility(
                 d33["value"], units_checked=self.problem.lines.campaign.units_checked
             )

@@ -265,7 +265,9 @@ def labelled_unit(heading: str) -> str:
     return ""
 
 
-MIXED_AMPLITUDES = "says rms or peak-to-peak of charge or force alone, where an FRF is amplitude over amplitude: convert it in a formula"
+MIXED_AMPLITUDES = (
+    "says rms or peak-to-peak of charge or force alone; an FRF is amplitude over amplitude: convert it in a formula"
+)
 
 
 def mixes_amplitudes(name: str, label: str) -> bool:
