@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.inversion.inverted_campaigns import covered, moved, scaled
-from tests.support.shaken_series import shaken
+from tests.support.shaken_series import D33, shaken
 from tests.support.simulated_campaign import Rig, simulate
 from underskin.diagnosis.slips.inspection import inspect
 from underskin.errors import InvalidInput
@@ -426,3 +426,29 @@ def test_two_ranges_of_an_amplifier(table: SigmaTable, higher: tuple[int, ...], 
     assert float(found.sensors.value[0]) == pytest.approx(8e-12, rel=0.1)
     assert found.gain is not None
     assert float(found.gain.value) < 0.06
+
+
+@pytest.mark.parametrize("factor", [1.1, 2.0, 0.0])
+def test_gain_changes_within_series(table: SigmaTable, factor: float) -> None:
+    """A charge times a factor from the middle on is stated with it and the time, as no noise in the force, and the
+    interval holds either d33; neither a force that stops nor one whose size changes is such a change."""
+    plain = shaken(samples=8192)
+
+    def altered_series(of_force: float, of_charge: float) -> Inversion:
+        recordings = []
+        for recording in plain.of(FrfRecording):
+            force, charge = np.asarray(recording.force_n), np.asarray(recording.charge_pc)
+            later, mean = np.arange(len(force)) >= len(force) // 2, force.mean()
+            force = np.where(later, mean + of_force * (force - mean), force)
+            recordings.append(replace(recording, force_n=force, charge_pc=np.where(later, of_charge * charge, charge)))
+        return invert(replace(plain, recordings=tuple(recordings)), table)
+
+    found = altered_series(1.0, factor)
+    (finding,) = [finding for finding in found.findings if finding.reason == Reason.GAIN_STEP]
+    assert finding.arguments["ratio"] == pytest.approx(factor, abs=0.04)
+    assert finding.arguments["step_s"] == pytest.approx(8192 / 800 / 2, abs=1.0)
+    assert FindingCode.NOISE_IN_FRF not in [finding.code for finding in found.findings]
+    assert found.campaign_d33 is not None
+    assert float(found.campaign_d33.low) < D33 * 1e-12 < float(found.campaign_d33.high)
+    for steady in (altered_series(1.0, 1.0), altered_series(0.3, 0.3), altered_series(0.0, 0.0)):
+        assert FindingCode.GAIN_STEPS not in [finding.code for finding in steady.findings]

@@ -159,6 +159,8 @@ class Reason(StrEnum):
     SILENT_TOGETHER = "sensors_exchanged.silent_together"
     AMPLITUDE_FACTOR = "gain_steps"
     TWO_GROUPS = "gain_steps.sensors"
+    GAIN_STEP = "gain_steps.within"
+    GAIN_DRIFTS = "gain_steps.drift"
     WARM_UP = "warm_up"
     CHANNELS_SWAPPED = "channels_swapped"
     PRELOAD_AND_RADIUS_EXCHANGED = "channels_swapped.preload_and_radius"

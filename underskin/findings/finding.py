@@ -390,6 +390,10 @@ def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
 
 _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
 _OF_ARRAY = "{percent:z.0f} % of the array's d33"
+_CHANGES = (
+    ", at all frequencies and far beyond noise: another range of the amplifier, a loose plug or a cable? The FRF "
+    "averages over it: its d33 is not to be quoted{more:more recording}"
+)
 _MORE_ROWS = "{more: ({more} more rows like it)|}"
 _UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
 _GIVEN_IN = "{units:; was charge over force given in {units:or}?|}"
@@ -556,6 +560,10 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.TWO_GROUPS: "{lower:listed sensors} and {higher:listed sensors} are two groups, alike within and "
     "{factor:.3g} times apart: was the charge of one not divided by its amplifier's range, or given in another unit or "
     "peak-to-peak? Which group is right shows in no recording: no d33 of the array is to be quoted",
+    Reason.GAIN_STEP: "at about {step_s:.3g} s the charge per force changes to {ratio:.3g} times what it was before"
+    f"{_CHANGES}",
+    Reason.GAIN_DRIFTS: "the charge per force changes within the recording, from {lowest:.2f} to {highest:.2f} times "
+    f"its mean{_CHANGES}",
     Reason.WARM_UP: "the response drifts by {percent:+z.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "

@@ -52,7 +52,7 @@ from underskin.recordings.frf.flat_zone import (
     roll_off,
     without_chain_phase,
 )
-from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
+from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, Stack, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
@@ -348,7 +348,8 @@ def findings_of(
         d33 = float(to_lab("d33_pc_per_n", array.value))
         implausible = plausibility.of_array(Reason.D33_OF_ARRAY, d33, units_checked=units_checked)
     preloads = [finding for recording in recorded if (finding := _preload_contradiction(recording)) is not None]
-    return (*defects, *noise_findings(measured), *preloads, *unit_errors, *implausible)
+    of_gain = gain_findings(dict(zip((item.id for item in recorded), measured, strict=True)))
+    return (*defects, *of_gain, *noise_findings(measured), *preloads, *unit_errors, *implausible)
 
 
 def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
