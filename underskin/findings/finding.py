@@ -218,7 +218,9 @@ def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
     if abs(percent) < _STATED_PERCENT:
         either = "noise in force or charge, which these lines do not tell apart, may bias"
         return f"{either} {estimator}: ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
-    text = f"noise in {channel} makes {estimator} too {size} by {in_digits(abs(percent), 2)} %: that was taken off"
+    changed = "raised" if percent < 0 else "lowered"
+    by = f"{in_digits(abs(percent), 2)} %"
+    text = f"noise in {channel} makes {estimator} too {size}: FRFs and d33 were {changed} by {by}"
     return (
         f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
         if unsure_percent >= _STATED_PERCENT
