@@ -130,16 +130,28 @@ def test_polarity_at_random_is_put_right(good: Campaign, table: SigmaTable) -> N
     assert put_right(report, right(good, table))
 
 
-def test_sensor_tenth_left_out_spread_sensors(good: Campaign, table: SigmaTable) -> None:
-    """A sensor at a tenth is left out and a spread of sensors is not."""
-    report = looked_at(changed(good, lambda entry, _: times(entry, 0.1 if entry.sensor == "s1" else 1.0)), table)
+def test_weak_sensor_left_out_spread_sensors(good: Campaign, table: SigmaTable) -> None:
+    """A sensor at 7 %, the factor of no range, is left out and a spread of sensors is not."""
+    report = looked_at(changed(good, lambda entry, _: times(entry, 0.07 if entry.sensor == "s1" else 1.0)), table)
     ((code, statement),) = slips(report)
     assert code == "weak"
-    assert "'s1' answers with 0.1 " in statement
+    assert "'s1' answers with 0.07" in statement
     others = replace(good, recordings=tuple(entry for entry in frf_recordings(good) if entry.sensor != "s1"))
     assert put_right(report, looked_at(others, table))
     spread = {"s0": 0.6, "s1": 1.4, "s2": 1.0}
     assert named(changed(good, lambda entry, _: times(entry, spread[entry.sensor])), table, "sensor_spread") == []
+
+
+def test_two_ranges_leave_d33_open(table: SigmaTable) -> None:
+    """Half of the sensors on another range of the amplifier are no spread: both halves are named, d33 is not quoted."""
+    six = campaign(Made(sensors=6), table)
+    halves = changed(six, lambda entry, _: times(entry, 4.0 if entry.sensor in ("s1", "s3", "s4") else 1.0))
+    report = looked_at(halves, table)
+    ((code, statement),) = slips(report)
+    assert code == "gain_steps"
+    assert statement.startswith("sensors s0, s2, s5 and sensors s1, s3, s4 are two groups")
+    assert report["verdict"] == "no_mismatch"
+    assert not report["d33"]["quotable"]
 
 
 @pytest.mark.parametrize(("share", "word"), first(2, [(0.75, "weak"), (2.0, "strong"), (1.35, "strong")]))

@@ -1,16 +1,17 @@
 """Marked sensors and recordings are named with the reason, and others are not."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.inversion.inverted_campaigns import covered, moved, scaled
-from tests.support.shaken_series import shaken
+from tests.support.shaken_series import D33, shaken
 from tests.support.simulated_campaign import Rig, simulate
 from underskin.diagnosis.slips.inspection import inspect
 from underskin.errors import InvalidInput
-from underskin.findings.codes import FindingCode
+from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding, ImplausibleD33
 from underskin.inversion.invert import Inversion, invert
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -373,3 +374,81 @@ def test_a_temperature_that_rises_from_sensor_to_sensor(per_kelvin: float, table
         assert FindingCode.CONDITION_DIFFERS not in {finding.code for finding in same.findings}
     assert outside <= 2
     assert said >= 2 or not per_kelvin
+
+
+def turned(campaign: Campaign, factor: Callable[[Floats], Complexes]) -> Campaign:
+    """The campaign with each FRF times a factor of its frequencies [Hz]."""
+    recordings = []
+    for recording in campaign.of(FrfRecording):
+        assert recording.frequency_hz is not None
+        assert recording.frf_re_pc_per_n is not None
+        assert recording.frf_im_pc_per_n is not None
+        values = (recording.frf_re_pc_per_n + 1j * recording.frf_im_pc_per_n) * factor(recording.frequency_hz)
+        recordings.append(replace(recording, frf_re_pc_per_n=values.real, frf_im_pc_per_n=values.imag))
+    return replace(campaign, recordings=tuple(recordings))
+
+
+@pytest.mark.parametrize("degrees", [20.0, -60.0, 85.0])
+def test_constant_phase_leaves_d33(table: SigmaTable, degrees: float) -> None:
+    """A phase that is the same over frequency is stated, and d33 is that of the magnitude; a delay, a pole and a small
+    phase are none."""
+    campaign = simulate(table, Rig(d33=np.full(4, 14.0)), np.random.default_rng(5))
+    plain = invert(campaign, table)
+    found = invert(turned(campaign, lambda f: np.exp(1j * np.deg2rad(degrees)) + 0 * f), table)
+    (finding,) = [finding for finding in found.findings if finding.code == FindingCode.CONSTANT_PHASE]
+    assert finding.arguments["phase_deg"] == pytest.approx(degrees, abs=1)
+    assert "late" not in found.zone.reason
+    assert found.campaign_d33 is not None
+    assert plain.campaign_d33 is not None
+    assert float(found.campaign_d33.value) == pytest.approx(float(plain.campaign_d33.value), rel=0.01)
+    for factor in (
+        lambda f: np.exp(-2j * np.pi * f * np.deg2rad(abs(degrees)) / 1000),
+        lambda f: 1 / (1 - 1j * 0.05 * abs(degrees) / f),
+        lambda f: np.exp(0.05j) + 0 * f,
+    ):
+        others = invert(turned(campaign, factor), table).findings
+        assert FindingCode.CONSTANT_PHASE not in [finding.code for finding in others]
+
+
+@pytest.mark.parametrize(("higher", "factor"), [((2, 3), 4.0), ((1, 2, 3), 5.0), ((2, 3), 3.4), ((1,), 1000.0)])
+def test_two_ranges_of_an_amplifier(table: SigmaTable, higher: tuple[int, ...], factor: float) -> None:
+    """Two groups of sensors a factor apart are named, none is left out as weak or dead, and the array has no d33."""
+    campaign = simulate(table, Rig(d33=np.array([8.0, 8.3, 7.9, 8.1])), np.random.default_rng(5))
+    for row, recording in enumerate(campaign.of(FrfRecording)):
+        if recording.sensor in [f"s{number}" for number in higher]:
+            campaign = scaled(campaign, row, factor)
+    found = invert(campaign, table)
+    (finding,) = [finding for finding in found.findings if finding.reason == Reason.TWO_GROUPS]
+    assert finding.arguments["factor"] == pytest.approx(factor, rel=0.1)
+    assert finding.arguments["higher"] == [f"s{number}" for number in higher]
+    assert found.flags == found.left_out == ()
+    assert found.campaign_d33 is None
+    assert float(found.sensors.value[0]) == pytest.approx(8e-12, rel=0.1)
+    assert found.gain is not None
+    assert float(found.gain.value) < 0.06
+
+
+@pytest.mark.parametrize("factor", [1.1, 2.0, 0.0])
+def test_gain_changes_within_series(table: SigmaTable, factor: float) -> None:
+    """A charge times a factor from the middle on is stated with it and the time, as no noise in the force, and the
+    interval holds either d33; neither a force that stops nor one whose size changes is such a change."""
+    plain = shaken(samples=8192)
+
+    def altered_series(of_force: float, of_charge: float) -> Inversion:
+        recordings = []
+        for recording in plain.of(FrfRecording):
+            force, charge = np.asarray(recording.force_n), np.asarray(recording.charge_pc)
+            later, mean = np.arange(len(force)) >= len(force) // 2, force.mean()
+            force = np.where(later, mean + of_force * (force - mean), force)
+            recordings.append(replace(recording, force_n=force, charge_pc=np.where(later, of_charge * charge, charge)))
+        return invert(replace(plain, recordings=tuple(recordings)), table)
+
+    found = altered_series(1.0, factor)
+    (finding,) = [finding for finding in found.findings if finding.reason == Reason.GAIN_STEP]
+    assert finding.arguments["ratio"] == pytest.approx(factor, abs=0.04)
+    assert finding.arguments["step_s"] == pytest.approx(8192 / 800 / 2, abs=1.0)
+    assert FindingCode.NOISE_IN_FRF not in [finding.code for finding in found.findings]
+    assert found.campaign_d33 is not None
+    assert float(found.campaign_d33.low) < D33 * 1e-12 < float(found.campaign_d33.high)
+    for steady in (altered_series(1.0, 1.0), altered_series(0.3, 0.3), altered_series(0.0, 0.0)):
+        assert FindingCode.GAIN_STEPS not in [finding.code for finding in steady.findings]

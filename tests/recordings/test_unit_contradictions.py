@@ -250,3 +250,26 @@ def test_rate_file_states_otherwise_told() -> None:
     force = {"channel": "Force", "unit": "N"}
     reading = read_file(lvm("N"), "a.lvm", rig(force, recording={**COMMON, "sample_rate_hz": 500}))
     assert "the file states 1000 samples a second; the rig description 500, which counts" in reading.warnings
+
+
+@pytest.mark.parametrize(
+    ("heading", "is_refused"),
+    [
+        ("|H| [pC rms/N]", True), ("Charge rms / Force peak [pC/N]", True), ("|H| [pC p-p/N]", True),
+        ("|H| [pC rms/N rms]", False), ("|H| [pC/N]", False), ("|H| [pC pk/N pk]", False),
+    ],
+)  # fmt: skip
+def test_frf_of_two_amplitudes_refused(heading: str, is_refused: bool) -> None:
+    """An FRF whose heading says rms or peak-to-peak of charge or force alone is refused, unless `labelled` says so."""
+    channels = {"frequency_hz": {"channel": "Frequency [Hz]"}, "frf_magnitude_pc_per_n": {"channel": heading}}
+    channels["frf_phase_deg"] = {"channel": "Phase [deg]"}
+    stated = {"schema": "rig/1", "skin": document(FRF)["skin"], "recording": COMMON, "channels": channels}
+    data = f"Frequency [Hz];{heading};Phase [deg]\n5;7.2;0\n10;7.1;0\n20;7.2;0\n".encode()
+    if is_refused:
+        with pytest.raises(FileError, match="says rms or peak-to-peak of charge or force alone"):
+            read_file(data, "a.csv", rig_description.from_dict(stated))
+        channels["frf_magnitude_pc_per_n"] |= {"labelled": labelled_unit(heading), "unit": "pC/N"}
+    (recording,) = read_file(data, "a.csv", rig_description.from_dict(stated)).campaign.recordings
+    assert isinstance(recording, FrfRecording)
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_re_pc_per_n.tolist() == pytest.approx([7.2, 7.1, 7.2])

@@ -218,7 +218,9 @@ def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
     if abs(percent) < _STATED_PERCENT:
         either = "noise in force or charge, which these lines do not tell apart, may bias"
         return f"{either} {estimator}: ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
-    text = f"noise in {channel} makes {estimator} too {size} by {in_digits(abs(percent), 2)} %: that was taken off"
+    changed = "raised" if percent < 0 else "lowered"
+    by = f"{in_digits(abs(percent), 2)} %"
+    text = f"noise in {channel} makes {estimator} too {size}: FRFs and d33 were {changed} by {by}"
     return (
         f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open"
         if unsure_percent >= _STATED_PERCENT
@@ -390,6 +392,10 @@ def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
 
 _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
 _OF_ARRAY = "{percent:z.0f} % of the array's d33"
+_CHANGES = (
+    ", at all frequencies and far beyond noise: another range of the amplifier, a loose plug or a cable? The FRF "
+    "averages over it: its d33 is not to be quoted{more:more recording}"
+)
 _MORE_ROWS = "{more: ({more} more rows like it)|}"
 _UNUSUAL = f"{{value:g}} {{unit}} is unusual: {{guess}}{_MORE_ROWS}"
 _GIVEN_IN = "{units:; was charge over force given in {units:or}?|}"
@@ -553,6 +559,13 @@ ENGLISH: Mapping[Reason, Words] = {
     "others': is their "
     "dynamic force or charge given as {meant} instead of peak? Put right by this factor ({of:listed recordings})"
     "{left_out:; {left_out} that do not tell were left out|}",
+    Reason.TWO_GROUPS: "{lower:listed sensors} and {higher:listed sensors} are two groups, alike within and "
+    "{factor:.3g} times apart: was the charge of one not divided by its amplifier's range, or given in another unit or "
+    "peak-to-peak? Which group is right shows in no recording: no d33 of the array is to be quoted",
+    Reason.GAIN_STEP: "at about {step_s:.3g} s the charge per force changes to {ratio:.3g} times what it was before"
+    f"{_CHANGES}",
+    Reason.GAIN_DRIFTS: "the charge per force changes within the recording, from {lowest:.2f} to {highest:.2f} times "
+    f"its mean{_CHANGES}",
     Reason.WARM_UP: "the response drifts by {percent:+z.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "
@@ -600,6 +613,10 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CONDITION_DIFFERS: "{name} differs between the sensors, {low:.4g} to {high:.4g}, and by the recordings of "
     "each sensor it changes d33 by {percent:+.2g} ± {unsure:.2g} % per unit: the d33 of sensors are stated at its "
     "mean, {mean:.4g}, which leaves them unsure by up to {left_percent:.2g} %; measure all sensors under one condition",
+    Reason.CONSTANT_PHASE: "the FRFs have a phase of {phase_deg:.0f}°, the same over frequency and more than any loss "
+    "of a skin: the reference phase of a lock-in amplifier, or another shift in the chain; it was taken off, so that "
+    "d33 is that of the magnitude (the real part alone would be {lost_percent:.2g} % less), and its sign is known but "
+    "for half a turn",
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: parameter_at_bound,

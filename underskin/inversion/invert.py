@@ -1,9 +1,9 @@
 """d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and for
 the campaign (Seminara 2018, section 3.2 and equation 15).
 
-Each recording's Re FRF, corrected for the common delay and the bias by noise, is averaged over the flat zone and
-divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then estimates the scatter of recordings, and so the
-precision of each d33. These intervals are relative: they hold for the declared skin and the base model.
+Each recording's Re FRF, corrected for the common delay or phase and the bias by noise, is averaged over the flat zone
+and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then estimates the scatter of recordings, and so
+the precision of each d33. These intervals are relative: they hold for the declared skin and the base model.
 `declared_percent` is the standard deviation of all d33 together by the tolerances of the declared thickness, sensor
 radius and modulus; `absolute_d33` includes it.
 
@@ -28,6 +28,7 @@ from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
 from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
 from underskin.inversion.noted_conditions import NotedConditions, noted_conditions
+from underskin.inversion.sensor_groups import LEAST_SPREAD, two_groups
 from underskin.physics.charge_response import Indenter, gain
 from underskin.prediction import pressed_skin
 from underskin.prediction.answers import OTHER, STATED
@@ -51,7 +52,7 @@ from underskin.recordings.frf.flat_zone import (
     roll_off,
     without_chain_phase,
 )
-from underskin.recordings.frf.line_choice import excited_at_mains, noise_findings, usable_lines
+from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, Stack, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
@@ -63,7 +64,7 @@ _DEAD = 0.05  # of the array's d33
 _LEAST_PILOT = 1e-3  # of the array's d33: a dead sensor may give exact zeros
 _OUTLYING = 5.0  # robust deviations
 _WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
-_LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not distinguished
+_UNFIT = {Reason.DEAD, Reason.INVERTED}
 _NOISY = 3.0  # times the array's
 _LEAST_CURVATURE = 0.05  # of d33
 _DIFFERS, _LEAST_DIFFERENCE = 3.0, 0.05  # standard errors, and of the array's d33
@@ -133,17 +134,12 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
         [C/N]: the array's median for the sensors that belong to it, the sensor's own magnitude for the others.
     """
     count = len(ids)
-    typical = typical_size(d33)
-    weight = 1 / (noise**2 + (_LEAST_SPREAD * typical) ** 2)
-    total = np.bincount(sensor, weight, count)
-    with np.errstate(invalid="ignore"):
-        value = np.bincount(sensor, weight * d33, count) / total
-        line = np.sqrt(np.bincount(sensor, (weight * noise) ** 2, count)) / total
+    value, line = _sensor_means(count, sensor, d33, noise)
     size = np.abs(value)
     array = _typical(size, line)
     alive = is_alive(value, line)
     sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
-    spread = max(ROBUST * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
+    spread = max(ROBUST * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, LEAST_SPREAD * array)
     flags: dict[int, Flag] = {}
     for index in np.flatnonzero(np.isfinite(value)).tolist():
         outlying = alive.sum() > 3 and abs(size[index] - array) > _OUTLYING * spread
@@ -162,6 +158,39 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
     pilot = np.full(count, array)
     pilot[list(flags)] = np.maximum(size[list(flags)], _LEAST_PILOT * array)
     return flags, pilot
+
+
+def _sensor_means(count: int, sensor: Indices, d33: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """The mean d33 of each sensor's recordings and its standard uncertainty by line noise, NaN without any (sensors,)
+    [C/N]."""
+    weight = 1 / (noise**2 + (LEAST_SPREAD * typical_size(d33)) ** 2)
+    total = np.bincount(sensor, weight, count)
+    with np.errstate(invalid="ignore"):
+        value = np.bincount(sensor, weight * d33, count) / total
+        return value, np.sqrt(np.bincount(sensor, (weight * noise) ** 2, count)) / total
+
+
+def _without_groups(
+    ids: Sequence[str], sensor: Indices, d33: Floats, noise: Floats, flags: dict[int, Flag], pilot: Floats
+) -> tuple[dict[int, Flag], Floats, Floats, list[Finding]]:
+    """The flags and pilots of `population_flags`, the factor of each sensor over its array (sensors,), and the finding
+    where the sensors are of two groups: then none is weak or strong, and which group is the array's is not known."""
+    value, line = _sensor_means(len(ids), sensor, d33, noise)
+    factor = np.ones(len(ids))
+    for unfit in (_UNFIT, _UNFIT - {Reason.DEAD}):  # in another unit by 1000, an array calls the right sensors dead
+        excluded = {index for index, flag in flags.items() if flag.flagged_for in unfit}
+        present = np.setdiff1d(np.flatnonzero(np.abs(value) > 3 * line), list(excluded)).astype(np.intp)
+        groups = two_groups(np.abs(value[present]), line[present])
+        if groups is not None:
+            break
+    else:
+        return flags, pilot, factor, []
+    lower, higher = present[groups.lower], present[groups.higher]
+    factor[higher], pilot = groups.factor, pilot.copy()
+    pilot[present] = np.abs(value[present])
+    named = {"lower": [ids[index] for index in lower], "higher": [ids[index] for index in higher]}
+    finding = Finding(Reason.TWO_GROUPS, "", "charge_pc", {**named, "factor": groups.factor})
+    return {index: flag for index, flag in flags.items() if index not in present}, pilot, factor, [finding]
 
 
 def scatter_flags(
@@ -319,7 +348,8 @@ def findings_of(
         d33 = float(to_lab("d33_pc_per_n", array.value))
         implausible = plausibility.of_array(Reason.D33_OF_ARRAY, d33, units_checked=units_checked)
     preloads = [finding for recording in recorded if (finding := _preload_contradiction(recording)) is not None]
-    return (*defects, *noise_findings(measured), *preloads, *unit_errors, *implausible)
+    of_gain = gain_findings(dict(zip((item.id for item in recorded), measured, strict=True)))
+    return (*defects, *of_gain, *noise_findings(measured), *preloads, *unit_errors, *implausible)
 
 
 def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
@@ -479,7 +509,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     if not recorded:
         raise _none_usable(campaign, left_out)
     conditions = [(item.indenter_radius_mm, item.preload_n) for item in recorded]
-    frfs, delay = without_chain_phase(stacked(measured), conditions)
+    frfs, delay, phase = without_chain_phase(stacked(measured), conditions)
     zone = flat_zone(frfs, conditions, band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
@@ -522,8 +552,16 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     inversion = _estimated(ids, rows, contact, zone, own_filters, noted).wider(common_uncertainty)
     filtered = of_roll_off(behind, zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33, units_checked=campaign.units_checked)
-    findings = (*at_reading(campaign), *unusual_values, *of_recordings, *filtered, *inversion.findings, *others)
+    at_start = (*at_reading(campaign), *unusual_values, *of_recordings, *_rotated(phase))
+    findings = (*at_start, *filtered, *inversion.findings, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
+
+
+def _rotated(phase: float) -> list[Finding]:
+    """A finding on the constant phase [rad] that was removed; none for 0."""
+    degrees = float(np.rad2deg(phase))
+    lost = {"phase_deg": degrees, "lost_percent": 100 * (1 - float(np.cos(phase)))}
+    return [Finding(Reason.CONSTANT_PHASE, "", "frf_im_pc_per_n", lost)] if phase else []
 
 
 def _delayed(delay: float) -> str:
@@ -629,7 +667,9 @@ def _estimated(
     ]
     good = np.setdiff1d(np.flatnonzero(rows.inside), outliers)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
-    unfit, pilot = population_flags(ids, sensor, d33, noise)
+    unfit, pilot, factor, of_groups = _without_groups(
+        ids, sensor, d33, noise, *population_flags(ids, sensor, d33, noise)
+    )
     beyond_filter = [index for index, flag in unfit.items() if flag.flagged_for != Reason.WEAK]
     unfit |= {index: flag for index, flag in filtered.items() if index not in beyond_filter}
     mean, variance = mean[:, good], variance[:, good]
@@ -639,11 +679,13 @@ def _estimated(
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]
-        model = mixed_model.fit(measured.part(plain), numbered)
+        over = factor[sensor]
+        alike = replace(measured, z=measured.z / over, line=noise / over, pilot=pilot[sensor] / over)
+        model = mixed_model.fit(alike.part(plain), numbered)
     scatter = model.scatter if model else mixed_model.prior_scatter()
     cell, where, count = _cells(rows, good)
     sensors = scatter.d33(measured, sensor, len(ids)).wider(effects.unsure(good, sensor, len(ids)))
-    flags = [*unfit.values(), *difference_flags(ids, sensors, unfit)]
+    flags = [*unfit.values(), *([] if of_groups else difference_flags(ids, sensors, unfit))]
     if model:
         expected = _expected_scatter(model, measured)[plain]
         flags += scatter_flags(ids, sensor[plain], rows, good[plain], pilot, expected)
@@ -657,12 +699,12 @@ def _estimated(
         sensors=sensors,
         flags=tuple(flags),
         zone=zone,
-        campaign_d33=model.mean if model else None,
-        spread=model.spread if model and len(set(sensor[plain])) > 1 else None,
+        campaign_d33=model.mean if model and not of_groups else None,
+        spread=model.spread if model and not of_groups and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
         left_out=(*far_off, *unfit.values()),
-        findings=tuple(effects.findings(good, sensor, len(ids))),
+        findings=(*of_groups, *effects.findings(good, sensor, len(ids))),
         declared_percent=float(np.nanmedian(contact.declared_percent[good])),
     )  # fmt: skip
 

@@ -23,11 +23,13 @@ from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.channel_arithmetic import FIELD
 from underskin.recordings.readers.unit_labels import (
     DECIBEL,
+    MIXED_AMPLITUDES,
     contradicts,
     decibel_reference,
     exponents,
     field_unit,
     meanings,
+    mixes_amplitudes,
     ratio_of,
     unit,
 )
@@ -336,6 +338,8 @@ class MappedBlock:
                 raise self._error(place, f"is labelled {label!r}, not {mapping.labelled!r} as the rig says")
             self.warnings.append(f"{place} is labelled {label!r}; the rig description says {mapping.unit!r}")
             return mapping.unit or ""
+        if dimension == "charge/force" and mixes_amplitudes(channel.name, channel.unit):
+            raise self._error(place, f"{MIXED_AMPLITUDES}, or if it does not, add labelled: {label} with the unit")
         if mapping.unit and contradicts(label, mapping.unit, channel.name, dimension):
             reason = f"is labelled {label!r}, but the rig description says {mapping.unit!r}"
             stated = unit(mapping.unit)

@@ -373,11 +373,10 @@ class Facts:
             "kinds of recordings contradict each other": bool(self.contradictions),
             " and ".join(self.bounds): bool(self.bounds),
             "a law that is in no list acts on it": law is not None and not law.is_outside_band,
-            "its force acts at the mains alone": any(
-                finding.reason == Reason.EXCITED_AT_MAINS
-                and finding.arguments["affected"] == finding.arguments["recordings"]
-                for finding in diagnosis.findings
-            ),
+            "its force acts at the mains alone": self._holds_for_all(Reason.EXCITED_AT_MAINS),
+            "its gain changes within the recordings": self._holds_for_all(Reason.GAIN_STEP, Reason.GAIN_DRIFTS),
+            "its sensors are two groups a factor apart": Reason.TWO_GROUPS
+            in [item.reason for item in diagnosis.findings],
             "no PVDF has such a value": plausibility.implausibility(
                 d33["value"], units_checked=self.problem.lines.campaign.units_checked
             )
@@ -393,6 +392,11 @@ class Facts:
         shifts = () if why_not else diagnosis.shifts
         hidden = [shift for shift in shifts if abs(shift.log_factor) > half_width]
         return StatedD33(d33, hidden, why_not, diagnosis.skin_d33_pc_per_n)
+
+    def _holds_for_all(self, *reasons: Reason) -> bool:
+        """Whether a finding for one of the reasons affects all recordings."""
+        affecting = [finding.arguments for finding in self.diagnosis.findings if finding.reason in reasons]
+        return any(arguments["affected"] == arguments["recordings"] for arguments in affecting)
 
     @property
     def power(self) -> list[Power]:

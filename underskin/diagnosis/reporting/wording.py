@@ -33,6 +33,7 @@ _FINDINGS = {
     "line_noise_level": "noise differs from line to line",
     "lines_not_finite": "lines without a number",
     "behind_filter": "band behind a filter",
+    "constant_phase": "constant phase",
     "noise_in_frf": "noise in force or charge",
     "no_finite_line": "no usable line",
     "no_line_in_band": "no line in the band",

@@ -31,7 +31,7 @@ LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a zero crossin
 def aligned_lines(recordings: Sequence[FrfRecording]) -> list[Complexes]:
     """The values [C/N] of each recording's lines `without_chain_phase`."""
     conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
-    aligned, _ = without_chain_phase(stacked([lines_of(recording) for recording in recordings]), conditions)
+    aligned, *_ = without_chain_phase(stacked([lines_of(recording) for recording in recordings]), conditions)
     rows = {int(row): values for stack in aligned for row, values in zip(stack.rows, stack.values, strict=True)}
     return [rows[row] for row in range(len(rows))]
 

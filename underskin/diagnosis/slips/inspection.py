@@ -18,7 +18,7 @@ from underskin.diagnosis.slips.conjugated import conjugated
 from underskin.diagnosis.slips.exchanged_cables import exchanged_cables
 from underskin.diagnosis.slips.exchanged_labels import exchanged_labels
 from underskin.diagnosis.slips.reversed_signs import reversed_signs
-from underskin.diagnosis.slips.sensor_gain import sensor_gains
+from underskin.diagnosis.slips.sensor_gain import groups_of, sensor_gains
 from underskin.diagnosis.slips.silent import silent
 from underskin.diagnosis.slips.table import Screened, Slip, without_slips
 from underskin.diagnosis.slips.table_domain import within_tables
@@ -55,6 +55,7 @@ OF_RESPONSES: Sequence[Slip] = (
     wrong_responses,
     reversed_signs,
     sensor_gains,
+    groups_of,
     amplitude_factors,
     exchanged_cables,
     warm_ups,

@@ -1,7 +1,9 @@
 """One sensor whose level differs from that of all others: its own d33 or cable, or a fault, not the physics.
 
 A weak sensor, ln gain ~ N(−2, 0.7), is left out; one that merely differs, ln gain ~ N(0, 0.45), is corrected, given
-enough others that agree. Where several sensors differ, the mechanism `sensor_spread` applies.
+enough others that agree. Two groups of sensors that are alike within (`two_groups`) are taken to the level of the
+larger one, and which is right stays open. Where several sensors differ otherwise, the mechanism `sensor_spread`
+applies.
 """
 
 from collections.abc import Iterator
@@ -15,6 +17,7 @@ from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, LEAST_LEVELS,
 from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.inversion.sensor_groups import TwoGroups, two_groups
 from underskin.recordings.campaign import FrfRecording
 
 _WEAK, _WEAK_SPREAD = -2.0, 0.7  # prior of ln gain of a weak sensor: a third to a thirtieth
@@ -34,6 +37,30 @@ def sensor_gains(screened: Screened) -> Iterator[Alternative]:
         if len(sensors) >= LEAST_LEVELS:
             column = CHANGE * of_sensor
             yield Alternative(-2 * log(len(sensors)), column=column, undo=partial(_without_gain, name=name))
+
+
+def groups_of(screened: Screened) -> Iterator[Alternative]:
+    """The sensors as two groups, the factor between them being the known change."""
+    levels = screened.levels
+    if levels is None:
+        return
+    sensors, of_recording = np.unique(levels.sensor, return_inverse=True)
+    medians = [float(np.median(levels.value[of_recording == index])) for index in range(len(sensors))]
+    groups = two_groups(np.exp(medians), np.zeros(len(sensors)))
+    if groups is not None:
+        numbers = [int(levels.index[of_recording == index][0]) for index in range(len(sensors))]
+        names = [screened.recordings[number].sensor for number in numbers]
+        offset = np.where(np.isin(of_recording, groups.higher), log(groups.factor), 0.0)
+        yield Alternative(-log(len(sensors)), offset=offset, undo=partial(_without_groups, groups=groups, names=names))
+
+
+def _without_groups(recordings: list[FrfRecording], _: float, *, groups: TwoGroups, names: list[str]) -> Undone:
+    """The recordings of the smaller group at the level of the larger one, the lower of equal ones."""
+    lower, higher = ([names[index] for index in part] for part in (groups.lower, groups.higher))
+    changed, factor = (lower, groups.factor) if len(lower) < len(higher) else (higher, 1 / groups.factor)
+    scaled = [times(item, factor) if item.sensor in changed else item for item in recordings]
+    arguments = {"lower": lower, "higher": higher, "factor": groups.factor}
+    return scaled, [Finding(Reason.TWO_GROUPS, "", "charge_pc", arguments)]
 
 
 def _without_sensor(recordings: list[FrfRecording], amplitude: float, *, name: str) -> Undone:

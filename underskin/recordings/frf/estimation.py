@@ -15,7 +15,7 @@ Force and charge look exchanged where the charge has the declared mean and oscil
 not.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -53,6 +53,7 @@ _EXPLAINED = 0.5  # least in-phase share of the power at the best delay: half a 
 _STEPS = 6  # delays tried for one turn of the highest line
 _MOST_DELAYS = 8192
 _CHUNK = 256  # delays at a time
+_CORNERS = 20  # of a pole, over the outermost line, as tried
 
 
 def lag_between(force: Floats, charge: Floats, block: int) -> int:
@@ -86,31 +87,85 @@ def common_delay(stacks: Sequence[Stack]) -> float:
     in antiphase with the force. It is 0 where the lines are in phase without a delay (but for the sign of a recording),
     and where no delay brings most of them in phase, as above a resonance and for noise.
     """
-    parts = [(stack, stack.weights * _phase_factors(stack.values)) for stack in stacks if len(stack.frequency) > 1]
-    total = sum(float((stack.weights.sum(axis=1) ** 2).sum()) for stack, _ in parts)
-    if not total > 0:
+    parts = _weighted(stack for stack in stacks if len(stack.frequency) > 1)
+    if not parts:
         return 0.0
-
-    def in_phase(delays: Floats) -> Floats:
-        return (
-            sum((_power(stack.frequency, factors, delays) for stack, factors in parts), np.zeros(len(delays))) / total
-        )
-
-    undelayed = float(in_phase(np.zeros(1))[0])
+    undelayed = float(_in_phase(parts, np.zeros(1))[0])
     if undelayed >= _IN_PHASE:
         return 0.0
+    best, explained = _best_delay(parts)
+    return best if explained > _EXPLAINED and undelayed < _IN_PHASE * explained else 0.0
+
+
+def common_phase(stacks: Sequence[Stack]) -> float:
+    """The phase [rad] common to all lines of all recordings, from −π/2 to π/2: half a turn is a polarity.
+
+    With S the sum of w u over the lines of a recording, arg(Σ S²)/2 maximises Σ (Re S e^(−iφ))², which then is
+    (Σ |S|² + |Σ S²|)/2. It is 0 where it brings too few lines in phase, and where a delay, or one pole with its corner
+    outside the lines, leaves less than half of the power out of phase: these turn the phase over frequency.
+    """
+    parts = _weighted(stacks)
+    if not parts:
+        return 0.0
+    sums = np.concatenate([factors.sum(axis=1) for _, factors in parts])
+    squares, total = complex((sums**2).sum()), _total(parts)
+    left = 1 - float((np.abs(sums) ** 2).sum() + abs(squares)) / (2 * total)
+    several = [part for part in parts if len(part[0].frequency) > 1]
+    delayed = _best_delay(several)[1] if several else 0.0
+    turning = left / 2 >= 1 - max(_best_pole(parts), delayed)
+    return 0.0 if turning or left > 1 - _EXPLAINED else float(np.angle(squares)) / 2
+
+
+def _best_pole(parts: Sequence["_Weighted"]) -> float:
+    """The largest share in phase without the phase of one pole whose corner lies outside the lines."""
+    lowest = min(float(stack.frequency.min()) for stack, _ in parts)
+    highest = max(float(stack.frequency.max()) for stack, _ in parts)
+
+    def share(high_pass_hz: float, low_pass_hz: float) -> float:
+        power = 0.0
+        for stack, factors in parts:
+            turn = np.arctan2(high_pass_hz, stack.frequency) - np.arctan2(stack.frequency, low_pass_hz)
+            power += float(((factors @ np.exp(-1j * turn)).real ** 2).sum())
+        return power / _total(parts)
+
+    ratios = np.linspace(1 / _CORNERS, 1.0, _CORNERS).tolist()
+    high_passes = [share(ratio * lowest, np.inf) for ratio in ratios]
+    return max(high_passes + [share(0.0, highest / ratio) for ratio in ratios])
+
+
+_Weighted = tuple[Stack, Complexes]  # with the weighted phase factors w u of its lines (rows, lines)
+
+
+def _weighted(stacks: Iterable[Stack]) -> list[_Weighted]:
+    """The stacks with any weight."""
+    parts = [(stack, stack.weights * _phase_factors(stack.values)) for stack in stacks]
+    return parts if _total(parts) > 0 else []
+
+
+def _total(parts: Sequence[_Weighted]) -> float:
+    """The power of lines all in phase."""
+    return sum(float((stack.weights.sum(axis=1) ** 2).sum()) for stack, _ in parts)
+
+
+def _in_phase(parts: Sequence[_Weighted], delays: Floats) -> Floats:
+    """The share of the power that is in phase or in antiphase at each delay [s] of the charge."""
+    powers = (_power(stack.frequency, factors, delays) for stack, factors in parts)
+    return sum(powers, np.zeros(len(delays))) / _total(parts)
+
+
+def _best_delay(parts: Sequence[_Weighted]) -> tuple[float, float]:
+    """The delay [s] with the highest share in phase, and that share."""
     highest = max(float(stack.frequency.max()) for stack, _ in parts)
     spacing = max(float(np.median(np.diff(stack.frequency))) for stack, _ in parts)
     count = min(int(np.ceil(_STEPS * highest / spacing)), _MOST_DELAYS)
     step = 1 / (_STEPS * highest)
     delays: Floats = step * np.arange(-(count // 2), count // 2 + 1).astype(np.float64)
     for _ in range(3):
-        power = in_phase(delays)
+        power = _in_phase(parts, delays)
         best = delays[_nearest_peak(delays, power)]
         delays = np.asarray(best + np.arange(-_STEPS, _STEPS + 1) * (step / _STEPS), dtype=np.float64)
         step /= _STEPS
-    explained = float(power.max())
-    return float(best) if explained > _EXPLAINED and undelayed < _IN_PHASE * explained else 0.0
+    return float(best), float(power.max())
 
 
 def without_delay(stacks: Sequence[Stack], delay: float) -> list[Stack]:

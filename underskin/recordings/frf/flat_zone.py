@@ -4,8 +4,8 @@ Re FRF of each recording over its own level is gathered in bins of equal width i
 of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of bins in
 which no condition departs, beyond its noise, from a power law common to all (a sensor's relaxation, no resonance) by
 more than `FLATNESS`. Outstanding lines at the mains and its harmonics and unused lines (`line_choice`) are left out. A
-delay common to all recordings is removed before (`estimation.common_delay`): Re FRF is the response where the charge is
-in phase with the force. `reason_of` words why the zone ends where it does.
+delay or a constant phase common to all recordings is removed before (`without_chain_phase`): Re FRF is the response
+where the charge is in phase with the force. `reason_of` words why the zone ends where it does.
 
 `roll_off` decides whether the band lies behind a high-pass or a low-pass. The magnitude over frequency, in bins over
 all recordings and up to where a resonance lifts it, is fitted by a plateau with a slight power law and two filters,
@@ -23,7 +23,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
-from underskin.recordings.frf.estimation import common_delay, without_delay
+from underskin.recordings.frf.estimation import common_delay, common_phase, without_delay
 from underskin.recordings.frf.line_choice import (
     HARMONIC_WIDTH_HZ,
     bin_of,
@@ -514,26 +514,47 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
     return RollOff(best, share) if is_explained and share >= _LEAST_SHARE else None
 
 
-def without_chain_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> tuple[list[Stack], float]:
-    """The FRFs without the phase of the charge's chain, and the delay [s] that was removed.
+def without_chain_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> tuple[list[Stack], float, float]:
+    """The FRFs without the phase of the charge's chain; the delay [s] and the constant phase [rad] that were removed.
 
-    Where the phases turn over frequency, they are those of the filters that `roll_off` finds, if any: two poles of a
-    high-pass make half a turn from the plateau to the lowest lines, which resembles a delay of the force and would hide
-    the polarity. Otherwise, and for what the filters leave, they are those of the common delay.
+    A phase that all lines of the magnitude's flat zone have in common, and that is larger than that of any loss, is
+    constant. Where the phases turn over frequency, they are those of the filters that `roll_off` finds, if any: two
+    poles of a high-pass make half a turn from the plateau to the lowest lines, which resembles a delay of the force and
+    would hide the polarity. Otherwise, and for what the filters leave, they are those of the common delay.
     """
+    constant = _constant_phase(without_mains(stacks), conditions)
+    if constant:
+        return [replace(stack, values=stack.values * np.exp(-1j * constant)) for stack in stacks], 0.0, constant
     delay = common_delay(without_mains(stacks))
     if delay:
         undelayed = [stack.at(stack.frequency > 0) for stack in without_delay(stacks, delay)]
         lowest = float(np.concatenate([stack.frequency for stack in undelayed]).min())
-        level = np.zeros(len(conditions))
-        for stack in undelayed:
-            level[stack.rows] = _medians(np.abs(stack.values), stack.used)[:, 0]
-        behind = roll_off(undelayed, flat_zone(undelayed, conditions), level)
+        behind = roll_off(undelayed, flat_zone(undelayed, conditions), _magnitude(undelayed, len(conditions)))
         if behind is not None:
             turns = [np.exp(-1j * behind.filters.phase(np.maximum(stack.frequency, lowest))) for stack in stacks]
             stacks = [replace(stack, values=stack.values * turn) for stack, turn in zip(stacks, turns, strict=True)]
             delay = common_delay(without_mains(stacks))
-    return without_delay(stacks, delay), delay
+    return without_delay(stacks, delay), delay, 0.0
+
+
+def _constant_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> float:
+    """The phase [rad] of the magnitude's flat zone, where it is the same at all lines; 0 where it is no more than the
+    steepest relaxation has, n π/2 for f⁻ⁿ (Bode), or where the zone is a filter's flank."""
+    sizes = [replace(stack, values=np.abs(stack.values) + 0j).at(stack.frequency > 0) for stack in stacks]
+    zone = flat_zone(sizes, conditions)
+    inside = [stack.at(lines) for stack in stacks if (lines := zone.holds(stack.frequency)).any()]
+    constant = common_phase(inside)
+    if abs(constant) <= STEEPEST * np.pi / 2 or roll_off(sizes, zone, _magnitude(sizes, len(conditions))) is not None:
+        return 0.0
+    return constant
+
+
+def _magnitude(stacks: Sequence[Stack], count: int) -> Floats:
+    """The median magnitude of each recording's lines (count,)."""
+    level = np.zeros(count)
+    for stack in stacks:
+        level[stack.rows] = _medians(np.abs(stack.values), stack.used)[:, 0]
+    return level
 
 
 def _falls_after(magnitude: Floats, index: int) -> bool:

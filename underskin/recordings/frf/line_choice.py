@@ -35,7 +35,7 @@ most recordings, and lines that are exactly 0, are idle.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -253,8 +253,11 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
     """The FRF corrected for the `bias` of its estimator by noise, with the remaining uncertainty `bias_unsure`, both
     for the `used` lines (lines,).
 
-    Unchanged where their coherence is nearly 1, or where power or γ² is not known.
+    Unchanged where their coherence is nearly 1, or where power or γ² is not known. Where the gain changes within the
+    series, what the FRF leaves is not noise: nothing is corrected, and the uncertainty is the scatter of the gain.
     """
+    if measured.gain_change is not None:
+        return replace(measured, bias_unsure=measured.gain_change.scatter)
     force, charge, coherence, averages = (
         measured.force_power, measured.charge_power, measured.coherence, measured.averages
     )  # fmt: skip
@@ -360,9 +363,20 @@ def _groups(used: Mask, valid: Mask) -> list[Indices]:
     return groups
 
 
+def gain_findings(measured: Mapping[str, Frf]) -> list[Finding]:
+    """A finding on the first series whose gain changes, with the number of those like it. `measured`: by their ids."""
+    changing = {name: frf.gain_change for name, frf in measured.items() if frf.gain_change is not None}
+    if not changing:
+        return []
+    (first, change), *others = changing.items()
+    affected = {"affected": len(changing), "recordings": len(measured), "more": len(others)}
+    reason = Reason.GAIN_DRIFTS if change.step_s is None else Reason.GAIN_STEP
+    return [Finding(reason, first, "charge_pc", {**asdict(change), **affected})]
+
+
 def noise_findings(measured: Sequence[Frf]) -> list[Finding]:
     """A finding on the bias of FRFs by noise, for the median recording, where it is large enough."""
-    biased = [frf for frf in measured if frf.bias or frf.bias_unsure]
+    biased = [frf for frf in measured if (frf.bias or frf.bias_unsure) and frf.gain_change is None]
     if 2 * len(biased) <= len(measured):
         return []
     bias, uncertainty = (float(np.median([getattr(frf, name) for frf in biased])) for name in ("bias", "bias_unsure"))

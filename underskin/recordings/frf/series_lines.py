@@ -10,7 +10,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.frf.line_choice import Usable, excited_at_mains, noise_findings, usable_lines
+from underskin.recordings.frf.line_choice import Usable, excited_at_mains, gain_findings, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, left_out_of
 from underskin.units import Floats, to_lab
 
@@ -51,6 +51,7 @@ def as_lines(recordings: Sequence[FrfRecording]) -> Estimated:
         *_single_passes(series),
         *_mains(series),
         *excited_at_mains({recording.id: chosen[recording.id] for recording in usable}),
+        *gain_findings({name: lines.frf for name, lines in series.items()}),
         *noise_findings(frfs),
     ]
     uneven = {

@@ -23,6 +23,7 @@ from underskin.errors import InvalidInput, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import DefectKind, Finding
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
+from underskin.recordings.frf.gain_change import GainChange, gain_change
 from underskin.units import Complexes, Floats, Indices, Mask
 
 _FEWEST_PERIODS = 4
@@ -471,6 +472,11 @@ class Blocks:
         """(blocks, samples)."""
         return np.lib.stride_tricks.sliding_window_view(signal, len(self.taper))[:: self.step]
 
+    def middles(self, samples: int) -> Floats:
+        """The sample in the middle of each block (blocks,)."""
+        size = len(self.taper)
+        return np.asarray(np.arange(0, samples - size + 1, self.step) + size / 2, dtype=np.float64)
+
     def spectra(self, signal: Floats) -> Complexes:
         """(blocks, lines)."""
         return np.fft.rfft(self.steadied(self.of(signal)) * self.taper)[:, self.lines]
@@ -501,6 +507,7 @@ class Frf:
     used: Mask | None = None
     bias: float = 0.0
     bias_unsure: float = 0.0
+    gain_change: GainChange | None = None
 
     @property
     def coherence_or_nan(self) -> Floats:
@@ -557,6 +564,7 @@ def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, 
         charge_power.mean(axis=0),
         passes=force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
         estimator=estimator,
+        gain_change=gain_change(force_spectra, charge_spectra, blocks.middles(len(force))[undamaged] / sample_rate),
     )
 
 

@@ -126,6 +126,7 @@ _SAYS_DECIBEL = re.compile(rf"(?<![A-Za-z])(dB|DB)(?![A-Za-z])|20 ?\*? ?log|(?i:
 _REFERENCE = re.compile(r"(?i:dB)\s*(?:\(|(?i:re|rel|ref)\.?)\s*(?:1(?:\.0*)?\s*)?(?P<unit>[^\s()\d][^()]*?)\s*\)?")
 _LEAD = re.compile(r"(?i:in|units?|einheit)(\s*[:=]\s*|\s+)(?=\S)")
 _AMPLITUDE = re.compile(r"[\s,_]*(?i:rms|peak|pk|pk-pk|p-?p|eff)\.?$")
+_STATISTIC = re.compile(r"(?i)(?<![a-z])(?:(rms|rqs|eff)|(p-?p|p2p|pk-?pk|peak.to.peak)|(peak|pk))(?![a-z])")
 _OVER = re.compile(r"\s+(?i:per|pro|par|por)\s+")
 _RECIPROCAL = re.compile(r"\s*[·*⋅ ]\s*\(?([^\s·*⋅^()]+?)\)?\^?[-−]1$")
 _BEHIND = re.compile(r"(?P<name>.*[^\s,:])(\s*/\s*|\s+in\s+|\s*[,:]\s*)(?P<unit>[^\s/,]+(/[^\s/,]+)?)\s*")
@@ -262,6 +263,17 @@ def labelled_unit(heading: str) -> str:
     if word is not None and word["unit"].lower() not in _NO_LAST_WORD and unit(word["unit"]) is not None:
         return word["unit"]
     return ""
+
+
+MIXED_AMPLITUDES = (
+    "says rms or peak-to-peak of charge or force alone; an FRF is amplitude over amplitude: convert it in a formula"
+)
+
+
+def mixes_amplitudes(name: str, label: str) -> bool:
+    """Whether the name or the unit of a ratio says rms or peak-to-peak of one of its two quantities alone."""
+    said = [mark.lastindex for mark in _STATISTIC.finditer(name if label in name else f"{name} {label}")]
+    return any(statistic != 3 for statistic in said) and not (len(said) == 2 and said[0] == said[1])  # 3: amplitudes
 
 
 def contradicts(label: str, stated: str, heading: str, dimension: str) -> bool:
