@@ -87,8 +87,8 @@ def test_magnitude_phase_taken_real_part(headings: str, phase: str) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("frf_magnitude_pc_per_n\n7\n", "needs frf_phase_deg or frf_phase_rad beside it"),
-        ("frf_phase_deg\n7\n", "needs frf_magnitude_pc_per_n beside it"),
+        ("frf_magnitude_pc_per_n\n7\n", "needs frf_phase_deg or frf_phase_rad with it"),
+        ("frf_phase_deg\n7\n", "needs frf_magnitude_pc_per_n with it"),
         (
             "frf_magnitude_pc_per_n,frf_phase\n7,1\n",
             "may be degrees or radians: call it frf_phase_deg or frf_phase_rad",

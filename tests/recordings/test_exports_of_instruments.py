@@ -103,6 +103,7 @@ def numbers(columns: Columns) -> list[np.ndarray]:
 
 
 PRESSED: dict[str, float | np.ndarray] = {"displacement_mm": TRAVEL, "force_n": FORCE}
+SPECIMEN: dict[str, float | np.ndarray] = {**PRESSED, "sample_height_mm": 10.0, "sample_diameter_mm": 20.0}
 
 
 def units_below_names(locale: Locale) -> Export:
@@ -111,7 +112,7 @@ def units_below_names(locale: Locale) -> Export:
     above = [locale.joined(locale["height"], locale.number(10.0), "mm")]
     above += [locale.joined(locale["diameter"], locale.number(20.0), "mm"), ""]
     headings = [locale.joined(*(name for name, *_ in columns)), locale.joined(*(label for _, label, _ in columns))]
-    return Export([*above, *headings, *locale.rows(*numbers(columns))], columns, lacks="recording.indenter_radius_mm")
+    return Export([*above, *headings, *locale.rows(*numbers(columns))], columns, SPECIMEN)
 
 
 def compression_machine(locale: Locale) -> Export:
@@ -120,8 +121,7 @@ def compression_machine(locale: Locale) -> Export:
     above = [f"{locale['height']} [mm]: {locale.number(10.0)}", f"{locale['diameter']} [mm]: {locale.number(20.0)}", ""]
     headings = [locale.joined(*(f'"{name}"' for name, *_ in columns))]
     headings += [locale.joined(*(f'"({label})"' for _, label, _ in columns))]
-    fields: dict[str, float | np.ndarray] = {**PRESSED, "sample_height_mm": 10.0, "sample_diameter_mm": 20.0}
-    return Export([*above, *headings, *locale.rows(*numbers(columns), quoted=True)], columns, fields)
+    return Export([*above, *headings, *locale.rows(*numbers(columns), quoted=True)], columns, SPECIMEN)
 
 
 def units_behind_names(locale: Locale) -> Export:

@@ -178,7 +178,7 @@ def test_channel_tell_curves_segments_apart() -> None:
         ),
         (
             {"displacement_mm": {"channel": "z", "stiffness_n_per_mm": 3, "deflection": {"channel": "d"}}},
-            "must not stand beside a deflection",
+            "must not be given with a deflection",
         ),
         ({"displacement_mm": {"channel": "z", "deflection": {"channel": "d", "k": 3}}}, r"deflection\.k = 3: unknown"),
         (
