@@ -14,6 +14,7 @@ from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding, ImplausibleD33
 from underskin.inversion.invert import Inversion, invert
+from underskin.prediction.pressed_skin import response_shares
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Complexes, Floats
@@ -452,3 +453,60 @@ def test_gain_changes_within_series(table: SigmaTable, factor: float) -> None:
     assert float(found.campaign_d33.low) < D33 * 1e-12 < float(found.campaign_d33.high)
     for steady in (altered_series(1.0, 1.0), altered_series(0.3, 0.3), altered_series(0.0, 0.0)):
         assert FindingCode.GAIN_STEPS not in [finding.code for finding in steady.findings]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.003, 0.03, 0.1])
+def test_an_array_read_whole_under_each_contact(share: float, table: SigmaTable) -> None:
+    """Sensors that feel next to nothing of a contact read cross-talk, which is no d33: they are not used."""
+    rig = Rig(d33=20 * np.array([0.98, 1.0, 1.0, 1.02]), gain=0.01, indenters_mm=(4.0,), preloads_n=(0.5, 1.0, 1.5))
+    pressed = simulate(table, rig, np.random.default_rng(0))
+    centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in pressed.skin.sensors}
+    read = [
+        replace(times(recording, share + 1e-4), id=f"{recording.id}-{sensor}", sensor=sensor, position_mm=place)
+        for recording in pressed.of(FrfRecording)
+        for place in [centres[recording.sensor]]
+        for sensor in centres
+        if sensor != recording.sensor
+    ]
+    campaign = replace(pressed, recordings=(*pressed.recordings, *read))
+    found, alone = invert(campaign, table), invert(pressed, table)
+    assert found.campaign_d33 is not None
+    assert alone.campaign_d33 is not None
+    assert found.campaign_d33.value == pytest.approx(alone.campaign_d33.value, rel=1e-3)
+    (far,) = (finding for finding in found.left_out if finding.code == FindingCode.FAR_CONTACTS)
+    assert isinstance(far, Finding)
+    assert far.arguments["recordings"] == len(read)
+    assert far.arguments["read_percent"] == pytest.approx(100 * (share + 1e-4), rel=0.05)
+    inspected = inspect(campaign, table)
+    assert len(inspected.campaign.recordings) == len(pressed.recordings)
+    assert FindingCode.FAR_CONTACTS in {finding.code for finding in inspected.findings}
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.03])
+def test_near_a_sensor_cross_talk_counts_for_less(share: float, table: SigmaTable) -> None:
+    """A sensor that feels some percent of a contact is less sure by usual cross-talk, and keeps d33 where it is."""
+    rig = Rig(d33=np.full(4, 20.0), gain=0.01, indenters_mm=(4.0,), preloads_n=(0.5, 1.0, 1.5))
+    pressed = simulate(table, rig, np.random.default_rng(0))
+    recordings = pressed.of(FrfRecording)
+    beside = [
+        replace(recording, position_mm=(8 * number + 3.05, 0.0))
+        for number in range(4)
+        for recording in recordings
+        if recording.sensor == f"s{number}"
+    ]
+    shares = response_shares(pressed.skin, beside, table)
+    read = [replace(times(r, s + share), id=f"{r.id}-beside") for r, s in zip(beside, shares.tolist(), strict=True)]
+    found, alone = invert(replace(pressed, recordings=(*recordings, *read)), table), invert(pressed, table)
+    assert found.campaign_d33 is not None
+    assert alone.campaign_d33 is not None
+    assert found.campaign_d33.value == pytest.approx(alone.campaign_d33.value, rel=0.015)
+
+
+def test_scatter_at_its_limit_gives_no_d33_of_the_array(table: SigmaTable) -> None:
+    """Where something else decides what recordings read, it is said, and no d33 of the array is stated."""
+    random = np.random.default_rng(0)
+    campaign = simulate(table, Rig(d33=np.full(4, 20.0)), random)
+    recordings = tuple(times(one, float(np.exp(random.normal(0, 1.2)))) for one in campaign.of(FrfRecording))
+    found = invert(replace(campaign, recordings=recordings), table)
+    assert found.campaign_d33 is None
+    assert FindingCode.UNUSUAL_SCATTER in {finding.code for finding in found.findings}

@@ -125,6 +125,17 @@ def contact_events(events: Mapping[str, Mapping[str, float | None]]) -> str:
     return f"the sphere {' and '.join(parts)}: the samples of these events count for no law"
 
 
+def far_contacts(recordings: int, expected_percent: float, read_percent: float, pick_up_percent: float) -> str:
+    """Recordings of sensors that feel less of the contact than usual pick-up."""
+    are, they, sensors = ("are", "they read", "sensors") if recordings > 1 else ("is", "it reads", "a sensor")
+    read = "" if math.isnan(read_percent) else f"; {they} {in_digits(read_percent, 2)} %"
+    return (
+        f"{recordings} recording{'s' * (recordings > 1)} of {sensors} far from the contact {are} not used: by the "
+        f"model at most {in_digits(expected_percent, 2)} % of the response under the contact arrives there, less than "
+        f"usual cross-talk and pick-up ({pick_up_percent:.2g} %){read}; cross-talk is not fitted to them"
+    )
+
+
 def thickness_unknown(answer: str, is_tried: bool) -> str:
     """An undeclared thickness, and what it leaves open."""
     layer = "a thin layer on a stiff base (layered contact)"
@@ -459,6 +470,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.BEYOND_TABLE: "{limit}",
     Reason.PLACE_BEYOND_TABLE: "its position is farther from the sensor than the table reaches, or its lines scatter "
     "beyond measure",
+    Reason.FAR_CONTACTS: far_contacts,
     Reason.EXCLUDED: "Left out: {excluded_for}",
     Reason.OUTLIER: "its d33 of {d33_pc_per_n:.3g} pC/N is grossly off all others",
     Reason.CURVE_TOO_DEEP: "pressed {moved_mm:.3g} mm, more than {share:g} of its sample's height ({most_mm:.3g} mm): "
@@ -633,6 +645,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.NO_SIMPLE_LAW: no_simple_law,
     Reason.UNUSUAL_SCATTER: "the gain of the recordings scatters by {percent:.2g} %, and by {usual:.2g} % on a poor "
     "rig: something that no recording states changes from one to the next",
+    Reason.SCATTER_AT_LIMIT: "the gain of the recordings scatters by {percent:.2g} % or more, the most that is "
+    "considered: something other than d33 decides what they read, and the array has no d33 to quote",
     Reason.CURVES_DIFFER: curves_differ,
     Reason.LOAD_NOT_LINEAR: "L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left "
     "out; it "

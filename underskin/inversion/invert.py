@@ -7,6 +7,10 @@ the precision of each d33. These intervals are relative: they hold for the decla
 `declared_percent` is the standard deviation of all d33 together by the tolerances of the declared thickness, sensor
 radius and modulus; `absolute_d33` includes it.
 
+A sensor's channel also takes up a share of the charge under the contact (cross-talk, pick-up), which is an error of
+that size in its own (`PICK_UP`): recordings of sensors off the contact count for less, and those that feel less of it
+than that are not used.
+
 Recordings far off the others of their sensor (a slip of units, a wrong range) are left out, since the mixed model
 assumes log-normal recordings about their sensor's d33. What a skin may show is no outlier: an effect of a condition on
 all sensors, the scatter of the array, and the effect of a misplaced sphere. Sensors are flagged with the reason where
@@ -34,9 +38,13 @@ from underskin.prediction import pressed_skin
 from underskin.prediction.answers import OTHER, STATED
 from underskin.prediction.pressed_skin import (
     DECLARED,
+    PICK_UP,
+    contact_offsets,
     declared_skin,
     exchanged_values,
+    far_contacts,
     log_slopes,
+    share_of_contact,
     transmission,
     usable,
 )
@@ -404,7 +412,8 @@ class NoD33(InvalidInput):
 
 @dataclass(frozen=True)
 class RecordingD33:
-    """Columns (recordings,) in SI: measured level, σ, d33 and its uncertainty by line noise; NaN where not `inside`."""
+    """Columns (recordings,) in SI: measured level, σ, d33 and its uncertainty by line noise and pick-up; NaN where not
+    `inside`."""
 
     ids: tuple[str, ...]
     sensor: Indices  # number of the sensor in Inversion.sensor_ids
@@ -417,7 +426,7 @@ class RecordingD33:
     rel_error: Floats  # of σ, the table's bound
     d33: Floats
     d33_uncertainty: Floats
-    inside: Mask  # contact within the table's domain, and a line in the band with a charge that can be
+    inside: Mask  # contact in the table's domain, not far from the sensor; a line in the band with a charge that can be
 
     @cached_property
     def condition(self) -> Indices:
@@ -441,7 +450,7 @@ class Cells:
 class Inversion:
     """The array's d33. `campaign_d33` (its interval is relative), `spread` (relative, over sensors), `gain` and
     `position` [m] come from the sensors that are neither dead, inverted, weak, strong nor behind a filter of
-    their own; None where there is no such sensor."""
+    their own; None where there is no such sensor, `campaign_d33` also where the gain scatters up to its limit."""
 
     sensor_ids: tuple[str, ...]
     recordings: RecordingD33
@@ -522,13 +531,20 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     contact = _Contact(campaign, recorded, contact_model)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = pressed_skin.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
-    left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
+    far, of_far = far_contacts(level, contact.share)
+    left_out += [reason for reason, used in zip(reasons, inside | far, strict=True) if not used]
+    left_out += of_far
+    inside &= ~far
     if not inside.any():
         raise _none_usable(campaign, left_out)
     if np.abs(level[inside]).max() < _LEAST_CHARGE:
         raise NoD33("recordings", campaign.name, "there is no charge in any recording")
     response = gain(contact.positioned.sigma, contact.transmitted.rt_over_h)
-    d33, uncertainty = level / response, noise / np.abs(response)
+    d33 = level / response
+    picked_up = (
+        PICK_UP * typical_size(d33[inside]) * np.sqrt(np.maximum(np.where(inside, contact.share, 1.0) ** -2 - 1, 0.0))
+    )
+    uncertainty = np.hypot(noise / np.abs(response), picked_up)
     ids = tuple(dict.fromkeys(item.sensor for item in recorded))
     sensor = np.array([ids.index(item.sensor) for item in recorded])
     rows = RecordingD33(
@@ -631,19 +647,16 @@ class _Contact:
         indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
         preload = to_si("preload_n", [item.preload_n for item in recorded])
         self.transmitted = transmitted = transmission(contact_model, skin, indenter, preload)
-        centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in described.sensors}
-        offset = [
-            np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
-        ]
         self.thickness = thickness = float(skin.thickness)
         self.positioned = positioned_sigma(
             contact_model,
             transmitted.small_strain_a_over_h,
             float(skin.rt_over_h),
             transmitted.load_parameter,
-            to_si("thickness_mm", offset) / thickness,
+            contact_offsets(described, recorded) / thickness,
             float(mixed_model.POSITIONS[-1]) / thickness,
         )
+        self.share = share_of_contact(self.positioned.sigma, transmitted)  # of the response under the contact
         slopes = log_slopes(contact_model, skin, indenter, preload)
         off = described.tolerances or Tolerances()
         changes = [slopes[name] * getattr(off, f"{name}_percent") for name in DECLARED]
@@ -689,6 +702,8 @@ def _estimated(
     if model:
         expected = _expected_scatter(model, measured)[plain]
         flags += scatter_flags(ids, sensor[plain], rows, good[plain], pilot, expected)
+    of_scatter = _scatter_finding(model) if model else None
+    at_limit = of_scatter is not None and of_scatter.reason is Reason.SCATTER_AT_LIMIT
     return Inversion(
         sensor_ids=ids,
         recordings=rows,
@@ -699,14 +714,23 @@ def _estimated(
         sensors=sensors,
         flags=tuple(flags),
         zone=zone,
-        campaign_d33=model.mean if model and not of_groups else None,
+        campaign_d33=model.mean if model and not of_groups and not at_limit else None,
         spread=model.spread if model and not of_groups and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,
         left_out=(*far_off, *unfit.values()),
-        findings=(*of_groups, *effects.findings(good, sensor, len(ids))),
+        findings=(*of_groups, *effects.findings(good, sensor, len(ids)), *([of_scatter] if of_scatter else [])),
         declared_percent=float(np.nanmedian(contact.declared_percent[good])),
     )  # fmt: skip
+
+
+def _scatter_finding(model: MixedModel) -> Finding | None:
+    """The finding on a gain that scatters by more than on a poor rig, or up to the most that is considered."""
+    percent, usual = 100 * float(model.gain.value), mixed_model.GAIN_RANGE[1]
+    if float(model.gain.high) >= mixed_model.GAINS[-1]:
+        return Finding(Reason.SCATTER_AT_LIMIT, "", "frf", {"percent": percent})
+    arguments = {"percent": percent, "usual": 100 * usual}
+    return Finding(Reason.UNUSUAL_SCATTER, "", "frf", arguments) if float(model.gain.low) > usual else None
 
 
 def _outliers(rows: RecordingD33, position: Floats) -> Indices:

@@ -21,6 +21,7 @@ from underskin.findings.finding import Finding
 from underskin.physics import charge_response, hertz
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
 from underskin.recordings.campaign import FrfRecording, SkinDescription
+from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import GRAM_FORCE, Floats, Mask, to_si
 
@@ -306,6 +307,54 @@ def log_slopes(contact_model: ContactModel, skin: Skin, indenter: Indenter, prel
     slopes = frf_gradient(contact_model, skin, indenter, preload, 1.0)
     size = transmission(contact_model, skin, indenter, preload).frf(1.0)
     return {name: np.asarray(slopes[name] * getattr(skin, name) / size) for name in DECLARED}
+
+
+# Cross-talk and pick-up of a sensor's channel, over the charge of the sensor under the contact: unshielded leads couple
+# by up to 20 % (Ott, Electromagnetic Compatibility Engineering, 2009, section 2.1), shielded ones by some tenths of a
+# percent. Their geometric mean:
+PICK_UP = 0.02
+
+
+def contact_offsets(skin: SkinDescription, recorded: Sequence[FrfRecording]) -> Floats:
+    """The distance of each contact from the centre of its recording's sensor [m]."""
+    centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in skin.sensors}
+    offsets = [
+        np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
+    ]
+    return to_si("thickness_mm", offsets)
+
+
+def response_shares(skin: SkinDescription, recorded: Sequence[FrfRecording], contact_model: ContactModel) -> Floats:
+    """The response of each recording's sensor over that of a sensor under the same contact; NaN outside the table."""
+    declared = declared_skin(skin)
+    indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
+    reached = transmission(contact_model, declared, indenter, to_si("preload_n", [item.preload_n for item in recorded]))
+    offset = contact_offsets(skin, recorded) / float(declared.thickness)
+    positioned = positioned_sigma(
+        contact_model, reached.small_strain_a_over_h, float(declared.rt_over_h), reached.load_parameter, offset, 0.0
+    )
+    return share_of_contact(positioned.sigma, reached)
+
+
+def share_of_contact(sigma: Floats, reached: Transmission) -> Floats:
+    """σ at each offset over that under the contact; 0 beyond the end of the table's profile, where σ is nearly 0."""
+    return np.where(reached.inside & np.isnan(sigma), 0.0, sigma / reached.sigma)
+
+
+def far_contacts(level: Floats, share: Floats) -> tuple[Mask, list[Finding]]:
+    """The recordings that tell nothing of d33, since usual pick-up is as large as what their sensor feels of the
+    contact; and a finding on all of them.
+
+    `level` is the FRF of each [C/N], in any sense that is linear in it; `share` as from `response_shares`.
+    """
+    far = share < PICK_UP
+    if not far.any():
+        return far, []
+    under_contact = np.abs(level[~far] / share[~far])
+    read = float(np.nanmedian(np.abs(level[far])) / np.nanmedian(under_contact)) if (~far).any() else math.nan
+    shares = {"expected_percent": 100 * float(share[far].max()), "read_percent": 100 * read}
+    arguments = {"recordings": int(far.sum()), "pick_up_percent": 100 * PICK_UP, **shares}
+    return far, [Finding(Reason.FAR_CONTACTS, "", "position_mm", arguments)]
 
 
 _BEYOND = 0.5  # of the recordings as declared, at the least

@@ -24,6 +24,7 @@ _FINDINGS = {
     "curve_not_usable": "curve cannot be used",
     "damaged_samples": "samples damaged",
     "duplicated_recording": "came twice",
+    "far_contacts": "contacts far from the sensor",
     "force_acts_once": "a single sweep or blow",
     "force_contradicts_preload": "force and preload disagree",
     "gain_steps": "amplitude off by a factor",

@@ -34,7 +34,7 @@ from underskin.diagnosis.slips.wrong_units import (
 )
 from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.prediction.pressed_skin import exchanged_values
+from underskin.prediction.pressed_skin import exchanged_values, far_contacts, response_shares
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.frf.series_lines import as_given, as_lines
@@ -112,6 +112,12 @@ def _inspect_lines(
     recordings, of_labels = without_slips(screened, [partial(conjugated, imported=imported), *OF_LABELS])
     recordings, beyond, of_domain = within_tables(campaign, recordings, table, keep_ids)
     findings += [*of_labels, *of_domain]
+    if not recordings:
+        return _inspected(campaign, recordings, findings)
+    level = np.array([np.abs(np.nanmedian(lines_of(recording).values)) for recording in recordings])
+    far, of_far = far_contacts(level, response_shares(campaign.skin, recordings, table))
+    findings += of_far
+    recordings = [recording for recording, is_far in zip(recordings, far, strict=True) if not is_far]
     if not recordings:
         return _inspected(campaign, recordings, findings)
     screened = replace(screened, recordings=recordings)
