@@ -151,7 +151,8 @@ def answer_clauses(
         within = "the noise" if left is None else f"{100 * left[0]:.2g} % of the largest force"
         agree = f"recordings and {model} agree within {within} (probability {percent})"
         if leader.probability >= EXPLAINED or not rivals:
-            return [f"{agree}, and nothing needs to be added{'' if all_used else ' for those that were used'}"]
+            added = "nothing needs to be added" if left is None else "no known mechanism needs to be added"
+            return [f"{agree}, and {added}{'' if all_used else ' for those that were used'}"]
         return [f"{agree}, but they do not rule out: {listed}", _law(mentioned)]
     if verdict == "unexplained":
         which = "known mechanisms" if all_tried else "mechanisms that were tried"
