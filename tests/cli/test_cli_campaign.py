@@ -15,7 +15,7 @@ from tests.support.instrument_files import EXAMPLES
 from tests.support.simulated_campaign import Rig, simulate
 from underskin import load_table
 from underskin.inversion.invert import invert
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, SkinDescription
 from underskin.recordings.readers import json_file
 from underskin.units import to_lab
 
@@ -246,3 +246,20 @@ def test_figures_two_files_name_refused(file: Path, tmp_path: Path) -> None:
 )
 def test_wrong_usage_is_one_line(arguments: list[str], says: str) -> None:
     assert says in refused(*arguments)
+
+
+def test_modulus_of_a_block_says_what_it_takes_of_the_machine(tmp_path: Path) -> None:
+    """A block of k = E A/h on a frame of stiffness K reads low by k/K: it says from which K on that exceeds its ±."""
+    force = np.linspace(0, 30, 120)
+    block = CompressionRecording(
+        id="block",
+        sample_height_mm=5.0,
+        sample_diameter_mm=20.0,
+        displacement_mm=force / 400 + force / 200,
+        force_n=force,
+    )
+    path = tmp_path / "frame.json"
+    path.write_bytes(json_file.write(Campaign("frame", SkinDescription(id="frame"), (block,))))
+    answer = run("d33", path)
+    (note,) = (line for line in answer.stdout.splitlines() if line.startswith("before you quote E"))
+    assert float(re.findall(r"softer than (\d+) N/mm", note)[0]) > 200

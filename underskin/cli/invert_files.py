@@ -4,6 +4,7 @@ Results are written as tables, or as CSV.
 """
 
 import csv
+import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,14 +21,15 @@ from rich.text import Text
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
-from underskin.findings.formatting import left_out_lines, significant
+from underskin.findings.formatting import in_digits, left_out_lines, significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
 from underskin.inversion.invert import Inversion, array_d33_by_other, invert
 from underskin.prediction.answers import OTHER, WORDS
 from underskin.recordings import plausibility, validation
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording
 from underskin.recordings.frf.estimators import Estimator
+from underskin.recordings.modulus import CompressionModulus
 from underskin.recordings.reading import Reading, join, read_file
 from underskin.recordings.rig_description import RigDescription
 from underskin.surrogate.sigma_table import ContactName, SigmaTable, load_table
@@ -40,6 +42,7 @@ _HEADER = (
 )  # fmt: skip
 
 
+_LEAST_ERROR = 1e-3  # of E: a size of the sample is known to no more than that
 _TO_QUOTE = "before you quote d33: it assumes the paper's model, and `underskin diagnose` tests that"
 
 
@@ -87,7 +90,32 @@ class InvertedFile:
         if isinstance(self.inversion, Inversion):
             notes.append(_TO_QUOTE)
             notes += [f"left out: {omission.sentence}" for omission in self.inversion.left_out]
+        notes += [self._of_frame] if self._of_frame else []
         return notes
+
+    @property
+    def _of_frame(self) -> str:
+        """What the E of cylinders assumes of their machine; empty without any.
+
+        A frame of stiffness K in series with a block whose reading has the stiffness k = E A/h lowers E by the share
+        k/K, which is that of the uncertainty at K = k E/u.
+        """
+        softest_n_per_mm = []
+        results = {modulus.recording: modulus.result for modulus in self.moduli}
+        for block in self.reading.campaign.of(CompressionRecording):
+            result = results[block.id]
+            if isinstance(result, CompressionModulus):
+                e_mpa, sd_mpa = to_lab("youngs_modulus_mpa", [result.modulus, result.uncertainty]).tolist()
+                area_mm2 = math.pi / 4 * block.sample_diameter_mm**2
+                stiffness = e_mpa * area_mm2 / block.sample_height_mm
+                softest_n_per_mm.append(stiffness * e_mpa / max(sd_mpa, _LEAST_ERROR * e_mpa))
+        if not softest_n_per_mm:
+            return ""
+        return (
+            "before you quote E: it takes the displacement for the sample's alone, and a machine softer than "
+            f"{in_digits(max(softest_n_per_mm), 2)} N/mm lowers it by more than its ± (stiffness_n_per_mm of a rig "
+            "description takes that off)"
+        )
 
 
 def write_tables(results: Iterable[InvertedFile]) -> None:
