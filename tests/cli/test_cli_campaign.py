@@ -259,7 +259,7 @@ def test_modulus_of_a_block_says_what_it_takes_of_the_machine(tmp_path: Path) ->
         force_n=force,
     )
     path = tmp_path / "frame.json"
-    path.write_bytes(json_file.write(Campaign("frame", SkinDescription(id="frame"), (block,))))
+    path.write_bytes(json_file.write(Campaign("frame", SkinDescription(poisson_ratio=0.5), (block,))))
     answer = run("d33", path)
     (note,) = (line for line in answer.stdout.splitlines() if line.startswith("before you quote E"))
     assert float(re.findall(r"softer than (\d+) N/mm", note)[0]) > 200

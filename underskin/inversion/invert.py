@@ -531,7 +531,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     contact = _Contact(campaign, recorded, contact_model)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = pressed_skin.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
-    far, of_far = far_contacts(level, contact.share)
+    far, of_far = far_contacts(recorded, level, contact.share)
     left_out += [reason for reason, used in zip(reasons, inside | far, strict=True) if not used]
     left_out += of_far
     inside &= ~far

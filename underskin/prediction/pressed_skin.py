@@ -341,7 +341,7 @@ def share_of_contact(sigma: Floats, reached: Transmission) -> Floats:
     return np.where(reached.inside & np.isnan(sigma), 0.0, sigma / reached.sigma)
 
 
-def far_contacts(level: Floats, share: Floats) -> tuple[Mask, list[Finding]]:
+def far_contacts(recorded: Sequence[FrfRecording], level: Floats, share: Floats) -> tuple[Mask, list[Finding]]:
     """The recordings that tell nothing of d33, since usual pick-up is as large as what their sensor feels of the
     contact; and a finding on all of them.
 
@@ -353,8 +353,9 @@ def far_contacts(level: Floats, share: Floats) -> tuple[Mask, list[Finding]]:
     under_contact = np.abs(level[~far] / share[~far])
     read = float(np.nanmedian(np.abs(level[far])) / np.nanmedian(under_contact)) if (~far).any() else math.nan
     shares = {"expected_percent": 100 * float(share[far].max()), "read_percent": 100 * read}
+    named = recorded[int(far.argmax())].id if far.sum() == 1 else ""
     arguments = {"recordings": int(far.sum()), "pick_up_percent": 100 * PICK_UP, **shares}
-    return far, [Finding(Reason.FAR_CONTACTS, "", "position_mm", arguments)]
+    return far, [Finding(Reason.FAR_CONTACTS, named, "position_mm", arguments)]
 
 
 _BEYOND = 0.5  # of the recordings as declared, at the least

@@ -115,7 +115,7 @@ def _inspect_lines(
     if not recordings:
         return _inspected(campaign, recordings, findings)
     level = np.array([np.abs(np.nanmedian(lines_of(recording).values)) for recording in recordings])
-    far, of_far = far_contacts(level, response_shares(campaign.skin, recordings, table))
+    far, of_far = far_contacts(recordings, level, response_shares(campaign.skin, recordings, table))
     findings += of_far
     recordings = [recording for recording, is_far in zip(recordings, far, strict=True) if not is_far]
     if not recordings:
