@@ -140,6 +140,27 @@ def test_a_step_of_the_reading_is_taken_out() -> None:
     assert modulus_mpa(campaign(read, pressed(depth))) == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.parametrize(("factor", "offset"), [(0.85, 0.0), (0.5, 0.0), (1.2, 0.0), (1.0, -0.3)])
+@pytest.mark.parametrize("corners", [(-0.1, 0.3), (-0.1, 0.3, -0.1)])
+def test_a_leap_of_the_force_ends_the_contact(factor: float, offset: float, corners: tuple[float, ...]) -> None:
+    """Where the sample tears, or a range or zero is changed, what follows is not of the same contact."""
+    depth = ways(*corners)
+    force = pressed(depth)
+    torn = np.arange(len(depth)) >= int(np.argmax(depth > 0.2))
+    read = np.where(torn, factor * force + offset * float(hertz(np.array(0.3))), force)
+    (finding,) = implausible(campaign(depth, read))
+    assert finding.code == "force_steps"
+    assert finding.arguments["at_mm"] == pytest.approx(0.2, abs=0.01)
+    assert modulus_mpa(campaign(depth, read)) == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_held_reading_of_the_force_is_no_leap() -> None:
+    """A channel that is read at a tenth of the rate leaps everywhere by as much."""
+    depth = ways(-0.1, 0.3, -0.1)
+    force = np.repeat(pressed(depth)[::10], 10)[: len(depth)]
+    assert "force_steps" not in {finding.code for finding in implausible(campaign(depth, force))}
+
+
 def test_a_wrong_last_reading_is_no_step() -> None:
     """Nothing follows that would say by how much the reading jumped: no sample is lost."""
     depth = ways(-0.1, 0.3)

@@ -25,7 +25,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, CurveRecording, samples_of
 from underskin.recordings.curve_course import PACE, RETURN, is_one_sided, roughness, turning_points
-from underskin.recordings.damaged_readings import marks, reading_steps, spikes, without_damaged
+from underskin.recordings.damaged_readings import force_step, marks, reading_steps, spikes, without_damaged
 from underskin.recordings.periodic_error import periodic_error
 from underskin.units import Floats, Indices, Mask
 
@@ -460,7 +460,7 @@ def prepared(campaign: Campaign) -> PreparedCurves:
         findings.extend((*of_damage, *of_saturation))
         oriented = orientation(curve)
         oriented_curves.append((curve, oriented))
-        for step in (_turned, _forwards, _without_steps, _without_periodic_error):
+        for step in (_turned, _forwards, _without_steps, _until_force_step, _without_periodic_error):
             curve, curve_findings = step(curve, oriented)
             findings.extend(curve_findings)
         return curve
@@ -527,6 +527,24 @@ def _without_steps(curve: CurveRecording, _: Orientation) -> tuple[CurveRecordin
     arguments = {"step_mm": float(steps[largest]), "sample": int(finite[largest]), "further": further}
     corrected = replace(curve, displacement_mm=displacement)
     return corrected, [Finding(Reason.READING_STEPS, curve.id, "displacement_mm", arguments)]
+
+
+def _until_force_step(curve: CurveRecording, _: Orientation) -> tuple[CurveRecording, list[Finding]]:
+    """The samples before a leap of the force alone: those after it are not of the same contact."""
+    finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
+    if not curve.has_sphere or len(finite) < _LEAST:
+        return curve, []
+    travel, force = curve.displacement_mm[finite], curve.force_n[finite]
+    sample = force_step(travel, force)
+    if sample is None:
+        return curve, []
+    arguments = {
+        "from_n": float(force[sample - 1]),
+        "to_n": float(force[sample]),
+        "at_mm": float(travel[sample]),
+        "samples": len(finite) - sample,
+    }
+    return samples_of(curve, finite[:sample]), [Finding(Reason.FORCE_STEPS, curve.id, "force_n", arguments)]
 
 
 def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:

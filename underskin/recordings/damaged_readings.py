@@ -84,6 +84,37 @@ def reading_steps(travel: Floats, force: Floats) -> Floats:
     return steps
 
 
+_AROUND = 20  # samples on either side of a step of the force: more than a slow channel holds a value
+
+
+def force_step(travel: Floats, force: Floats) -> int | None:
+    """The first sample before which the force of a pressed sphere leaps to another course while the travel goes on
+    evenly, or None: the sample tears or slips, or the range of the cell is switched.
+
+    The change of the force there stands off those around it, as no law, hold or turn makes it. Snap-in and pull-off
+    are leaps to or from the air, or of a force that pulls.
+    """
+    changed, moved = np.diff(force, prepend=force[0]), np.abs(np.diff(travel, prepend=travel[0]))
+    away = force - force[0]
+    pressed = away * np.sign(away[np.abs(away).argmax()])
+    noise, turn = roughness(force), int(travel.argmax())
+    for sample in np.flatnonzero(np.abs(changed) > _SUDDEN * noise).tolist():
+        first, end = sample - _AROUND, sample + _AROUND + 1
+        if (
+            first < 1
+            or end > len(force)
+            or first <= turn < end
+            or pressed[sample - 1 : sample + 1].min() < _SUDDEN * noise
+        ):
+            continue
+        around, steps = (np.delete(column[first:end], _AROUND) for column in (changed, moved))
+        usual = float(np.median(around))
+        leaps = abs(changed[sample] - usual) > _SUDDEN * max(float(np.abs(around - usual).max()), noise)
+        if leaps and moved[sample] <= 2 * np.median(steps):
+            return sample
+    return None
+
+
 def _step(travel: Floats, force: Floats, sample: int) -> float:
     """The jump of the reading before a sample: what it moved beyond the steps on both sides.
 

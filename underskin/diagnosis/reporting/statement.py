@@ -308,13 +308,14 @@ SLIPS = (
         FindingCode.GAIN_STEPS,
     ),
     FindingCode.WARM_UP,
-    *(FindingCode.FORCE_SATURATES, FindingCode.READING_STEPS, FindingCode.PERIODIC_ERROR),
+    *(FindingCode.FORCE_SATURATES, FindingCode.READING_STEPS, FindingCode.FORCE_STEPS, FindingCode.PERIODIC_ERROR),
     *(
         FindingCode.UNITS_OFF_BY_1000,
         FindingCode.CHANNELS_SWAPPED,
         FindingCode.SIGN_FLIPPED,
         FindingCode.MAINS_IN_CHARGE,
         FindingCode.OUT_OF_DOMAIN,
+        FindingCode.FAR_CONTACTS,
     ),
     *(FindingCode.CONTACTS_KEPT, FindingCode.DUPLICATED_RECORDING),
 )

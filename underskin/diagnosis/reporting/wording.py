@@ -27,6 +27,7 @@ _FINDINGS = {
     "far_contacts": "contacts far from the sensor",
     "force_acts_once": "a single sweep or blow",
     "force_contradicts_preload": "force and preload disagree",
+    "force_steps": "the force leaps",
     "gain_steps": "amplitude off by a factor",
     "held_out_no_better": "no better on other recordings",
     "unusual_scatter": "recordings scatter",
