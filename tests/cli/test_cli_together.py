@@ -51,7 +51,7 @@ def test_files_together_tell_file(palm: Campaign, presses: list[str], tmp_path: 
     assert "8 recordings have ids that several files use" in parts.stderr
     shown = run("d33", *presses, "--together", "palm/3", "--figures", str(tmp_path / "pages")).stdout
     assert (shown.splitlines()[0], shown.count("d33 of the array")) == ("palm/3", 2)  # and by the solved contact
-    assert "is assumed here and not tested" in shown  # whether it can be quoted
+    assert "assumes the paper's model" in shown  # whether it can be quoted
     assert [page.name for page in (tmp_path / "pages").iterdir()] == ["palm-3.html"]
 
 
