@@ -52,7 +52,7 @@ def test_no_finding_is_shown_by_its_code(visitor: Visit, server: Server) -> None
     ]
     _, diagnosis_id = diagnosed(server, resonant("found"), {**report(), "findings": findings}, "found")
     visitor.go(f"/diagnoses/{diagnosis_id}")
-    part = visitor.page.locator("details", has_text="Look at these recordings")
+    part = visitor.page.locator("details:has(> summary:has-text('Look at these recordings'))")
     part.locator("summary").click()
     shown = part.locator("td:last-child").all_inner_texts()
     assert len(shown) == len(findings)
@@ -68,6 +68,7 @@ def test_not_settled_points_section(visitor: Visit, server: Server) -> None:
     visitor.go(f"/diagnoses/{diagnosis_id}")
     heading = visitor.page.get_by_role("heading", name="What the model lacks, and the values found")
     assert heading.count() == 1
+    visitor.page.locator("summary", has_text="what to keep in mind").click()
     summary = visitor.page.locator(".summary").inner_text()
     assert f"under “{heading.inner_text()}”" in summary
     assert "No d33 yet: it lies from" in summary
