@@ -101,6 +101,18 @@ def test_skin_before_after_sensor_changed(visitor: Visit, server: Server, width:
     assert max(abs(gap) for sensor, gap in gaps.items() if sensor != "s2") < 0.05
 
 
+def test_campaigns_without_a_condition_in_common(server: Server) -> None:
+    """FRFs under other preloads are not laid over each other; d33 is compared all the same."""
+    ids = [
+        sent(server, to_dict(replace(campaign(replace(BEFORE, preloads_n=preloads), table()), name=name)), "loads")
+        for name, preloads in (("light", (1.0, 2.0)), ("heavy", (1.5, 2.5)))
+    ]
+    shown = server.http.get("/compare", params={"first": ids[0], "second": ids[1]}, headers=BROWSING)
+    assert shown.status_code == 200
+    assert "figure-map-difference" in shown.text
+    assert "figure-frf" not in shown.text
+
+
 def test_nothing_to_compare_is_said(server: Server) -> None:
     assert server.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
 
