@@ -113,6 +113,18 @@ def test_campaigns_without_a_condition_in_common(server: Server) -> None:
     assert "figure-frf" not in shown.text
 
 
+def test_a_sensor_that_was_dead_differs_in_charge(server: Server) -> None:
+    """Of a first d33 of 0 there is no percent: the difference is told in pC/N."""
+    made = campaign(BEFORE, table())
+    first, second = (
+        sent(server, to_dict(replace(one, name=name)), "repaired")
+        for one, name in ((weakened(made, "s2", 0.0), "dead"), (made, "alive"))
+    )
+    text = server.http.get("/compare", params={"first": first, "second": second}, headers=BROWSING).text
+    assert re.search(r"1 of 4 sensors differs beyond chance: s2 \+1\d(\.\d)? pC/N", text)
+    assert "nan" not in re.findall(r'class="result lead".*?</p>', text, re.DOTALL)[0]
+
+
 def test_nothing_to_compare_is_said(server: Server) -> None:
     assert server.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
 
