@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import orjson
@@ -20,7 +21,7 @@ from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
-from underskin.recordings.joined_files import is_of_another
+from underskin.recordings.joined_files import files_to_join, is_of_another
 from underskin.recordings.readers import formats
 from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
@@ -104,8 +105,8 @@ def look(
 ) -> InspectedFile:
     """The campaigns of a file, by its content, with its format and channels; JSON may hold one or a list of them.
 
-    The other files of a recording, which the rig description names, are among those `sent` with it; they hold no
-    campaign of their own.
+    The other files of a recording, which the rig description names, are among those `sent` with it, each name once;
+    they hold no campaign of their own.
     """
     beside = {other.label: other.path for other in sent if other.label is not None}
     label = upload.label or _UNLABELLED
@@ -115,8 +116,10 @@ def look(
             kind = formats.detect(stream, label)
         if kind == "JSON":
             return InspectedFile(kind, None, _read_json(upload, most_json_bytes))
-        if rig is not None and rig.join is not None and is_of_another(label, beside, rig.join):
-            return InspectedFile(kind, None, [])
+        if rig is not None and rig.join is not None:
+            if is_of_another(label, beside, rig.join):
+                return InspectedFile(kind, None, [])
+            _require_sent_once(label, [other.label for other in sent], rig.join)
         held = read_contents(upload.path, label, rig, beside)
         contents = held if isinstance(held, Contents) else None
         reading = _understood(held, label, rig, upload.said)
@@ -129,6 +132,15 @@ def look(
         campaign = ReadCampaign(upload.label, errors=[_invalid(error)])
     instrument = None if contents is None else instruments.recognised(kind, contents)
     return InspectedFile(kind, contents, [replace(campaign, instrument=instrument)])
+
+
+def _require_sent_once(label: str, sent: Sequence[str | None], join: tuple[str, tuple[str, ...]]) -> None:
+    """Raise FileError where a name of the files of a recording is that of several files sent, of which none can be told
+    to belong to it."""
+    for file in (Path(label), *files_to_join(Path(label), join)):
+        if sent.count(file.name) > 1:
+            reason = f"{file.name} was sent twice, and is to be joined (join): send the folders one by one"
+            raise FileError(label, "", reason)
 
 
 def _understood(

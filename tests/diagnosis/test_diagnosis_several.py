@@ -332,6 +332,12 @@ def test_block_measured_apart_counts_beside(table: SigmaTable) -> None:
     assert "compression" in {entry["kind"] for entry in report["by_kind"]}
 
 
+def test_blocks_alone_are_named(table: SigmaTable) -> None:
+    """A report on curves of several campaigns names these, as one with FRFs does."""
+    report = reported([of_block(9.0, "old"), of_block(9.2, "new")], table)
+    assert report["campaigns"] == ["old", "new"]
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize(("stiffness", "scatter"), first(1, [(0.25, 0.16), (0.15, 0.0)]))
 def test_glue_line_begins_slip_listed_date(stiffness: float, scatter: float, table: SigmaTable) -> None:

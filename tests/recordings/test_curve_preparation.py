@@ -6,6 +6,7 @@ import pytest
 from tests.support.sphere_curves import campaign, hertz, pressed, ways
 from underskin import read_file
 from underskin.errors import InvalidInput
+from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
 from underskin.recordings import rig_description
@@ -159,6 +160,16 @@ def test_a_held_reading_of_the_force_is_no_leap() -> None:
     depth = ways(-0.1, 0.3, -0.1)
     force = np.repeat(pressed(depth)[::10], 10)[: len(depth)]
     assert "force_steps" not in {finding.code for finding in implausible(campaign(depth, force))}
+
+
+@pytest.mark.parametrize(("of_travel", "of_force"), [(0.0, 1e-3), (1e-5, 0.0), (0.0, 0.0)])
+def test_a_step_between_two_holds(of_travel: float, of_force: float) -> None:
+    """The reading jumps while the sphere rests: travel, force or both are constant before and behind the step."""
+    depth = ways(-0.1, 0.3, 0.3, -0.1)
+    noise = of_travel * np.random.default_rng(3).normal(size=len(depth))
+    read = depth + noise + np.where(np.arange(len(depth)) < 360, 0.0, 0.02)
+    findings = {finding.code: finding for finding in implausible(campaign(read, pressed(depth, noise=of_force)))}
+    assert findings[FindingCode.READING_STEPS].arguments["step_mm"] == pytest.approx(0.02, rel=0.05)
 
 
 def test_a_wrong_last_reading_is_no_step() -> None:

@@ -110,6 +110,21 @@ def test_another_thickness_is_not_the_skin_s(other: str) -> None:
         read(f"{HEADERS['English']}\nSkin thickness: 3 mm\n{table}")
 
 
+ABOUT = ("Preload uncertainty: 0.01 N", "Vorspannkraft-Toleranz: 0,1 N", "Preload limit: 50 N", "Bend radius: 40 mm")
+
+
+@pytest.mark.parametrize("other", ABOUT)
+def test_a_spread_is_not_the_quantity(other: str) -> None:
+    """An uncertainty, a tolerance or a limit, and the radius of a bend, are no preload and no sphere."""
+    table = f"Time (s);F (N);Force std (N);Q (pC)\n{rows(TIME, FORCE, 0 * FORCE, CHARGE, decimal='.')}\n"
+    (recording,) = read(f"{other}\n{HEADERS['English']}\n{table}").campaign.of(FrfRecording)
+    assert (recording.indenter_radius_mm, recording.preload_n) == (4, 1)
+    assert recording.force_n == pytest.approx(FORCE, abs=1e-6)
+    without = HEADERS["English"].replace("Tip radius: 4 mm\n", "").replace("Static force: 1 N", other)
+    with pytest.raises(FileError, match=r"does not say recording.indenter_radius_mm"):
+        read(f"{without}\n{table}")
+
+
 @pytest.mark.parametrize("write", [numpy_file, matlab_5, plain_hdf5])
 @pytest.mark.parametrize(("name", "value"), [("fs", RATE), ("Fs", RATE), ("sampling_rate", RATE), ("dt", 1 / RATE)])
 def test_rate_that_an_array_has_beside_it(write: Callable[[Any], bytes], name: str, value: float) -> None:
@@ -141,6 +156,10 @@ LINES = {
         ("04/05/2026 09:15", ".", None),
         ("05/13/2026 09:15", ",", "2026-05-13T09:15:00+00:00"),
         ("au printemps", ",", None),
+        ("12 févr. 2026", ".", "2026-02-12T00:00:00+00:00"),
+        ("3 Sept 2017", ".", "2017-09-03T00:00:00+00:00"),
+        ("decay 3 2017", ".", None),
+        ("3 marks 2017", ".", None),
     ],
 )
 def test_date_of_a_column(written: str, mark: str, time: str | None) -> None:

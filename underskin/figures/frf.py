@@ -68,16 +68,18 @@ def frf_pair(first: Sequence[FrfSpread], second: Sequence[FrfSpread]) -> go.Figu
     conditions some; None without a common one."""
     of_first = {_condition(spread): spread for spread in first}
     common = [spread for spread in second if _condition(spread) in of_first]
+    if not common:
+        return None
     shown = [common[number] for number in sorted({*np.linspace(0, len(common) - 1, _MOST_PAIRS).astype(int).tolist()})]
     traces: list[PlotlyTrace] = []
-    for number, after in enumerate(shown if common else []):
+    for number, after in enumerate(shown):
         _, look = _look(_condition(after), list(map(_condition, shown)))
         name = f"R {after.indenter_radius_mm:.3g} mm, {after.preload_n:.3g} N"
         for which, spread, dash in (("first", of_first[_condition(after)], "dash"), ("second", after, "solid")):
             parts = (spread.magnitude_pc_per_n[1], spread.phase_deg[1], spread.coherence[0])
             styled_look = {**look, "line": {**look["line"], "dash": dash}}
             traces += _lines(f"{which}, {name}", str(number), spread.frequency_hz, parts, styled_look)
-    return _finished(traces, None, "FRFs of both campaigns") if traces else None
+    return _finished(traces, None, "FRFs of both campaigns")
 
 
 def _lines(

@@ -18,14 +18,15 @@ _WHICH = ("first", "second")
 def with_differences(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Rows of sensors with `{first,second}_pc_per_n` and `…_uncertainty_pc_per_n`, with the second less the first in
     pC/N, its standard uncertainty, the percent, and whether it is beyond chance over the whole array (5 %); None of a
-    sensor of only one campaign."""
+    sensor of only one campaign, and the percent of a first d33 of 0."""
     known = [row for row in rows if None not in (row["first_pc_per_n"], row["second_pc_per_n"])]
     d33, deviation = _both(known)
     gap, of_gap = d33[:, 1] - d33[:, 0], np.hypot(*deviation.T)
     differ = differ_from_zero(gap, of_gap)
     for row, value, uncertainty, beyond in zip(known, gap.tolist(), of_gap.tolist(), differ.tolist(), strict=True):
         row["difference_pc_per_n"], row["difference_uncertainty_pc_per_n"] = value, uncertainty
-        row["difference_percent"] = 100 * value / (row["first_pc_per_n"] or math.nan)
+        first = row["first_pc_per_n"]
+        row["difference_percent"] = 100 * value / first if first else None
         row["beyond_chance"] = beyond
     return list(rows)
 
@@ -41,8 +42,8 @@ def in_words(rows: Sequence[Mapping[str, Any]]) -> str:
         levels = array_levels(np.log(d33), deviation / d33)
     change = changes(np.array([0.0, 1.0]), levels.level[None], levels.deviation[None], gain_scatters=True)
     size, low, high = (float(np.expm1(part[0])) for part in (change.value, change.low, change.high))
-    differ = sorted((row for row in shared if row["beyond_chance"]), key=lambda row: -abs(row["difference_percent"]))
-    named = ", ".join(f"{row['sensor'][:24]} {row['difference_percent']:+.0f} %" for row in differ[:_MOST_NAMED])
+    differ = sorted((row for row in shared if row["beyond_chance"]), key=lambda row: -_relative(row))
+    named = ", ".join(f"{row['sensor'][:24]} {_size(row)}" for row in differ[:_MOST_NAMED])
     sensors = f"{len(differ) or 'none'} of {len(shared)} sensors differ{'s' if len(differ) == 1 else ''} beyond chance"
     sensors += (
         f": {named}{f' and {len(differ) - _MOST_NAMED} more' if len(differ) > _MOST_NAMED else ''}" if differ else ""
@@ -51,6 +52,17 @@ def in_words(rows: Sequence[Mapping[str, Any]]) -> str:
         return f"{capital(sensors)}."
     of_array = np.exp(levels.level).tolist()
     return f"{array_change_in_words(size, low, high, of_array, 'from the first to the second', None)}; {sensors}."
+
+
+def _relative(row: Mapping[str, Any]) -> float:
+    """How much a sensor differs, for sorting: in percent, and a first d33 of 0 most of all."""
+    return math.inf if row["difference_percent"] is None else abs(row["difference_percent"])
+
+
+def _size(row: Mapping[str, Any]) -> str:
+    """A sensor's difference in percent; of a first d33 of 0 in pC/N."""
+    percent = row["difference_percent"]
+    return f"{row['difference_pc_per_n']:+.3g} pC/N" if percent is None else f"{percent:+.0f} %"
 
 
 def _both(rows: Sequence[Mapping[str, Any]]) -> tuple[Floats, Floats]:

@@ -119,7 +119,8 @@ def _step(travel: Floats, force: Floats, sample: int) -> float:
     """The jump of the reading before a sample: what it moved beyond the steps on both sides.
 
     Where the travel turns there, these tell nothing of the step between: the force does, by the straight line over the
-    travel through the samples on either side, of one slope for both.
+    travel through the samples on either side, of one slope for both; where either column rests on both sides there is
+    no such line, and the step is that of the travel's means.
     """
     parts = [slice(max(sample - _BESIDE, 0), sample), slice(sample, sample + _BESIDE)]
     before, after = (float(np.median(np.diff(travel[part]))) for part in parts)
@@ -130,5 +131,6 @@ def _step(travel: Floats, force: Floats, sample: int) -> float:
         np.concatenate([column[part] - mean for part, mean in zip(parts, means, strict=True)])
         for column, means in ((travel, at), (force, load))
     )
-    slope = float(away @ rest) / float(away @ away)
-    return float(at[1] - at[0] - (load[1] - load[0]) / slope)
+    rests = any(all(np.ptp(column[part]) == 0 for part in parts) for column in (travel, force))
+    slope = 0.0 if rests else float(away @ rest) / float(away @ away)
+    return float(at[1] - at[0] - ((load[1] - load[0]) / slope if slope else 0.0))

@@ -43,7 +43,7 @@ WORDS: tuple[tuple[str, str, str], ...] = (
     (
         "indenter_radius_mm",
         "length",
-        rf"^(?!.*({_SENSOR}|{_SAMPLE}|[ck]onta[ck]t))(?=.*({_RADIUS}|({_SPHERE}).*({_DIAMETER})))",
+        rf"^(?!.*({_SENSOR}|{_SAMPLE}|[ck]onta[ck]t|\bbend|bieg))(?=.*({_RADIUS}|({_SPHERE}).*({_DIAMETER})))",
     ),
     ("indenter_radius_mm", "length", rf"^(?!.*({_SENSOR}|{_SAMPLE})).*({_DIAMETER}).*({_SPHERE})"),
     (
@@ -68,6 +68,11 @@ OF_CHANNELS = {  # of columns of samples or lines whose unit does not say it
     "displacement_mm": r"displacement|depth|\bweg|eindring|verschiebung|d[ée]placement|enfoncement|spostamento|desplaz",
     "time_s": r"time|zeit|temps|tempo|tiempo",
 }
+# What a name says of a quantity's spread or bounds, and not of the quantity
+_ABOUT = re.compile(
+    r"uncertain|toll?eran[czt]|\b(error|std|limit)|deviation|unsicherheit|fehler|abweichung|grenz|incert|erreur"
+    r"|écart[ -]type|deviazione|desviación"
+)
 RECORDED_AT = "recorded_at"
 # Properties, and columns of words, that hold the time of a recording, the surest first.
 TIMES = (
@@ -85,6 +90,11 @@ def is_diameter(name: str) -> bool:
     return re.search(_DIAMETER, name.lower()) is not None and not re.search(_RADIUS, name.lower())
 
 
+def is_about(name: str) -> bool:
+    """Whether a name says the uncertainty, the tolerance or the limit of a quantity, and not the quantity."""
+    return _ABOUT.search(name.lower().replace("_", " ")) is not None
+
+
 def field_by_words(name: str, dimension: str) -> str:
     """The field that the words of a name say, with a unit of this dimension; empty for none."""
     plain = (in_brackets(name) or (name,))[0].lower().replace("_", " ").strip()
@@ -93,7 +103,7 @@ def field_by_words(name: str, dimension: str) -> str:
     is_other = field in ("thickness_mm", "youngs_modulus_mpa") and not all(
         _OF_LAYER.fullmatch(word) for word in re.findall(r"[^\W\d_]+", plain)
     )
-    return "" if is_other else field
+    return "" if is_other or is_about(plain) else field
 
 
 def field_of(name: str) -> tuple[str, bool]:

@@ -19,12 +19,16 @@ from underskin.recordings.regular_samples import OFF_SAMPLE, mean_step
 
 
 def files_to_join(file: Path, join: tuple[str, tuple[str, ...]]) -> Iterator[Path]:
-    """The other files of a recording, by the name of the first; raises FileError where its name has not the part."""
+    """The other files of a recording, by the name of the first; raises FileError where its name has not the part, or
+    would give none of a file."""
     part, others = join
     if part not in file.name:
         raise FileError(str(file), "", f"has no {part!r} in its name, which says what files belong to it (join)")
     for other in others:
-        yield file.with_name(other.join(file.name.rsplit(part, 1)))
+        name = other.join(file.name.rsplit(part, 1))
+        if name in ("", ".", "..") or Path(name).name != name:
+            raise FileError(str(file), "", f"would be joined with {name!r}, which must be the name of a file (join)")
+        yield file.with_name(name)
 
 
 def is_of_another(name: str, names: Iterable[str], join: tuple[str, tuple[str, ...]]) -> bool:

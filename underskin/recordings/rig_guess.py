@@ -22,6 +22,7 @@ from underskin.recordings.field_words import (
     WHEN,
     field_by_words,
     field_of,
+    is_about,
     is_diameter,
     stated_rate,
 )
@@ -264,7 +265,7 @@ def likely(columns: Sequence[Column], properties: Mapping[str, Any] = MappingPro
             field = MAGNITUDE
         if is_spectrum and kind == "frf" and field in ("force_n", "charge_pc", "time_s"):
             field = ""  # of the recording
-        fields.append(field if field in channel_fields(kind) else "")
+        fields.append(field if field in channel_fields(kind) and not is_about(name) else "")
     if kind != "frf" or is_spectrum:
         return kind, fields
     of_rows = [_row_field(column) != "" for column in columns]

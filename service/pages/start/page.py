@@ -50,7 +50,7 @@ def start(
                 sparkline(glance.d33),
                 None if glance.diagnosis is None else verdict[glance.diagnosis.id],
                 None if glance.model is None else adoptions[glance.model.id],
-                attention(glance.by_paper, glance.last, glance.d33),
+                attention(glance.by_paper, glance.last),
                 verdicts.change_percent(_d33(glance.paper_array), _d33(glance.adopted_array)),
             )
             for glance in shown

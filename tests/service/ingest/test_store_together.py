@@ -196,6 +196,18 @@ def test_files_of_one_recording_are_joined(server: Server) -> None:
     assert "a_charge.csv belongs to it (join), and was not sent with it" in alone.text
 
 
+def test_files_of_one_name_are_not_joined(server: Server) -> None:
+    """Of two folders, whose files are called alike, none can be told to belong to another: each is to be sent alone."""
+    rig, *files = halves()
+    answer = server.http.post("/v1/campaigns?skin=folders", files=[rig, *files, files[0]])
+    (refused, kept) = answer.json()["campaigns"]
+    assert (kept["file"], kept["errors"]) == ("b_force.csv", [])
+    assert "a_charge.csv was sent twice, and is to be joined (join): send the folders one by one" in str(refused)
+    twice = server.http.post("/v1/campaigns?skin=folders", files=[rig, *files[:2], files[1]])
+    assert twice.status_code == 422
+    assert "a_force.csv was sent twice" in twice.text
+
+
 def test_files_of_one_recording_are_joined_on_the_page(server: Server) -> None:
     """So they are on the page of an upload, which keeps one campaign of each pair."""
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as browser:

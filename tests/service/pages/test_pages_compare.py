@@ -101,6 +101,30 @@ def test_skin_before_after_sensor_changed(visitor: Visit, server: Server, width:
     assert max(abs(gap) for sensor, gap in gaps.items() if sensor != "s2") < 0.05
 
 
+def test_campaigns_without_a_condition_in_common(server: Server) -> None:
+    """FRFs under other preloads are not laid over each other; d33 is compared all the same."""
+    ids = [
+        sent(server, to_dict(replace(campaign(replace(BEFORE, preloads_n=preloads), table()), name=name)), "loads")
+        for name, preloads in (("light", (1.0, 2.0)), ("heavy", (1.5, 2.5)))
+    ]
+    shown = server.http.get("/compare", params={"first": ids[0], "second": ids[1]}, headers=BROWSING)
+    assert shown.status_code == 200
+    assert "figure-map-difference" in shown.text
+    assert "figure-frf" not in shown.text
+
+
+def test_a_sensor_that_was_dead_differs_in_charge(server: Server) -> None:
+    """Of a first d33 of 0 there is no percent: the difference is told in pC/N."""
+    made = campaign(BEFORE, table())
+    first, second = (
+        sent(server, to_dict(replace(one, name=name)), "repaired")
+        for one, name in ((weakened(made, "s2", 0.0), "dead"), (made, "alive"))
+    )
+    text = server.http.get("/compare", params={"first": first, "second": second}, headers=BROWSING).text
+    assert re.search(r"1 of 4 sensors differs beyond chance: s2 \+1\d(\.\d)? pC/N", text)
+    assert "nan" not in re.findall(r'class="result lead".*?</p>', text, re.DOTALL)[0]
+
+
 def test_nothing_to_compare_is_said(server: Server) -> None:
     assert server.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
 

@@ -37,7 +37,7 @@ def ids(server: Server) -> list[str]:
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_overviews_name_what_is_wrong(visitor: Visit, ids: list[str], width: int) -> None:
-    """Start, skin and campaign name the weak and the dead sensor, the fall and what was refused, in a line."""
+    """Start, skin and campaign name the weak and the dead sensor and what was refused, in a line."""
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 900})
     lines = {}
@@ -52,7 +52,7 @@ def test_overviews_name_what_is_wrong(visitor: Visit, ids: list[str], width: int
     assert "s2 dead" in lines[f"/campaigns/{ids[1]}"]
     assert "s2 is dead since 2018-05-03" in (trend := visited(visitor, "/skins/aged", "#array-trend"))
     assert "fell by" in trend
-    assert re.search(r"median d33 fell by 1\d % since 2017-05-03", lines["/"])
+    assert "fell by" not in lines["/"]  # where nothing tells it from chance
 
 
 def visited(visitor: Visit, path: str, selector: str) -> str:

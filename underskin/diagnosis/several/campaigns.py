@@ -87,9 +87,10 @@ def diagnose_together(
     refuse_copies(with_frf)
     if not with_frf:
         curves = with_curves(replace(of_curves[0], recordings=()), of_curves)
-        return {**reported(diagnose(curves, table, progress, without=without)).document, "campaign": name}
-    ordered = in_order(with_frf)
-    document = _document(name, ordered, of_curves, table, without, progress)
+        ordered, document = [], reported(diagnose(curves, table, progress, without=without)).document
+    else:
+        ordered = in_order(with_frf)
+        document = _document(name, ordered, of_curves, table, without, progress)
     return {**document, "campaign": name, "campaigns": [campaign.name for campaign in (*ordered, *of_curves)]}
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, date, datetime, tzinfo
 from itertools import chain
 from typing import BinaryIO
+from unicodedata import combining, normalize
 from zoneinfo import ZoneInfo
 
 from underskin.errors import FileError, InvalidInput
@@ -219,9 +220,19 @@ _WRITTEN = [
     )
 ]
 _SLASHED = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{4})(?!\d)")
-_MONTHS = (  # how their names begin, in English, French, German, Italian and Spanish
-    *("jan gen ene", "feb fév fev", "mar mär mrz", "apr avr abr", "may mai mag", "jun juin giu", "jul juil lug"),
-    *("aug aoû aou ago", "sep set", "oct okt ott", "nov", "dec déc dez dic"),
+_MONTHS = (  # their names without accents, in English, French, German, Italian and Spanish
+    "january janvier januar janner gennaio enero",
+    "february fevrier februar febbraio febrero",
+    "march mars marz maerz mrz marzo",
+    "april avril aprile abril",
+    "may mai maggio mayo",
+    "june juin juni giugno junio",
+    "july juillet juli luglio julio",
+    "august aout agosto",
+    "september septembre settembre septiembre setiembre",
+    "october octobre oktober ottobre octubre",
+    "november novembre noviembre",
+    "december decembre dezember dicembre diciembre",
 )
 _ISO_DATE = re.compile(r"(\d{4})-(\d{2})-(\d{2})")
 
@@ -254,9 +265,11 @@ def iso_time(cell: str, zone: tzinfo) -> str:
 
 
 def _month(name: str) -> int | None:
-    """The number of a month by its name or the beginning of it; None for another word."""
-    begins = (number for number, words in enumerate(_MONTHS, 1) if name.lower().startswith(tuple(words.split())))
-    return next(begins, None)
+    """The number of a month by its name, or by the beginning of it as an abbreviation; None for another word, and for
+    the beginning of two months."""
+    plain = "".join(letter for letter in normalize("NFKD", name.lower()) if not combining(letter))
+    months = [number for number, words in enumerate(_MONTHS, 1) if f" {plain}" in f" {words}"]
+    return months[0] if len(months) == 1 else None
 
 
 def with_day_first(cells: Iterable[str], decimal: str) -> list[str]:
