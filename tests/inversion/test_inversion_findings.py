@@ -511,3 +511,22 @@ def test_scatter_at_its_limit_gives_no_d33_of_the_array(table: SigmaTable) -> No
     found = invert(replace(campaign, recordings=recordings), table)
     assert found.campaign_d33 is None
     assert FindingCode.UNUSUAL_SCATTER in {finding.code for finding in found.findings}
+
+
+def noted(campaign: Campaign, condition: Callable[[FrfRecording], dict[str, float]]) -> Campaign:
+    """The campaign with conditions noted for each FRF recording."""
+    recorded = campaign.of(FrfRecording)
+    return replace(campaign, recordings=tuple(replace(item, conditions={**condition(item)}) for item in recorded))
+
+
+def test_a_condition_that_follows_the_load_leaves_d33_with_preload(table: SigmaTable) -> None:
+    """What d33 does with preload is no effect of a column that follows the preload: no d33 changes by noting it."""
+    campaign = simulate(table, Rig(d33=np.full(4, 14.0), gain=0.01), np.random.default_rng(5))
+    bent = [times(item, 1 + 0.06 * (item.preload_n - 1.6)) for item in campaign.of(FrfRecording)]
+    campaign = replace(campaign, recordings=tuple(bent))
+    plain = invert(campaign, table)
+    found = invert(noted(campaign, lambda item: {"load_cell_v": 2 * item.preload_n}), table)
+    assert plain.campaign_d33 is not None
+    assert found.campaign_d33 is not None
+    for before, after in ((plain.cells.d33, found.cells.d33), (plain.campaign_d33, found.campaign_d33)):
+        np.testing.assert_allclose([after.value, after.low, after.high], [before.value, before.low, before.high])

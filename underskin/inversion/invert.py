@@ -687,8 +687,8 @@ def _estimated(
     unfit |= {index: flag for index, flag in filtered.items() if index not in beyond_filter}
     mean, variance = mean[:, good], variance[:, good]
     plain = np.array([index not in unfit for index in sensor])
-    effects = noted.fitted(good[plain], sensor[plain], rows.condition[good[plain]], d33[plain])
-    measured = LevelRows(d33 / effects.gain(good), noise, pilot[sensor], mean, variance)
+    effects = noted.fitted(good[plain], sensor[plain], rows.condition, d33[plain])
+    measured = LevelRows(d33 / effects.gain(good, sensor, len(ids)), noise, pilot[sensor], mean, variance)
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]
@@ -697,7 +697,8 @@ def _estimated(
         model = mixed_model.fit(alike.part(plain), numbered)
     scatter = model.scatter if model else mixed_model.prior_scatter()
     cell, where, count = _cells(rows, good)
-    sensors = scatter.d33(measured, sensor, len(ids)).wider(effects.unsure(good, sensor, len(ids)))
+    unsure = effects.unsure(good, sensor, len(ids))
+    sensors = scatter.d33(measured, sensor, len(ids)).wider(unsure)
     flags = [*unfit.values(), *([] if of_groups else difference_flags(ids, sensors, unfit))]
     if model:
         expected = _expected_scatter(model, measured)[plain]
@@ -709,7 +710,7 @@ def _estimated(
         recordings=rows,
         cells=Cells(
             rows.sensor[where], rows.indenter_radius[where], rows.preload[where], count,
-            scatter.d33(measured, cell, len(where)).wider(effects.unsure(good, cell, len(where))),
+            scatter.d33(measured, cell, len(where)).wider(unsure[rows.sensor[where]]),
         ),
         sensors=sensors,
         flags=tuple(flags),
