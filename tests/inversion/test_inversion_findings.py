@@ -530,3 +530,30 @@ def test_a_condition_that_follows_the_load_leaves_d33_with_preload(table: SigmaT
     assert found.campaign_d33 is not None
     for before, after in ((plain.cells.d33, found.cells.d33), (plain.campaign_d33, found.campaign_d33)):
         np.testing.assert_allclose([after.value, after.low, after.high], [before.value, before.low, before.high])
+
+
+def test_a_label_of_the_sensors_leaves_them_as_certain(table: SigmaTable) -> None:
+    """A column that the recordings of a sensor share says nothing of d33: it widens no interval, and a temperature
+    is named as inseparable, without a slope."""
+    campaign = simulate(table, Rig(d33=np.full(4, 14.0), gain=0.01), np.random.default_rng(5))
+    started = {item.id: 1.7e9 + 60 * number for number, item in enumerate(campaign.of(FrfRecording))}
+
+    def labels(item: FrfRecording) -> dict[str, float]:
+        return {"channel": float(item.sensor[1:]), "file": started[item.id] - 1.7e9, "unix": started[item.id]}
+
+    plain = invert(campaign, table)
+    for condition, said in ((labels, 0), (lambda item: {"temperature_c": 20 + float(item.sensor[1:])}, 1)):
+        found = invert(noted(campaign, condition), table)
+        np.testing.assert_allclose(found.sensors.uncertainty, plain.sensors.uncertainty)
+        assert len(found.findings) == said
+        assert all("20 to 23, and hardly within them" in finding.statement for finding in found.findings)
+
+
+def test_a_condition_is_stated_in_digits_that_differ(table: SigmaTable) -> None:
+    """The range of a large number that varies little over the sensors is no single number."""
+    random = np.random.default_rng(7)
+    campaign = simulate(table, Rig(d33=np.full(4, 14.0), gain=0.005), random)
+    count = len(campaign.recordings)
+    pressure = 1.7e6 + 7 * np.arange(count) / count + 0.3 * random.standard_normal(count)
+    (finding,) = invert(at_temperatures(campaign, pressure, 0.008), table).findings
+    assert "1700000.85 to 1700005.97" in finding.statement
