@@ -173,6 +173,24 @@ def test_shaken_charge_limited_behind_much_noise_is_refused(
         invert(of(limited), table)
 
 
+def test_a_contact_that_bends_the_response_is_no_overload(table: SigmaTable) -> None:
+    """A charge as F^1.4 under a sine of 0.8 of the preload is used; a charge that its amplifier limits is refused."""
+    random, time = np.random.default_rng(5), np.arange(40000) / 2000.0
+
+    def of(answer: Callable[[Floats], Floats]) -> Campaign:
+        campaign = shaken(sample_rate_hz=2000.0)
+        recordings = []
+        for recording in campaign.of(FrfRecording):
+            relative = 1 + 0.8 * np.sin(2 * np.pi * 20 * time)
+            charge = 7.4 * recording.preload_n * (answer(relative) + 0.001 * random.standard_normal(len(time)))
+            recordings.append(replace(recording, force_n=recording.preload_n * relative, charge_pc=charge))
+        return replace(campaign, recordings=tuple(recordings))
+
+    assert invert(of(lambda force: force**1.4), table).left_out == ()
+    with pytest.raises(NoD33, match="overload"):
+        invert(of(lambda force: np.tanh(force - 1)), table)
+
+
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.08, 0.01), (0.0, 0.2)])
 def test_nothing_tells_channel_noisy_interval(in_force: float, in_charge: float, table: SigmaTable) -> None:
     """Where nothing tells which channel is noisy the interval holds d33.

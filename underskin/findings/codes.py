@@ -190,6 +190,7 @@ class Reason(StrEnum):
     BEHIND_FILTER = "behind_filter"
     SENSOR_BEHIND_FILTER = "behind_filter.sensor"
     CONDITION_DIFFERS = "condition_differs"
+    CONDITION_NOT_TOLD = "condition_differs.not_told"
     CONSTANT_PHASE = "constant_phase"
     CONSTANT_AXIS = "constant_axis"
     ONE_LINE = "one_line"

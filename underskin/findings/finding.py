@@ -625,9 +625,12 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.NOISE_IN_FRF: noise_in_frf,
     Reason.BEHIND_FILTER: behind_filter,
     Reason.SENSOR_BEHIND_FILTER: sensor_behind_filter,
-    Reason.CONDITION_DIFFERS: "{name} differs between the sensors, {low:.4g} to {high:.4g}, and by the recordings of "
-    "each sensor it changes d33 by {percent:+.2g} ± {unsure:.2g} % per unit: the d33 of sensors are stated at its "
-    "mean, {mean:.4g}, which leaves them unsure by up to {left_percent:.2g} %; measure all sensors under one condition",
+    Reason.CONDITION_DIFFERS: "{name} differs between the sensors, {low:.15g} to {high:.15g}, and by the recordings of "
+    "each sensor it changes d33 by {percent:+z.15g} ± {unsure:.2g} % per unit: the d33 of sensors are stated at its "
+    "mean, {mean:.15g}, which leaves them unsure by up to {left_percent:.2g} %; measure all sensors under one "
+    "condition",
+    Reason.CONDITION_NOT_TOLD: "{name} differs between the sensors, {low:.15g} to {high:.15g}, and hardly within them: "
+    "what it does to d33 cannot be separated from the sensors; measure all sensors under one condition",
     Reason.CONSTANT_PHASE: "the FRFs have a phase of {phase_deg:.0f}°, the same over frequency and more than any loss "
     "of a skin: the reference phase of a lock-in amplifier, or another shift in the chain; it was taken off, so that "
     "d33 is that of the magnitude (the real part alone would be {lost_percent:.2g} % less), and its sign is known but "

@@ -15,7 +15,8 @@ Recordings far off the others of their sensor (a slip of units, a wrong range) a
 assumes log-normal recordings about their sensor's d33. What a skin may show is no outlier: an effect of a condition on
 all sensors, the scatter of the array, and the effect of a misplaced sphere. Sensors are flagged with the reason where
 they are dead, inverted, behind a filter, noisy, non-linear in preload (bent), or differ from the median of the others
-by three standard errors and 5 % (weak, strong); far off, they are left out of the array's d33. Findings are used.
+by 5 % and three deviations of their error and the array's spread together (weak, strong); far off, they are left out of
+the array's d33. Findings are used.
 """
 
 from collections.abc import Mapping, Sequence
@@ -75,7 +76,7 @@ _WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
 _UNFIT = {Reason.DEAD, Reason.INVERTED}
 _NOISY = 3.0  # times the array's
 _LEAST_CURVATURE = 0.05  # of d33
-_DIFFERS, _LEAST_DIFFERENCE = 3.0, 0.05  # standard errors, and of the array's d33
+_DIFFERS, _LEAST_DIFFERENCE = 3.0, 0.05  # standard deviations, and of the array's d33
 _FALSE_ALARMS = 1e-3  # per array
 
 
@@ -242,8 +243,9 @@ def error_from_median(uncertainties: Floats) -> Floats:
 
 
 def difference_flags(ids: tuple[str, ...], sensors: Estimate, unfit: Mapping[int, Flag]) -> list[Flag]:
-    """Sensors that differ from the array's median by three standard errors and 5 %; of the array are all that are not
-    `unfit`, which are flagged already. Fewer than three have no median robust to one of them."""
+    """Sensors unlike the others of their array: by 5 % and 3 √(SE² + s²) from its median, with the standard error SE of
+    that difference and the spread s over sensors by their median absolute deviation, robust to those marked. Of the
+    array are all that are not `unfit`, which are flagged already. Fewer than three have no median robust to one."""
     of_array = np.array([number for number in range(len(ids)) if number not in unfit], dtype=int)
     of_array = of_array[np.isfinite(sensors.value[of_array])]
     if len(of_array) < _ENOUGH:
@@ -251,7 +253,8 @@ def difference_flags(ids: tuple[str, ...], sensors: Estimate, unfit: Mapping[int
     value, deviation = sensors.value[of_array], sensors.uncertainty[of_array]
     middle = float(np.median(value))
     gap = np.abs(value - middle)
-    differs = (gap > _DIFFERS * error_from_median(deviation)) & (gap > _LEAST_DIFFERENCE * abs(middle))
+    usual = np.hypot(error_from_median(deviation), ROBUST * float(np.median(gap)))
+    differs = (gap > _DIFFERS * usual) & (gap > _LEAST_DIFFERENCE * abs(middle))
     return [
         Flag(ids[number], Reason.WEAK if share < 1 else Reason.STRONG, {"percent": 100 * share})
         for number, share in zip(of_array[differs].tolist(), (value[differs] / middle).tolist(), strict=True)
@@ -687,8 +690,8 @@ def _estimated(
     unfit |= {index: flag for index, flag in filtered.items() if index not in beyond_filter}
     mean, variance = mean[:, good], variance[:, good]
     plain = np.array([index not in unfit for index in sensor])
-    effects = noted.fitted(good[plain], sensor[plain], rows.condition[good[plain]], d33[plain])
-    measured = LevelRows(d33 / effects.gain(good), noise, pilot[sensor], mean, variance)
+    effects = noted.fitted(good[plain], sensor[plain], rows.condition, d33[plain])
+    measured = LevelRows(d33 / effects.gain(good, sensor, len(ids)), noise, pilot[sensor], mean, variance)
     model = None
     if plain.any():
         numbered = np.unique(sensor[plain], return_inverse=True)[1]
@@ -697,7 +700,8 @@ def _estimated(
         model = mixed_model.fit(alike.part(plain), numbered)
     scatter = model.scatter if model else mixed_model.prior_scatter()
     cell, where, count = _cells(rows, good)
-    sensors = scatter.d33(measured, sensor, len(ids)).wider(effects.unsure(good, sensor, len(ids)))
+    unsure = effects.unsure(good, sensor, len(ids))
+    sensors = scatter.d33(measured, sensor, len(ids)).wider(unsure)
     flags = [*unfit.values(), *([] if of_groups else difference_flags(ids, sensors, unfit))]
     if model:
         expected = _expected_scatter(model, measured)[plain]
@@ -709,7 +713,7 @@ def _estimated(
         recordings=rows,
         cells=Cells(
             rows.sensor[where], rows.indenter_radius[where], rows.preload[where], count,
-            scatter.d33(measured, cell, len(where)).wider(effects.unsure(good, cell, len(where))),
+            scatter.d33(measured, cell, len(where)).wider(unsure[rows.sensor[where]]),
         ),
         sensors=sensors,
         flags=tuple(flags),

@@ -333,7 +333,10 @@ class _LinearResponses:
         return float((rest / np.maximum(rest + response, _TINY)) @ response / max(float(response.sum()), _TINY))
 
 
-_FALLS_BEHIND = 0.02  # a charge as a power of 1 to 2 of the force loses 1/8 (rms/preload)²: 2 % at an rms of 0.4
+_FALLS_BEHIND = 0.02  # up to 2 % d33 is taken as it is
+# Times (rms/preload)² is what a charge of F^p loses under a Gaussian force: (p - 1)(p - 2)/6, the cubic term over the
+# linear one in the Taylor series at the preload, times ⟨x⁴⟩ = 3; of 1 < p < 2 most at p = 3/2
+_BENT_BY_CONTACT = 1 / 8
 _LIMITED_BY_CHANCE = 1e-6
 _PIECES = 32  # of a record, whose scatter tells the uncertainty: longer than noise stays alike, and enough of them
 _DETERMINED = 0.5  # least share of the cube that a periodic force's lines leave: those of few tones leave 0.8
@@ -348,10 +351,9 @@ class _Cubic:
     chance: float
     left: float
 
-    @property
-    def falls_behind(self) -> bool:
-        """Whether the effect follows less at large amplitudes."""
-        return self.loss > _FALLS_BEHIND and self.chance < _LIMITED_BY_CHANCE
+    def falls_behind(self, allowed: float) -> bool:
+        """Whether the effect follows less at large amplitudes, by more than an `allowed` loss."""
+        return self.loss > allowed and self.chance < _LIMITED_BY_CHANCE
 
     @property
     def runs_ahead(self) -> bool:
@@ -366,17 +368,21 @@ def _is_limited(force: Floats, charge: Floats) -> bool:
     linear response, beside the same of its square (Bendat, Nonlinear System Techniques and Applications, 1998): for a
     linear chain the coefficient is 0 by any noise of the charge. Unless the force consists of a few tones a limited
     charge has the force run ahead of it, too; noise of the force, or a ringing longer than a block, has not. Where the
-    lines of a periodic force leave little of the cube, that must be beyond chance as well.
+    lines of a periodic force leave little of the cube, that must be beyond chance as well. What a contact itself may
+    lose is allowed; a force that changes its sign does not tell the preload.
     """
     if len(force) < _PIECES * _FEWEST_PILED_UP:
         return False
+    allowed = _FALLS_BEHIND
+    if force.min() * force.max() > 0:
+        allowed = max(allowed, _BENT_BY_CONTACT * float(np.var(force) / np.mean(force) ** 2))
     period = period_of(force)
     cubic = _cubic(force, charge, period)
     if period and cubic.left >= _DETERMINED:
-        return cubic.falls_behind
+        return cubic.falls_behind(allowed)
     if period:
         cubic = _cubic(force, charge, 0)
-    if not cubic.falls_behind:
+    if not cubic.falls_behind(allowed):
         return False
     other = _cubic(charge, force, 0)
     return other.runs_ahead if period else other.loss < 0
