@@ -208,9 +208,10 @@ class RigDescription:
 
     @property
     def has_stated_signs(self) -> bool:
-        """Whether it states the signs of force and displacement of a curve, each as 1 or -1."""
-        signs = {self.channels[name].sign for name in _OF_CURVES if name in self.channels}
-        return self.channels.keys() >= set(_OF_CURVES) and signs <= {1, -1}
+        """Whether it states the signs of force and displacement of a curve, each of one channel, as 1 or -1."""
+        stated = [self.channels[name] for name in _OF_CURVES if name in self.channels]
+        is_composed = any(mapping.deflection is not None for mapping in stated)
+        return len(stated) == len(_OF_CURVES) and not is_composed and {mapping.sign for mapping in stated} <= {1, -1}
 
     @property
     def row_fields(self) -> Iterator[SignalMapping]:

@@ -162,6 +162,7 @@ def test_ambiguous_diagnosis_names_rivals_settle(visitor: Visit, server: Server)
     found = {**report(), "verdict": "ambiguous", "probability": 0.56, "alternatives": rivals, "statement": said}
     _, diagnosis_id = diagnosed(server, resonant("two ways"), found, "ambiguous")
     visitor.go(f"/diagnoses/{diagnosis_id}")
+    page.locator("summary", has_text="what to keep in mind").click()
     assert "Best explained by contact resonance (56 %)" in page.locator(".summary").inner_text()
     assert "several explanations remain · probability 56 %" in page.locator(".verdict").inner_text()
     page.get_by_role("heading", name="What the model lacks, and").click()  # which is folded below the summary
