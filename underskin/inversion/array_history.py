@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc, chdtri, ndtr, ndtri
 
-from underskin.inversion.invert import error_from_median, is_alive
 from underskin.inversion.mixed_model import LEVEL, mixture_quantile
+from underskin.inversion.sensor_flags import error_from_median, is_alive
 from underskin.units import Floats, Indices, Mask
 
 FEWEST = 3  # two points always lie on a line
