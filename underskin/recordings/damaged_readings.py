@@ -116,21 +116,22 @@ def force_step(travel: Floats, force: Floats) -> int | None:
 
 
 def _step(travel: Floats, force: Floats, sample: int) -> float:
-    """The jump of the reading before a sample: what it moved beyond the steps on both sides.
+    """The jump of the reading before a sample: what it moved beyond the steps that follow.
 
     Where the travel turns there, these tell nothing of the step between: the force does, by the straight line over the
-    travel through the samples on either side, of one slope for both; where either column rests on both sides there is
-    no such line, and the step is that of the travel's means.
+    travel through the samples on either side, of one slope for both.
     """
     parts = [slice(max(sample - _BESIDE, 0), sample), slice(sample, sample + _BESIDE)]
-    before, after = (float(np.median(np.diff(travel[part]))) for part in parts)
-    if before * after > 0:
-        return float(travel[sample] - travel[sample - 1]) - after
+    before, after = (np.diff(travel[part]) for part in parts)
+    usual = [float(np.median(steps)) for steps in (before, after)]
+    # A held sphere does not move beyond the scatter of its own steps, and its force relaxes over no travel
+    moves = all(abs(step) > np.median(np.abs(steps - step)) for step, steps in zip(usual, (before, after), strict=True))
+    if not moves or usual[0] * usual[1] > 0:
+        return float(travel[sample] - travel[sample - 1]) - usual[1]
     at, load = (np.array([column[part].mean() for part in parts]) for column in (travel, force))
     away, rest = (
         np.concatenate([column[part] - mean for part, mean in zip(parts, means, strict=True)])
         for column, means in ((travel, at), (force, load))
     )
-    rests = any(all(np.ptp(column[part]) == 0 for part in parts) for column in (travel, force))
-    slope = 0.0 if rests else float(away @ rest) / float(away @ away)
+    slope = float(away @ rest) / float(away @ away)
     return float(at[1] - at[0] - ((load[1] - load[0]) / slope if slope else 0.0))
