@@ -52,19 +52,27 @@ def log_frf_bands(campaign: Campaign) -> LogFrfBands:
     off_mains = np.abs(np.subtract.outer(rows.frequency, np.outer(MAINS_HZ, (1, 3)).ravel())).min(axis=1)
     usable = (off_mains >= _NEAR_MAINS_HZ) & (np.abs(rows.value) > 0)
     value, weight = np.zeros((len(rows.spans), _BANDS), dtype=complex), np.zeros((len(rows.spans), _BANDS))
+    relative = rows.deviation / np.where(usable, np.abs(rows.value), np.inf)
+    # The median over lines, times that over recordings in each band: a resonance between few lines looks like noise
+    noises = np.array(
+        [np.median(relative[span][usable[span]]) if usable[span].any() else np.inf for span in rows.spans]
+    )
+    over_own = relative / noises[rows.recording]
+    uneven = [
+        np.median(over_own[usable & (band == number)]) if (usable & (band == number)).any() else 1.0
+        for number in range(_BANDS)
+    ]
     for index, span in enumerate(rows.spans):
         of_recording = np.arange(span.start, span.stop)[usable[span]]
-        if len(of_recording) < LEAST_LINES:
-            continue
-        # The median over the lines: a resonance between a few of them looks like noise
-        noise = float(np.median(rows.deviation[of_recording] / np.abs(rows.value[of_recording])))
-        if noise > _WIDEST:
+        noise = float(noises[index])
+        if len(of_recording) < LEAST_LINES or noise > _WIDEST:
             continue
         phase = np.unwrap(np.angle(rows.value[of_recording]))  # near 0 at the lowest lines, but for the polarity
         phase -= np.pi * np.round(np.median(phase[: max(3, len(phase) // 8)]) / np.pi)
         logarithm = np.log(np.abs(rows.value[of_recording])) + 1j * phase
-        np.add.at(value[index], band[of_recording], logarithm / noise**2)
-        np.add.at(weight[index], band[of_recording], noise**-2)
+        of_line = (noise * np.array(uneven)[band[of_recording]]) ** -2.0
+        np.add.at(value[index], band[of_recording], logarithm * of_line)
+        np.add.at(weight[index], band[of_recording], of_line)
         value[index, weight[index] > 0] /= weight[index, weight[index] > 0]
         value[index] -= value[index, weight[index] > 0].real.mean()
         steps = np.flatnonzero(np.abs(np.diff(phase)) > np.pi - _UNSURE * noise)
