@@ -79,7 +79,7 @@ def test_table_shows_array_sensors_band_left(palm: Campaign, file: Path) -> None
         value, low, high = (float(to_lab("d33_pc_per_n", getattr(d33, name))) for name in ("value", "low", "high"))
         assert re.search(rf"{title} +{value:.4g} ± \S+ pC/N \(95 %: {low:.4g} to {high:.4g}\)", shown)
     assert re.search(r"band +5 to 130 Hz: no resonance in any recording; it is the whole recorded range", shown)
-    assert re.search(r"s5 .* weak: 2\d % of the array's d33", shown)
+    assert re.search(r"s5 .* weak: 2\d % of the array's median", shown)
     assert "left out: sensor s5: weak" in shown
     assert "look at" not in shown
 

@@ -12,7 +12,7 @@ from bench.soak import SOAK
 from tests.mechanisms.contact_elements import Body, force_of_elements
 from tests.recordings.test_sphere_modulus import bonded_layer, whole_sphere
 from tests.support.lean_reports import COSTLY
-from tests.support.sphere_curves import campaign, pressed, ways
+from tests.support.sphere_curves import RADIUS_MM, campaign, pressed, ways
 from underskin.diagnosis.data.dataset import curve_lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.recordings.campaign import IndentationRecording, from_dict
@@ -171,6 +171,15 @@ def test_a_wrong_thickness_is_a_rival_of_stiffening(true_mm: float, declared_mm:
     assert low < true_mm < high < 1.7 * low
     assert f"a layer of the declared {declared_mm:g} mm" in report.statement
     assert any(finding.code == "thickness_differs" for finding in report.findings)
+
+
+def test_a_curve_from_its_deepest_sample_on_has_its_zero_in_the_air() -> None:
+    """Held, drawn back into the air and pressed again, no deeper: the force of the first sample is no zero."""
+    depth = np.concatenate([np.full(60, 0.3), ways(0.3, -0.05, 0.2995, samples=300)])
+    report = diagnosed(campaign(depth, pressed(depth, unit_hertz)))
+    assert report.verdict == "no_mismatch", report.statement
+    modulus = report.fit.after.youngs_modulus
+    assert modulus.low < RADIUS_MM**-0.5 < modulus.high
 
 
 def unit_hertz(depth: Floats) -> Floats:

@@ -80,7 +80,7 @@ def test_quiet_report_says_shown(table: SigmaTable) -> None:
     }
     assert small & hidden
     said = report["statement"].rpartition(". ")[2]
-    assert said.startswith(f"Of the {known} known mechanisms these {len(small - hidden)} would each have shown")
+    assert said.startswith(f"Of the {known} known mechanisms {len(small - hidden)} would have shown")
     named = set(said.rstrip(".").partition(": ")[2].split(", "))
     assert named == {name.replace("_", " ") for name in small - hidden}
     assert 0 < len(named) < known

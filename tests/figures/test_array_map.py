@@ -79,7 +79,7 @@ def test_discs_never_overlap_and_carry_their_ids(pitch: float) -> None:
 
 def test_stands_out_chosen_rings_every_value() -> None:
     """Marked and chosen sensors have rings and every value its interval."""
-    reasons = ["", "", "weak: 21 % of the array's d33"]
+    reasons = ["", "", "weak: 21 % of the array's median"]
     figure = array_map(SENSORS[:3], X[:3], Y[:3], [14.0, 14.1, 3.0], [0.1] * 3, reasons, chosen="s01")
     widths = [shape.line.width for shape in figure.layout.shapes]
     assert widths[0] < min(widths[1:])

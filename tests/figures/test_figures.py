@@ -18,7 +18,7 @@ SDS_OF_95 = 1.959963984540054  # half the width of a 95 % interval of a normal d
 
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])
-REASONS = ("", "", "weak: 21 % of the array's d33")
+REASONS = ("", "", "weak: 21 % of the array's median")
 
 
 def test_frf_against_preload_points_line() -> None:

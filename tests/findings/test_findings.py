@@ -60,7 +60,7 @@ def test_the_page_explains_each_code_once() -> None:
 
 
 def test_no_percent_is_less_than_nothing() -> None:
-    assert "(0 % of the array's d33)" in statement(Reason.DEAD, {"percent": -1e-3})
+    assert "(0 % of the array's median)" in statement(Reason.DEAD, {"percent": -1e-3})
 
 
 def test_code_reason_reason_words() -> None:

@@ -402,7 +402,7 @@ def _impossible_declaration(fields: Sequence[str], confirmable: bool) -> str:
 
 
 _IMPOSSIBLE = "{largest:.3g} is no number that can be meant ({low:g} to {high:g} in magnitude)"
-_OF_ARRAY = "{percent:z.0f} % of the array's d33"
+_OF_ARRAY = "{percent:z.0f} % of the array's median"
 _CHANGES = (
     ", at all frequencies and far beyond noise: another range of the amplifier, a loose plug or a cable? The FRF "
     "averages over it: its d33 is not to be quoted{more:more recording}"

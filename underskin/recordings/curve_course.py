@@ -126,7 +126,9 @@ class CurveLandmarks:
     detaches: int | None
     pull_off: int | None
     air: Indices
-    zero: float  # force in air (less the drift where the air is after contact), or of the first sample
+    zero: (
+        float  # force in air (less the drift where the air is after contact), or of the first or the least deep sample
+    )
     drift: float  # of the force in air per time, where significant; else 0
 
     @property
@@ -290,7 +292,8 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
     else:
         air = _air(force, turn, snap_in, pull_off, noise, span)
     measured = level if drifting_after is not None else force
-    zero = float(np.median(measured[air])) if len(air) >= _AIR else float(force[0])
+    shallowest = 0 if turn >= _AIR else int(displacement.argmin())  # recorded from the deepest sample on
+    zero = float(np.median(measured[air])) if len(air) >= _AIR else float(force[shallowest])
     return CurveLandmarks(noise, turn, arrive, leave, snap_in, detaches, pull_off, air, zero, drift)
 
 

@@ -46,7 +46,7 @@ def test_overviews_name_what_is_wrong(visitor: Visit, ids: list[str], width: int
         lines[path] = page.locator(".attention").inner_text()
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert "1 recording refused" in lines[path]
-        assert re.search(r"s1 weak: 8\d % of the array's d33", lines[path])
+        assert re.search(r"s1 weak: 8\d % of the array's median", lines[path])
         visitor.require_accessible()
     assert "s2 dead" in lines["/"]
     assert "s2 dead" in lines[f"/campaigns/{ids[1]}"]

@@ -293,8 +293,9 @@ def _power_clause(power: Sequence[Power], kind: Kind) -> str:
     shown = [limit.mechanism for limit in power if limit.smallest_visible_percent <= _SMALL]
     if not shown:
         return f"none of the {all_of_them} known mechanisms would have shown with {_SMALL:g} % of the response"
-    which = f"these {len(shown)} would each have shown with {_SMALL:g} % of the response"
-    return f"of the {all_of_them} known mechanisms {which}: {', '.join(in_words([name]) for name in shown)}"
+    names = ", ".join(in_words([name]) for name in shown)
+    which = f"{len(shown)} would have shown with {_SMALL:g} % of the response"
+    return f"of the {all_of_them} known mechanisms {which}: {names}"
 
 
 SLIPS = (
