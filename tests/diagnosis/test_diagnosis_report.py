@@ -114,7 +114,7 @@ def test_command_writes_report_readable_file(tmp_path: Path, table: SigmaTable) 
     assert "torn.json" in result.stderr
     report = json.loads((tmp_path / "reports" / "palm.json").read_text(encoding="utf-8"))
     assert report["schema"] == "report/1"
-    assert f"{good}: {report['verdict']}: {report['headline']}\n{report['statement']}\n" in result.stderr
+    assert f"{good}: {report['headline'].rstrip('.')} ({report['verdict']}).\n{report['statement']}\n" in result.stderr
     assert [file.name for file in (tmp_path / "reports").iterdir()] == ["palm.json"]
 
 

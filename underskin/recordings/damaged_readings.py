@@ -91,7 +91,8 @@ def force_step(travel: Floats, force: Floats) -> int | None:
     """The first sample before which the force of a pressed sphere leaps to another course while the travel goes on
     evenly, or None: the sample tears or slips, or the range of the cell is switched.
 
-    The change of the force there stands off those around it, as no law, hold or turn makes it. Snap-in and pull-off
+    The change of the force there stands off those around it, as no law makes it. At a hold or a turn friction may
+    reverse: there none is looked for. Snap-in and pull-off
     are leaps to or from the air, or of a force that pulls.
     """
     changed, moved = np.diff(force, prepend=force[0]), np.abs(np.diff(travel, prepend=travel[0]))
@@ -110,7 +111,8 @@ def force_step(travel: Floats, force: Floats) -> int | None:
         around, steps = (np.delete(column[first:end], _AROUND) for column in (changed, moved))
         usual = float(np.median(around))
         leaps = abs(changed[sample] - usual) > _SUDDEN * max(float(np.abs(around - usual).max()), noise)
-        if leaps and moved[sample] <= 2 * np.median(steps):
+        before, after = (np.median(np.diff(travel[part])) for part in (slice(first, sample), slice(sample, end)))
+        if leaps and before * after > 0 and moved[sample] <= 2 * np.median(steps):
             return sample
     return None
 

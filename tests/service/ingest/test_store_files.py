@@ -160,7 +160,7 @@ def test_many_errors_first_told_counted(server: Server) -> None:
     result = answer.json()
     assert [entry["status"] for entry in result["recordings"]] == ["ok"] + ["refused"] * 150
     assert sum(len(entry["errors"]) for entry in result["recordings"]) == 100
-    assert result["notes"] == ["150 recordings have 150 errors; the first 100 are told"]
+    assert result["notes"] == ["150 recordings have 150 errors; the first 100 are listed"]
     none = server.http.post("/v1/campaigns", json={**document, "recordings": bad})
     assert (none.status_code, len(none.json()["errors"])) == (422, 100)
     alike = "recordings bad 0, bad 1, bad 2 and 97 more: preload_n = -1.0: must be finite and greater than 0 (N)"

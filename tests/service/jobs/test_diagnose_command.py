@@ -19,7 +19,7 @@ def test_reports_kept_campaigns_service(working: Server, tmp_path: Path) -> None
     given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(working.http.base_url), *few]
     result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(reports), "--html"])
     assert result.exit_code == 2
-    assert f"{kept}: explained" in result.stderr
+    assert f"{kept}: Contact resonance" in result.stderr
     assert "nowhere: 404" in result.stderr
     assert json.loads((reports / f"{kept}.json").read_text(encoding="utf-8")) == small_report()
     assert "contact resonance" in (reports / f"{kept}.html").read_text(encoding="utf-8")

@@ -44,7 +44,7 @@ def test_magnitude_and_phase_are_the_real_part(http: httpx.Client, phase: str) -
     assert polar.json()["d33_pc_per_n"] == pytest.approx(real.json()["d33_pc_per_n"], rel=1e-12)
     alone = sent(http, "/v1/d33", {**SKIN, "preload_n": 1, "frf_magnitude_pc_per_n": 14})
     assert alone.status_code == 400
-    assert "needs frf_phase_deg or frf_phase_rad beside it" in alone.json()["detail"]
+    assert "needs frf_phase_deg or frf_phase_rad with it" in alone.json()["detail"]
     assert [one["field"] for one in errors(sent(http, "/v1/frf", {**SKIN, "preload_n": 1, phase: 60}))] == [
         "d33_pc_per_n",
         phase,

@@ -26,7 +26,8 @@ Document = Mapping[str, Any]
 
 def headline(report: Document) -> str:
     """One sentence of at most 20 words on a report of one campaign."""
-    return readable(within_words(_parts(report))).replace("_", " ")  # a lab's names of conditions
+    parts = (part.replace("_", " ") for part in _parts(report))  # a lab's names of conditions
+    return readable(within_words(parts))
 
 
 def first_and_rest(report: Document) -> tuple[str, str]:
