@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from underskin.errors import UNITS_CHECKED, ErrorCode, InvalidInput, Requirement
 from underskin.findings.codes import Reason
-from underskin.findings.finding import Finding, UnitGuess
+from underskin.findings.finding import Finding
+from underskin.findings.sentences import UnitGuess
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

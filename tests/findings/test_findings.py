@@ -14,17 +14,8 @@ from tests.support.repository import ROOT
 from underskin.array_stress.request import read_request
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_one_of, required, unequal_lengths, wrong_type
 from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
-from underskin.findings.finding import (
-    ENGLISH,
-    LACKING,
-    OPTIONAL,
-    Finding,
-    ImplausibleD33,
-    UnitGuess,
-    Words,
-    lacking,
-    statement,
-)
+from underskin.findings.finding import ENGLISH, LACKING, OPTIONAL, Finding, Words, lacking, statement
+from underskin.findings.sentences import ImplausibleD33, UnitGuess
 from underskin.recordings.campaign import from_dict, parse
 from underskin.units import checked
 

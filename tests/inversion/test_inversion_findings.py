@@ -12,7 +12,8 @@ from tests.support.simulated_campaign import Rig, simulate
 from underskin.diagnosis.slips.inspection import inspect
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode, Reason
-from underskin.findings.finding import Finding, ImplausibleD33
+from underskin.findings.finding import Finding
+from underskin.findings.sentences import ImplausibleD33
 from underskin.inversion.invert import Inversion, invert
 from underskin.prediction.pressed_skin import response_shares
 from underskin.recordings.campaign import Campaign, FrfRecording

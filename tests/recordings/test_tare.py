@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from underskin.recordings.rig_mapping import rise_of
+from underskin.recordings.tare import rise_of
 
 _NOISE = 0.01
 

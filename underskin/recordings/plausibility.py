@@ -17,7 +17,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from underskin.findings.codes import Reason
-from underskin.findings.finding import Finding, ImplausibleD33
+from underskin.findings.finding import Finding
+from underskin.findings.sentences import ImplausibleD33
 from underskin.physics import hertz
 from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import curve_course

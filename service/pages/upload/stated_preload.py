@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from underskin.findings.finding import more_alike
+from underskin.findings.sentences import more_alike
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.spectra import mean_of
 from underskin.units import readable_unit

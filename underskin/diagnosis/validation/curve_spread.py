@@ -42,8 +42,10 @@ def curve_spread_findings(problem: FittingProblem, stated: Explanation) -> list[
     along, square, across, of_slope = (
         np.add.reduceat(product, lines.first) for product in (model * measured, model**2, model * slope, slope**2)
     )
+    if not ((along > 0) & (of_slope > 0)).all():  # a model of no force tells nothing of its factor
+        return []
     known = square - across**2 / of_slope
-    if not (along > 0).all() or not (known > 0).all():
+    if not (known > 0).all():
         return []
     moduli = _Moduli(np.log(along / square), GAIN_RANGE[1] ** 2 + 1 / known)
     if moduli.agree():

@@ -41,7 +41,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from underskin.findings.codes import Reason
-from underskin.findings.finding import DefectKind, Finding
+from underskin.findings.finding import Finding
+from underskin.findings.sentences import DefectKind
 from underskin.recordings.frf.spectra import AROUND, Defect, Frf, Stack, expected_coherence, information, stacked
 from underskin.units import Floats, Indices, Mask
 

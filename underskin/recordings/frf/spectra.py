@@ -21,7 +21,8 @@ from scipy.special import stdtr
 
 from underskin.errors import InvalidInput, unusable
 from underskin.findings.codes import Reason
-from underskin.findings.finding import DefectKind, Finding
+from underskin.findings.finding import Finding
+from underskin.findings.sentences import DefectKind
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.recordings.frf.gain_change import GainChange, gain_change
 from underskin.units import Complexes, Floats, Indices, Mask
