@@ -7,19 +7,16 @@ by a law.
 """
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from itertools import product
 from math import comb, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.comparison import times
-from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, Alternative, Levels, Undone
+from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, Alternative, Undone
 from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import FrfRecording
-from underskin.units import Floats, Mask
+from underskin.units import Floats, Indices, Mask
 
 _FACTORS = {2.0: "peak-to-peak", 0.5: "peak-to-peak", 2.0**0.5: "rms", 0.5**0.5: "rms"}
 _LOG_PRIOR = -log(75)  # over that of a warm-up: settings seldom change in a campaign, and there are four factors
@@ -48,8 +45,7 @@ def amplitude_factors(screened: Screened) -> Iterator[Alternative]:
         log_prior = _LOG_PRIOR - choices
         if factor == 0.5 and near < _APART:
             log_prior -= _SKEWED
-        undo = partial(_without_factor, levels=levels, factor=factor, off=off)
-        yield Alternative(log_prior, offset=offset, undo=undo)
+        yield Alternative(log_prior, offset=offset, undo=_without_factor(screened, levels.index, factor, off))
         yield Alternative(log_prior - SELDOM, column=CHANGE * off.astype(float))
         yield Alternative(-log(steps), column=CHANGE * step.astype(float))
 
@@ -64,20 +60,19 @@ def _most_similar_step(axes: Sequence[Floats], off: Mask) -> tuple[Mask, int]:
     return sets[int(np.argmin(np.minimum(mismatches, len(off) - mismatches)))], len(sets)
 
 
-def _without_factor(recordings: list[FrfRecording], _: float, *, levels: Levels, factor: float, off: Mask) -> Undone:
-    """The recordings corrected for the factor, without those that have no level."""
-    wrong = levels.index[off].tolist()
+def _without_factor(screened: Screened, index: Indices, factor: float, off: Mask) -> Undone:
+    """The recordings corrected for the factor, without those that have no level and are not in `index`."""
+    count = len(screened.recordings)
     arguments = {
         "factor": factor,
         "meant": _FACTORS[factor],
-        "of": [recordings[index].id for index in wrong],
-        "recordings": len(recordings),
-        "left_out": len(recordings) - len(levels.index),
+        "of": [screened.recordings[wrong].id for wrong in index[off].tolist()],
+        "recordings": count,
+        "left_out": count - len(index),
     }
-    right = [
-        times(recordings[index], 1 / factor) if index in wrong else recordings[index] for index in levels.index.tolist()
-    ]
-    return right, [Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)]
+    correction = np.full(count, np.nan)
+    correction[index] = np.where(off, 1 / factor, 1.0)
+    return screened.scaled(correction, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments))
 
 
 def _chosen(value: Floats, precision: Floats, size: float) -> Mask:

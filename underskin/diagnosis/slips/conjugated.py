@@ -21,7 +21,7 @@ from math import comb, log
 import numpy as np
 
 from underskin.diagnosis.slips.comparison import LEAST_RECORDINGS, times
-from underskin.diagnosis.slips.levels import Alternative, Undone
+from underskin.diagnosis.slips.levels import Alternative
 from underskin.diagnosis.slips.log_frf import (
     CHANNEL_DEVIATION,
     Elements,
@@ -37,7 +37,6 @@ from underskin.diagnosis.slips.table import GAIN, Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats
 
 _LOG_PRIOR = -log(45)  # about one campaign in fifty has conjugated recordings
@@ -70,15 +69,11 @@ def conjugated(screened: Screened, imported: Collection[str]) -> Iterator[Altern
     elif ids:
         arguments = {"conjugated": ids, "recordings": len(recordings)}
         findings.append(Finding(Reason.RECORDINGS_CONJUGATED, ids[0] if len(ids) == 1 else "", _FIELD, arguments))
+    right = screened.recordings
+    if ids:
+        right = [times(recording, 1.0, -1.0 if recording.id in ids else 1.0) for recording in right]
     if findings:
-        yield Alternative(_LOG_PRIOR - choices, nats + chi2 / 2, undo=partial(_turned, ids=ids, findings=findings))
-
-
-def _turned(recordings: list[FrfRecording], _: float, *, ids: Collection[str], findings: list[Finding]) -> Undone:
-    """The recordings with those of these ids conjugated."""
-    if not ids:
-        return recordings, findings
-    return [times(recording, 1.0, -1.0 if recording.id in ids else 1.0) for recording in recordings], findings
+        yield Alternative(_LOG_PRIOR - choices, nats + chi2 / 2, undo=(right, findings))
 
 
 _LARGEST = 0.7  # rad: limit that reduces the weight of sharp resonances, whose frequency differs between recordings

@@ -6,19 +6,16 @@ down. Of all pairs and first recordings that with the largest gain of ln evidenc
 a step of any size in one of the two sensors.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterator
 from itertools import combinations
 from math import log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, SPREADS, Alternative, Undone
+from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, SPREADS, Alternative
 from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import FrfRecording
 from underskin.units import Indices
 
 
@@ -43,29 +40,12 @@ def exchanged_cables(screened: Screened) -> Iterator[Alternative]:
     sensor = levels.sensor.copy()
     sensor[since] = sum(pair) - sensor[since]
     late = levels.index[since[np.argsort(levels.order[since])]].tolist()
-    undo = partial(_with_right_sensors, names=[screened.campaign.skin.sensors[index].id for index in pair], late=late)
-    yield Alternative(-SELDOM - log(len(tried)), sensor=sensor, undo=partial(undo, positions=screened.positions))
+    first, second = (screened.campaign.skin.sensors[index].id for index in pair)
+    arguments = {"first": first, "second": second, "since": screened.recordings[late[0]].id, "recordings": len(late)}
+    finding = Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
+    right = {index: second if screened.recordings[index].sensor == first else first for index in late}
+    undone = screened.relabelled(right, finding, moved=True)
+    yield Alternative(-SELDOM - log(len(tried)), sensor=sensor, undo=undone)
     for of_sensor in pair:
         step = (np.isin(np.arange(len(sensor)), since) & (levels.sensor == of_sensor)).astype(float)
         yield Alternative(-log(len(sensor)), column=CHANGE * step)
-
-
-def _with_right_sensors(
-    recordings: list[FrfRecording],
-    _: float,
-    *,
-    names: list[str],
-    late: list[int],
-    positions: Mapping[str, tuple[float, float]],
-) -> Undone:
-    """The recordings with their true sensors, `late` in the order of time; contacts move with the sensors."""
-    right = list(recordings)
-    for index in late:
-        here, position_mm = recordings[index].sensor, recordings[index].position_mm
-        there = names[1 - names.index(here)]
-        if position_mm is not None:
-            x, y = (at + new - old for at, new, old in zip(position_mm, positions[there], positions[here], strict=True))
-            position_mm = x, y
-        right[index] = replace(recordings[index], sensor=there, position_mm=position_mm)
-    arguments = {"first": names[0], "second": names[1], "since": recordings[late[0]].id, "recordings": len(late)}
-    return right, [Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)]

@@ -17,7 +17,7 @@ the other stays as wrong as before; the gain of each sensor shows this.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import dist, log
 
@@ -25,8 +25,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.slips.comparison import aligned_lines, flat_level, no_response
-from underskin.diagnosis.slips.levels import LEAST_LEVELS, POSITION_MM, Alternative, Undone
-from underskin.diagnosis.slips.table import ASTRAY, GAIN, Screened, leave_out
+from underskin.diagnosis.slips.levels import LEAST_LEVELS, POSITION_MM, Alternative
+from underskin.diagnosis.slips.table import ASTRAY, GAIN, Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
@@ -97,16 +97,16 @@ def exchanged_labels(screened: Screened) -> Iterator[Alternative]:
         and not mute & set(exchange.true_sensor)
     ]
     for exchange in exchanges:
-        yield Alternative(
-            0.0, exchange.gain, undo=partial(_relabelled, exchange=exchange, positions=screened.positions)
-        )
+        right = {index: exchange.true_sensor[labels[index]] for index in exchange.since}
+        undone = screened.relabelled(right, _finding(exchange, recordings), moved=False)
+        yield Alternative(0.0, exchange.gain, undo=undone)
     settled = mute.union(*(exchange.true_sensor for exchange in exchanges))
     alone = [move for move in moves if not settled & set(move.true_sensor)]
     if alone:
         off = np.isin(np.arange(len(recordings)), [index for move in alone for index in move.since])
         arguments = {"sensors": sorted({labels[index] for index in np.flatnonzero(off)}), "recordings": int(off.sum())}
         finding = Finding(Reason.LABELS_CONTRADICT_PLACES, "", "sensor", arguments)
-        yield Alternative(0.0, alone[0].gain, undo=leave_out(off, [finding]))
+        yield Alternative(0.0, alone[0].gain, undo=screened.without(off, finding))
 
 
 def _weighed(
@@ -179,23 +179,14 @@ def _usual(level: Floats, shape: Floats) -> float | None:
     return float(np.median(ratio[ratio > _SMALL * np.quantile(ratio, 0.9)]))
 
 
-def _relabelled(
-    recordings: list[FrfRecording], _: float, *, exchange: _Exchange, positions: Mapping[str, tuple[float, float]]
-) -> Undone:
-    """The recordings with their true sensors, the contacts unchanged."""
-    right = list(recordings)
-    for index in exchange.since:
-        label, contact = recordings[index].sensor, recordings[index].position_mm
-        right[index] = replace(
-            recordings[index], sensor=exchange.true_sensor[label], position_mm=contact or positions[label]
-        )
+def _finding(exchange: _Exchange, recordings: Sequence[FrfRecording]) -> Finding:
     names = sorted(exchange.true_sensor)
     since = recordings[exchange.since[0]].id if exchange.before else None
     arguments: dict[str, object] = {"since": since, "recordings": len(exchange.since)}
     if len(names) > 2:
         arguments |= {"sensors": names, "places": [exchange.true_sensor[name] for name in names]}
-        return right, [Finding(Reason.LABELS_PERMUTED, "", "sensor", arguments)]
+        return Finding(Reason.LABELS_PERMUTED, "", "sensor", arguments)
     pair = dict(zip(("first", "second"), names, strict=True))
     if since is None:
-        return right, [Finding(Reason.LABELS_EXCHANGED, "", "sensor", pair)]
-    return right, [Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**pair, **arguments})]
+        return Finding(Reason.LABELS_EXCHANGED, "", "sensor", pair)
+    return Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**pair, **arguments})

@@ -144,8 +144,8 @@ class Alternative:
 
     `gain` is its ln evidence over no slip, apart from what it does to the levels: `offset` (recordings,) is a known
     change of y; `column` (recordings,) one of unknown amplitude, times its prior standard deviation; `sensor`
-    (recordings,) are the true sensors. `undo` gives the recordings without the slip and the findings, from the
-    recordings and the amplitude in prior standard deviations, or None where it is none of a slip; without it the
+    (recordings,) are the true sensors. `undo` is the recordings without the slip and the findings, or a function that
+    gives them from the amplitude in prior standard deviations, None where it is none of a slip; without `undo` the
     alternative is no slip.
     """
 
@@ -154,7 +154,7 @@ class Alternative:
     offset: Floats | None = None
     column: Floats | None = None
     sensor: Indices | None = None
-    undo: Callable[[list[FrfRecording], float], Undone | None] | None = None
+    undo: Undone | Callable[[float], Undone | None] | None = None
 
     @property
     def changes_levels(self) -> bool:

@@ -6,17 +6,14 @@ reversed; otherwise a single one at most.
 """
 
 from collections.abc import Iterator
-from functools import partial
 from math import log
 
 import numpy as np
 
-from underskin.diagnosis.slips.comparison import times
-from underskin.diagnosis.slips.levels import Alternative, Undone
+from underskin.diagnosis.slips.levels import Alternative
 from underskin.diagnosis.slips.table import ASTRAY, Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats, Mask
 
 _ALIKE, _MOSTLY = 2.0, 0.8  # levels of one rig and layer differ by less, but for a few far from any sensor
@@ -49,16 +46,8 @@ def reversed_signs(screened: Screened) -> Iterator[Alternative]:
             known = sign != 0
     reverses = int((sign[factor < 0] < 0).sum()) - int((sign[factor < 0] > 0).sum())
     if findings:
-        undo = partial(_right, factor=factor, known=known, findings=findings)
-        yield Alternative(-log(len(recordings)), -reverses * log(ASTRAY), undo=undo)
-
-
-def _right(recordings: list[FrfRecording], _: float, *, factor: Floats, known: Mask, findings: list[Finding]) -> Undone:
-    """The recordings with their true signs, of which the sign is known."""
-    signed = zip(recordings, factor, known, strict=True)
-    return [
-        times(recording, -1.0) if sign < 0 else recording for recording, sign, is_known in signed if is_known
-    ], findings
+        undone = screened.scaled(np.where(known, factor, np.nan), *findings)
+        yield Alternative(-log(len(recordings)), -reverses * log(ASTRAY), undo=undone)
 
 
 def _reversed_sensors(labels: np.ndarray, sign: Floats) -> list[str]:

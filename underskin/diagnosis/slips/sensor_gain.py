@@ -12,13 +12,11 @@ from math import exp, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.comparison import times
 from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, LEAST_LEVELS, Alternative, Undone
 from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.inversion.sensor_groups import TwoGroups, two_groups
-from underskin.recordings.campaign import FrfRecording
+from underskin.inversion.sensor_groups import two_groups
 
 _WEAK, _WEAK_SPREAD = -2.0, 0.7  # prior of ln gain of a weak sensor: a third to a thirtieth
 
@@ -32,11 +30,11 @@ def sensor_gains(screened: Screened) -> Iterator[Alternative]:
         of_sensor = (levels.sensor == sensor).astype(float)
         name = screened.recordings[int(levels.index[levels.sensor == sensor][0])].sensor
         offset, column = _WEAK * of_sensor, _WEAK_SPREAD * of_sensor
-        undo = partial(_without_sensor, name=name)
+        undo = partial(_without_sensor, screened=screened, name=name)
         yield Alternative(-log(len(sensors)), offset=offset, column=column, undo=undo)
         if len(sensors) >= LEAST_LEVELS:
-            column = CHANGE * of_sensor
-            yield Alternative(-2 * log(len(sensors)), column=column, undo=partial(_without_gain, name=name))
+            undo = partial(_without_gain, screened=screened, name=name)
+            yield Alternative(-2 * log(len(sensors)), column=CHANGE * of_sensor, undo=undo)
 
 
 def groups_of(screened: Screened) -> Iterator[Alternative]:
@@ -47,36 +45,31 @@ def groups_of(screened: Screened) -> Iterator[Alternative]:
     sensors, of_recording = np.unique(levels.sensor, return_inverse=True)
     medians = [float(np.median(levels.value[of_recording == index])) for index in range(len(sensors))]
     groups = two_groups(np.exp(medians), np.zeros(len(sensors)))
-    if groups is not None:
+    if groups is not None:  # those of the smaller group are taken to the level of the larger, the lower of equal ones
         numbers = [int(levels.index[of_recording == index][0]) for index in range(len(sensors))]
         names = [screened.recordings[number].sensor for number in numbers]
         offset = np.where(np.isin(of_recording, groups.higher), log(groups.factor), 0.0)
-        yield Alternative(-log(len(sensors)), offset=offset, undo=partial(_without_groups, groups=groups, names=names))
+        lower, higher = ([names[index] for index in part] for part in (groups.lower, groups.higher))
+        changed, factor = (lower, groups.factor) if len(lower) < len(higher) else (higher, 1 / groups.factor)
+        is_changed = np.isin([recording.sensor for recording in screened.recordings], changed)
+        arguments = {"lower": lower, "higher": higher, "factor": groups.factor}
+        finding = Finding(Reason.TWO_GROUPS, "", "charge_pc", arguments)
+        undone = screened.scaled(np.where(is_changed, factor, 1.0), finding)
+        yield Alternative(-log(len(sensors)), offset=offset, undo=undone)
 
 
-def _without_groups(recordings: list[FrfRecording], _: float, *, groups: TwoGroups, names: list[str]) -> Undone:
-    """The recordings of the smaller group at the level of the larger one, the lower of equal ones."""
-    lower, higher = ([names[index] for index in part] for part in (groups.lower, groups.higher))
-    changed, factor = (lower, groups.factor) if len(lower) < len(higher) else (higher, 1 / groups.factor)
-    scaled = [times(item, factor) if item.sensor in changed else item for item in recordings]
-    arguments = {"lower": lower, "higher": higher, "factor": groups.factor}
-    return scaled, [Finding(Reason.TWO_GROUPS, "", "charge_pc", arguments)]
-
-
-def _without_sensor(recordings: list[FrfRecording], amplitude: float, *, name: str) -> Undone:
+def _without_sensor(amplitude: float, *, screened: Screened, name: str) -> Undone:
     """The recordings of the other sensors."""
-    others = [recording for recording in recordings if recording.sensor != name]
-    share = exp(_WEAK + _WEAK_SPREAD * amplitude)
-    arguments = {"sensor": name, "share": share, "recordings": len(recordings) - len(others)}
-    return others, [Finding(Reason.WEAK_SENSOR, "", "frf_re_pc_per_n", arguments)]
+    off = screened.of_sensor(name)
+    arguments = {"sensor": name, "share": exp(_WEAK + _WEAK_SPREAD * amplitude), "recordings": int(off.sum())}
+    return screened.without(off, Finding(Reason.WEAK_SENSOR, "", "frf_re_pc_per_n", arguments))
 
 
-def _without_gain(recordings: list[FrfRecording], amplitude: float, *, name: str) -> Undone | None:
+def _without_gain(amplitude: float, *, screened: Screened, name: str) -> Undone | None:
     """The recordings with the sensor's gain removed."""
-    gain = CHANGE * amplitude
+    gain, of_sensor = CHANGE * amplitude, screened.of_sensor(name)
     if abs(gain) < LEAST_CHANGE:
         return None
-    scaled = [times(recording, exp(-gain)) if recording.sensor == name else recording for recording in recordings]
-    count = sum(recording.sensor == name for recording in recordings)
+    arguments = {"sensor": name, "share": exp(gain), "recordings": int(of_sensor.sum())}
     reason = Reason.SENSOR_WEAKER if gain < 0 else Reason.SENSOR_STRONGER
-    return scaled, [Finding(reason, "", "frf_re_pc_per_n", {"sensor": name, "share": exp(gain), "recordings": count})]
+    return screened.scaled(np.where(of_sensor, exp(-gain), 1.0), Finding(reason, "", "frf_re_pc_per_n", arguments))

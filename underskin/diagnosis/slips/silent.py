@@ -16,7 +16,7 @@ from math import log
 import numpy as np
 
 from underskin.diagnosis.slips.levels import Alternative
-from underskin.diagnosis.slips.table import GAIN, Screened, leave_out
+from underskin.diagnosis.slips.table import GAIN, Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.forms import recording_order
@@ -41,11 +41,11 @@ def silent(screened: Screened) -> Iterator[Alternative]:
         arguments = {"first": first, "second": second, "since": recordings[since[0]].id, "recordings": len(since)}
         finding = Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)
         off = np.isin(np.arange(len(recordings)), since)
-        yield Alternative(-log(len(recordings)), float(missing_nats[off].sum()), undo=leave_out(off, [finding]))
+        yield Alternative(-log(len(recordings)), float(missing_nats[off].sum()), undo=screened.without(off, finding))
     off, findings = _missing(screened, missing_nats > GAIN + log(len(recordings)))
     if findings:
         choices = len(findings) * log(len(recordings))
-        yield Alternative(-choices, float(missing_nats[off].sum()), undo=leave_out(off, findings))
+        yield Alternative(-choices, float(missing_nats[off].sum()), undo=screened.without(off, *findings))
 
 
 def _missing(screened: Screened, expected: Mask) -> tuple[Mask, list[Finding]]:

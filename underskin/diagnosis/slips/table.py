@@ -6,14 +6,14 @@ is undone where the sum exceeds ln 25 and it is a slip, not what resembles one; 
 at again.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import log
+from math import isnan, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.comparison import Comparison, compared
+from underskin.diagnosis.slips.comparison import Comparison, compared, times
 from underskin.diagnosis.slips.levels import (
     LEAST_LEVELS,
     NO_SLIP,
@@ -29,7 +29,7 @@ from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Mask
+from underskin.units import Floats, Mask
 
 GAIN = log(25)  # ln odds that a slip must have against none
 ASTRAY = 1e-5  # share of recordings that nothing listed explains, which bounds the cost of a wrong label or sign
@@ -70,17 +70,35 @@ class Screened:
         assert self.levels is not None
         return causes_of(self.campaign, self.recordings, self.levels, self.table)
 
+    def of_sensor(self, name: str) -> Mask:
+        """Which recordings are of a sensor."""
+        return np.array([recording.sensor == name for recording in self.recordings])
+
+    def scaled(self, factor: Floats, *findings: Finding) -> Undone:
+        """The recordings with their FRFs times a factor (recordings,), without those where it is NaN."""
+        factors = zip(self.recordings, factor.tolist(), strict=True)
+        return [item if size == 1 else times(item, size) for item, size in factors if not isnan(size)], list(findings)
+
+    def without(self, off: Mask, *findings: Finding) -> Undone:
+        """The recordings without those that are `off` (recordings,)."""
+        return self.scaled(np.where(off, np.nan, 1.0), *findings)
+
+    def relabelled(self, sensors: Mapping[int, str], finding: Finding, *, moved: bool) -> Undone:
+        """The recordings with their true sensors by index, the contacts where they are, or `moved` with the sensors."""
+        right = list(self.recordings)
+        for index, sensor in sensors.items():
+            recording = right[index]
+            label, contact = self.positions[recording.sensor], recording.position_mm
+            if not moved:
+                contact = contact or label
+            elif contact is not None:
+                x, y = (at + new - old for at, new, old in zip(contact, self.positions[sensor], label, strict=True))
+                contact = x, y
+            right[index] = replace(recording, sensor=sensor, position_mm=contact)
+        return right, [finding]
+
 
 Slip = Callable[[Screened], Iterable[Alternative]]
-
-
-def leave_out(off: Mask, findings: list[Finding]) -> Callable[[list[FrfRecording], float], Undone]:
-    """What undoes a slip by leaving out the recordings that are `off` (recordings,)."""
-
-    def undo(recordings: list[FrfRecording], _: float) -> Undone:
-        return [recording for recording, is_off in zip(recordings, off, strict=True) if not is_off], findings
-
-    return undo
 
 
 def without_slips(screened: Screened, slips: Sequence[Slip]) -> Undone:
@@ -113,8 +131,7 @@ def _without_likeliest(screened: Screened, slips: Sequence[Slip]) -> tuple[Slip,
     likely = [index for index in range(len(gain)) if gain[index] > GAIN and alternatives[index][1].undo is not None]
     for index in sorted(likely, key=lambda index: -gain[index]):
         slip, alternative = alternatives[index]
-        assert alternative.undo is not None
-        undone = alternative.undo(screened.recordings, float(amplitude[index]))
+        undone = alternative.undo(float(amplitude[index])) if callable(alternative.undo) else alternative.undo
         if undone is not None:
             return slip, undone
     return None

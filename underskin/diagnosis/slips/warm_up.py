@@ -14,7 +14,6 @@ from underskin.diagnosis.slips.table import Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.forms import recording_order
-from underskin.recordings.campaign import FrfRecording
 
 _TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings: half an hour or less
 _LONGEST = 0.3  # largest τ, of the number of recordings
@@ -30,20 +29,19 @@ def warm_ups(screened: Screened) -> Iterator[Alternative]:
         return
     times = [time for time in _TIMES if time <= _LONGEST * len(levels.value)]
     for time in times:
-        undo = partial(_without_first, time=time, may_age=levels.may_age)
+        undo = partial(_without_first, screened=screened, time=time, may_age=levels.may_age)
         yield Alternative(0.0, column=CHANGE * np.exp(-levels.order / time), undo=undo)
     for longer in _SLOWER if times else ():
         yield Alternative(0.0, column=CHANGE * np.exp(-levels.order / (longer * times[-1])))
     yield Alternative(-SELDOM, column=CHANGE * (levels.order == 0).astype(float))
 
 
-def _without_first(recordings: list[FrfRecording], size: float, *, time: float, may_age: bool) -> Undone | None:
+def _without_first(size: float, *, screened: Screened, time: float, may_age: bool) -> Undone | None:
     """The recordings after the warm-up."""
     amplitude = CHANGE * size
     if abs(amplitude) < LEAST_CHANGE or (may_age and amplitude > 0):
         return None
-    last = min(time * np.log(max(abs(amplitude) / _OVER, 1.0)), _MOST_SHARE * len(recordings))
-    late = recording_order(recordings) > last
-    arguments = {"percent": 100 * float(np.exp(-amplitude) - 1), "recordings": int((~late).sum())}
-    remaining = [recording for recording, chosen in zip(recordings, late, strict=True) if chosen]
-    return remaining, [Finding(Reason.WARM_UP, "", "recorded_at", arguments)]
+    last = min(time * np.log(max(abs(amplitude) / _OVER, 1.0)), _MOST_SHARE * len(screened.recordings))
+    early = recording_order(screened.recordings) <= last
+    arguments = {"percent": 100 * float(np.exp(-amplitude) - 1), "recordings": int(early.sum())}
+    return screened.without(early, Finding(Reason.WARM_UP, "", "recorded_at", arguments))

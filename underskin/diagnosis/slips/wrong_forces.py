@@ -14,7 +14,7 @@ from math import log
 import numpy as np
 
 from underskin.diagnosis.slips.levels import Alternative
-from underskin.diagnosis.slips.table import GAIN, Screened, leave_out
+from underskin.diagnosis.slips.table import GAIN, Screened
 from underskin.diagnosis.slips.wrong_units import MOST_SHARE, SLIP
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -38,7 +38,7 @@ def wrong_forces(screened: Screened) -> Iterator[Alternative]:
         ids = {finding.recording for _, finding in contradictions}
         off = np.array([recording.id in ids for recording in screened.recordings])
         findings = [replace(one, arguments={**one.arguments, "left_out": True}) for _, one in contradictions]
-        yield Alternative(0.0, min(nats for nats, _ in contradictions), undo=leave_out(off, findings))
+        yield Alternative(0.0, min(nats for nats, _ in contradictions), undo=screened.without(off, *findings))
 
 
 def are_many(contradictions: Sequence[object], recordings: Sequence[FrfRecording]) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from underskin.diagnosis.slips.levels import Alternative
-from underskin.diagnosis.slips.table import GAIN, Screened, leave_out
+from underskin.diagnosis.slips.table import GAIN, Screened
 from underskin.diagnosis.slips.wrong_units import MOST_SHARE
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -30,7 +30,7 @@ def wrong_positions(screened: Screened) -> Iterator[Alternative]:
         if reason is Reason.PLACE and off.any():
             ids = [screened.recordings[index].id for index in np.flatnonzero(off).tolist()]
             findings = [Finding(reason, name, "position_mm", arguments) for name in ids]
-            yield Alternative(0.0, float(nats[off].sum()), undo=leave_out(off, findings))
+            yield Alternative(0.0, float(nats[off].sum()), undo=screened.without(off, *findings))
 
 
 def all_positions(screened: Screened) -> list[Finding]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from underskin.diagnosis.slips.comparison import LEAST_RECORDINGS
 from underskin.diagnosis.slips.levels import Alternative
-from underskin.diagnosis.slips.table import GAIN, Screened, leave_out
+from underskin.diagnosis.slips.table import GAIN, Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composition import D33
@@ -43,7 +43,7 @@ def wrong_values(screened: Screened) -> Iterator[Alternative]:
             units = {"too_large": bool(off[index] > 0), "given_in": too_large if off[index] > 0 else too_small}
             arguments = {"value": float(values[index]), **units}
             findings.append(Finding(Reason.BESIDE_OTHERS, screened.recordings[index].id, name, arguments))
-        yield from _left_out(off, nats, findings)
+        yield from _left_out(screened, off, nats, findings)
 
 
 def wrong_responses(screened: Screened) -> Iterator[Alternative]:
@@ -55,14 +55,14 @@ def wrong_responses(screened: Screened) -> Iterator[Alternative]:
         )
         for index in np.flatnonzero(off).tolist()
     ]
-    yield from _left_out(off, nats, findings)
+    yield from _left_out(screened, off, nats, findings)
 
 
-def _left_out(off: Floats, nats: Floats, findings: list[Finding]) -> Iterator[Alternative]:
+def _left_out(screened: Screened, off: Floats, nats: Floats, findings: list[Finding]) -> Iterator[Alternative]:
     """The alternative that these recordings are off, each at the cost of choosing it."""
     if findings:
         choices, gain = np.count_nonzero(off) * log(len(off)), float(nats[off != 0].sum())
-        yield Alternative(-choices, gain, undo=leave_out(off != 0, findings))
+        yield Alternative(-choices, gain, undo=screened.without(off != 0, *findings))
 
 
 def _off_by_1000(values: Floats) -> tuple[Floats, Floats]:
