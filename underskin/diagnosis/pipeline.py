@@ -25,7 +25,6 @@ from underskin.diagnosis.selection.unlisted_search import with_laws
 from underskin.diagnosis.slips.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.slips.inspection import inspect
 from underskin.diagnosis.slips.physical_limits import without_extremes
-from underskin.diagnosis.slips.unusable_curves import without_unusable
 from underskin.diagnosis.validation.cross_validation import (
     FAR_ABOVE,
     above_noise,
@@ -98,10 +97,9 @@ def _diagnose(
     for kind in kinds:
         if kind == "frf":
             continue
-        usable, unusable = without_unusable(campaign, kind)
-        consistent = without_inconsistent(usable, kind)
-        partial = partial.with_findings(*unusable, *consistent.findings)
-        if (unusable or consistent.findings) and consistent.lacking and kind == kinds[0]:
+        consistent = without_inconsistent(campaign, kind)
+        partial = partial.with_findings(*consistent.findings)
+        if consistent.findings and consistent.lacking and kind == kinds[0]:
             return replace(partial, lacking=consistent.lacking)
         if curve_lines(consistent.campaign, kind).recordings:
             curves[kind] = consistent.campaign

@@ -5,21 +5,15 @@ The quantity compared is the apparent modulus (recordings/curve_course.py).
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Inspected
+from underskin.diagnosis.slips.unusable_curves import without_unusable
 from underskin.findings.codes import Lack, Lacking, Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import (
-    Campaign,
-    CompressionRecording,
-    CurveRecording,
-    IndentationRecording,
-    SkinDescription,
-)
+from underskin.recordings.campaign import Campaign, CurveRecording, IndentationRecording
 from underskin.recordings.curve_course import FAR, apparent_mpa, contradictions
 
 _IMPOSSIBLE_MPA = 1e-6, 1e6  # below foam's and above diamond's
@@ -27,19 +21,15 @@ _DEEPEST = 0.85  # of a cylinder's height, where the true stress is tens of modu
 
 
 def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
-    """The curves of one kind that agree with each other, and findings on the others.
+    """The usable curves of one kind that agree with each other, and findings on the others.
 
     Copies and single curves of another magnitude are left out. Where all curves contradict what is declared, none is
     used unless `units_checked` confirms it.
     """
-    recorded = [
-        recording
-        for recording in campaign.recordings
-        if isinstance(recording, IndentationRecording | CompressionRecording) and recording.kind == kind
-    ]
-    curves, findings = list(recorded), []
-    for step in (_without_copies, _within_range, partial(_like_others, skin=campaign.skin)):
-        curves, step_findings = step(curves)
+    curves = [curve for curve in campaign.curves if curve.kind == kind]
+    findings = list[Finding]()
+    for step in (without_unusable, _without_copies, _within_range, _like_others):
+        curves, step_findings = step(curves, campaign)
         findings += step_findings
     remaining = replace(campaign, recordings=tuple(curves))
     shared = contradictions(campaign.skin, curves)
@@ -51,7 +41,7 @@ def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
     return Inspected(remaining, findings, None if curves else Lacking(Lack.NO_CURVE))
 
 
-def _without_copies(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:
+def _without_copies(curves: Sequence[CurveRecording], _: Campaign) -> tuple[list[CurveRecording], list[Finding]]:
     """The curves without copies of earlier ones."""
     originals: dict[tuple[bytes, bytes], CurveRecording] = {}
     findings = []
@@ -62,30 +52,27 @@ def _without_copies(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecordi
     return list(originals.values()), findings
 
 
-def _within_range(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:
+def _within_range(curves: Sequence[CurveRecording], _: Campaign) -> tuple[list[CurveRecording], list[Finding]]:
     """The curves without those pressed through nearly the whole sample, or ten sphere diameters deep."""
     usable, findings = [], []
     for curve in curves:
         displacement_mm = curve.displacement_mm[np.isfinite(curve.displacement_mm)]
         moved = float(displacement_mm.max() - displacement_mm[0])
         if isinstance(curve, IndentationRecording):  # a sphere may come a long way through the air
-            most = 20 * curve.indenter_radius_mm
-            too_deep = Finding(
-                Reason.SPHERE_TOO_DEEP, curve.id, "displacement_mm", {"moved_mm": moved, "most_mm": most}
-            )
+            reason, most = Reason.SPHERE_TOO_DEEP, 20 * curve.indenter_radius_mm
         else:
-            most = _DEEPEST * curve.sample_height_mm
-            arguments = {"moved_mm": moved, "most_mm": most, "share": _DEEPEST}
-            too_deep = Finding(Reason.CURVE_TOO_DEEP, curve.id, "displacement_mm", arguments)
+            reason, most = Reason.CURVE_TOO_DEEP, _DEEPEST * curve.sample_height_mm
         if moved > most:
-            findings.append(too_deep)
+            arguments = {"moved_mm": moved, "most_mm": most, "share": _DEEPEST}
+            findings.append(Finding(reason, curve.id, "displacement_mm", arguments))
         else:
             usable.append(curve)
     return usable, findings
 
 
-def _like_others(curves: Sequence[CurveRecording], skin: SkinDescription) -> tuple[list[CurveRecording], list[Finding]]:
+def _like_others(curves: Sequence[CurveRecording], campaign: Campaign) -> tuple[list[CurveRecording], list[Finding]]:
     """The curves whose apparent modulus is of the others' magnitude; of two, the one nearer to the declared modulus."""
+    skin = campaign.skin
     modulus = np.array([apparent_mpa(curve, skin.poisson_ratio) for curve in curves])
     if len(curves) < 2 or not np.isfinite(modulus).any():
         return list(curves), []

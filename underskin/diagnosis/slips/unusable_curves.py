@@ -1,5 +1,6 @@
 """Curves that nothing can be fitted to, or that no law of a sphere describes: findings, left out of a diagnosis."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,59 +9,50 @@ from underskin.diagnosis.data.dataset import curve_lines
 from underskin.errors import InvalidInput, too_few, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
+from underskin.recordings.campaign import Campaign, CurveRecording, IndentationRecording, SkinDescription
 from underskin.recordings.curve_preparation import reject_exchanged_columns
 from underskin.recordings.modulus import estimate, of_compression, require_depth, tip_of
 from underskin.units import Floats, to_si
 
 
-def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:
-    """The campaign without the curves of one kind that have too few samples, do not load, or are beyond a sphere's law.
+def without_unusable(
+    curves: Sequence[CurveRecording], campaign: Campaign
+) -> tuple[list[CurveRecording], list[Finding]]:
+    """The curves of one kind that have enough samples, load, and are within a sphere's law.
 
-    Each of these is a finding, and so are curves under a tip that looks like a cone.
+    Each of the others is a finding, and so are curves under a tip that looks like a cone.
     """
-    thinned = {recording.id: recording for recording in curve_lines(campaign, kind).campaign.recordings}
+    lines = curve_lines(replace(campaign, recordings=tuple(curves)), curves[0].kind)
+    thinned = {curve.id: curve for curve in lines.campaign.curves}
     findings, usable = [], []
-    for recording in campaign.recordings:
-        lacking, doubt = None, None
-        if recording.kind == kind:
-            lacking = _exchanged(recording) or _lacking(thinned.get(recording.id), campaign.skin)
-        if lacking is None and isinstance(recording, IndentationRecording) and recording.kind == kind:
-            lacking, doubt = _of_other_tip(recording, campaign.skin)
+    for curve in curves:
+        lacking, doubt = _lacking(curve, thinned.get(curve.id), campaign.skin), None
+        if lacking is None and isinstance(curve, IndentationRecording):
+            lacking, doubt = _of_other_tip(curve, campaign.skin)
         if lacking is None:
-            usable.append(recording)
+            usable.append(curve)
         else:
-            findings.append(Finding(Reason.CURVE_NOT_USABLE, recording.id, lacking.field, {"refusal": lacking}))
+            findings.append(Finding(Reason.CURVE_NOT_USABLE, curve.id, lacking.field, {"refusal": lacking}))
         if doubt is not None:
-            findings.append(Finding(Reason.TIP_SHAPE, recording.id, doubt.field, {"refusal": doubt}))
-    return replace(campaign, recordings=tuple(usable)), findings
+            findings.append(Finding(Reason.TIP_SHAPE, curve.id, doubt.field, {"refusal": doubt}))
+    return usable, findings
 
 
-def _exchanged(recording: object) -> InvalidInput | None:
-    """The refusal of a curve whose columns look exchanged, from its raw samples."""
+def _lacking(curve: CurveRecording, thinned: CurveRecording | None, skin: SkinDescription) -> InvalidInput | None:
+    """Why nothing can be concluded from a curve, whose columns look exchanged, or from its thinned samples."""
     try:
-        if isinstance(recording, IndentationRecording | CompressionRecording):
-            reject_exchanged_columns(recording)
-    except InvalidInput as refusal:
-        return refusal
-    return None
-
-
-def _lacking(recording: object, skin: SkinDescription) -> InvalidInput | None:
-    """Why nothing can be concluded from a thinned curve; None if it is usable."""
-    if isinstance(recording, IndentationRecording | CompressionRecording) and not np.ptp(recording.displacement_mm):
-        return unusable("displacement_mm", float(recording.displacement_mm[0]), "must change")
-    try:
-        if isinstance(recording, IndentationRecording):
-            modulus_estimate = estimate(*_columns(recording), skin.poisson_ratio, _thickness(skin))
-            modulus = modulus_estimate.modulus
-            if modulus > 0:
-                require_depth(modulus_estimate)
-        elif isinstance(recording, CompressionRecording):
-            modulus = of_compression(recording).modulus
-        else:
+        reject_exchanged_columns(curve)
+        if thinned is None:
             return too_few("force_n", "too few finite samples", "must have at least 5")
+        if not np.ptp(thinned.displacement_mm):
+            return unusable("displacement_mm", float(thinned.displacement_mm[0]), "must change")
+        if isinstance(thinned, IndentationRecording):
+            of_sphere = estimate(*_columns(thinned), skin.poisson_ratio, _thickness(skin))
+            modulus = of_sphere.modulus
+            if modulus > 0:
+                require_depth(of_sphere)
+        else:
+            modulus = of_compression(thinned).modulus
     except InvalidInput as refusal:
         return refusal
     return None if modulus > 0 else unusable("force_n", "does not rise as it is pressed", "must rise")
