@@ -25,7 +25,7 @@ from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.kinds import KINDS
 from underskin.diagnosis.reporting.numbers import parameter_index
-from underskin.recordings.campaign import Campaign, CurveRecording, frf_recordings
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
@@ -75,12 +75,12 @@ def shown_curves(
 ) -> list[ShownCurve]:
     """All fitted curves, the worst explained first; `recorded` holds them with every sample."""
     lines = problem.lines
-    raw = {recording.id: recording for recording in _curves(recorded)}
+    raw = {recording.id: recording for recording in recorded.curves}
     _, before_curves = _predictions(problem, before)
     cell, after_curves = _predictions(problem, after)
     deviation = _deviation(problem, after, cell)
     curves = []
-    for index, (recording, span) in enumerate(zip(_curves(lines.campaign), lines.spans, strict=True)):
+    for index, (recording, span) in enumerate(zip(lines.campaign.curves, lines.spans, strict=True)):
         sample_mm, measured, *times = finite_samples(raw[recording.id])
         landmarks = curve_landmarks(sample_mm, measured, *times)
         jumps: list[int | None] = [None, None]
@@ -109,10 +109,6 @@ def shown_curves(
     return sorted(curves, key=lambda curve: -curve.misfit_percent)
 
 
-def _curves(campaign: Campaign) -> list[CurveRecording]:
-    return [recording for recording in campaign.recordings if isinstance(recording, CurveRecording)]
-
-
 def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Floats) -> tuple[Floats, Floats] | None:
     """The least-squares fit (parameters,) of indentations and the cells' reading under it (rows,) [N].
 
@@ -135,7 +131,7 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> tuple[Cel
     reading = cell.reading(lines, force)
     fit, reading = plain_reading(problem, explanation, reading) or (fit, reading)
     predicted = []
-    for recording, span in zip(_curves(lines.campaign), lines.spans, strict=True):
+    for recording, span in zip(lines.campaign.curves, lines.spans, strict=True):
         contact = float(fit[parameter_index(explanation, f"contact_point {recording.id}")])
         # The cell's reading in the air just before contact, including any drift
         in_air = np.flatnonzero(recording.displacement_mm[: int(recording.displacement_mm.argmax()) + 1] <= contact)
@@ -174,54 +170,47 @@ _MOST_FRF_POINTS = 6000  # drawn of all recordings
 
 @dataclass(frozen=True)
 class ShownFrf:
-    """One recording: the drawn lines (shown,) of its `count`; responses in pC/N.
+    """One recording: the drawn lines (shown,) of its `count`; responses in pC/N, `predicted` before and after.
 
     `deviation` (2, shown): standard deviation of the noise about the explanation after, of real and imaginary part.
-    `misfit_before`, `misfit_after`: 100 √(Σ|y − m|²/Σ|m|²) over all its lines.
+    `misfits`, before and after: 100 √(Σ|y − m|²/Σ|m|²) over all its lines.
     """
 
-    name: str
-    sensor: str
-    indenter_radius_mm: float
-    preload_n: float
+    recording: FrfRecording
     count: int
     frequency_hz: Floats
     measured: Complexes
-    before: Complexes
-    after: Complexes
+    predicted: Mapping[str, Complexes]
     deviation: Floats
-    misfit_before: float
-    misfit_after: float
+    misfits: Mapping[str, float]
 
 
 def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation) -> list[ShownFrf]:
     """The fitted recordings, the one with the largest misfit after first; at most `MOST_RECORDINGS`, those with the
     largest misfit, equally many of each sensor."""
     lines, recordings = problem.lines, frf_recordings(problem.lines.campaign)
-    predicted = [_predicted(problem, explanation) for explanation in (before, after)]
-    misfits = [[_misfit_percent(lines.value[span], rows[span]) for span in lines.spans] for rows in predicted]
-    deviation = _frf_deviation(problem, after, predicted[1])
-    chosen = _worst([recording.sensor for recording in recordings], misfits[1])
+    predicted = {"before": _predicted(problem, before), "after": _predicted(problem, after)}
+    misfits = {
+        role: [_misfit_percent(lines.value[span], rows[span]) for span in lines.spans]
+        for role, rows in predicted.items()
+    }
+    deviation = _frf_deviation(problem, after, predicted["after"])
+    chosen = _worst([recording.sensor for recording in recordings], misfits["after"])
     unit = KINDS["frf"].per_si
     most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, MOST_LINES))
     shown = []
     for index in chosen:
-        recording, span = recordings[index], lines.spans[index]
+        span = lines.spans[index]
         rows = span.start + _thinned_lines(lines.frequency[span], most)
         shown.append(
             ShownFrf(
-                name=recording.id,
-                sensor=recording.sensor,
-                indenter_radius_mm=recording.indenter_radius_mm,
-                preload_n=recording.preload_n,
+                recording=recordings[index],
                 count=span.stop - span.start,
                 frequency_hz=lines.frequency[rows],
                 measured=unit * lines.value[rows],
-                before=unit * predicted[0][rows],
-                after=unit * predicted[1][rows],
+                predicted={role: unit * values[rows] for role, values in predicted.items()},
                 deviation=unit * deviation[:, rows],
-                misfit_before=misfits[0][index],
-                misfit_after=misfits[1][index],
+                misfits={role: values[index] for role, values in misfits.items()},
             )
         )
     return shown

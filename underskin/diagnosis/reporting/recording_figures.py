@@ -283,14 +283,11 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         margin={"l": 90, "r": 20, "t": 80, "b": 100},
         legend=BELOW,
         meta={
-            "recordings": [recording.name for recording in recordings],
-            "sensors": [recording.sensor for recording in recordings],
-            "indenters_mm": [recording.indenter_radius_mm for recording in recordings],
-            "preloads_n": [recording.preload_n for recording in recordings],
-            "left_percent": [
-                [float(f"{misfit:.3g}") for misfit in (recording.misfit_before, recording.misfit_after)]
-                for recording in recordings
-            ],
+            "recordings": [shown.recording.id for shown in recordings],
+            "sensors": [shown.recording.sensor for shown in recordings],
+            "indenters_mm": [shown.recording.indenter_radius_mm for shown in recordings],
+            "preloads_n": [shown.recording.preload_n for shown in recordings],
+            "left_percent": [[float(f"{misfit:.3g}") for misfit in shown.misfits.values()] for shown in recordings],
             "shows": [trace.role for trace in traces],
         },
     )
@@ -330,19 +327,20 @@ def _traces(models: Sequence[Model], few: bool) -> list[_Trace]:
 def _columns(recording: ShownFrf) -> dict[str, Floats]:
     """The ordinates of a recording's traces by `role`, each (shown,); residuals and noise in percent of the prediction
     after, or of 5 % of the largest where that is more."""
-    before, phase = (np.degrees(np.unwrap(np.angle(predicted))) for predicted in (recording.before, recording.after))
+    after = recording.predicted["after"]
+    before, phase = (np.degrees(np.unwrap(np.angle(predicted))) for predicted in recording.predicted.values())
     columns = {
         "measured": np.abs(recording.measured),
-        "measured phase": phase + np.degrees(np.angle(recording.measured * recording.after.conj())),
+        "measured phase": phase + np.degrees(np.angle(recording.measured * after.conj())),
         "after phase": phase,
         "before phase": before + 360 * np.round((phase[0] - before[0]) / 360),
     }
-    size = np.abs(recording.after)
+    size = np.abs(after)
     percent = 100 / np.maximum(size, max(SMALLEST * float(size.max()), _NONE))
     for part, deviation in zip(("real", "imaginary"), recording.deviation, strict=True):
         half = SDS_OF_95 * deviation * percent
         columns |= {f"noise {part} low": -half, f"noise {part} high": half}
-    for name, predicted in (("before", recording.before), ("after", recording.after)):
+    for name, predicted in recording.predicted.items():
         residual = (recording.measured - predicted) * percent
         columns |= {name: np.abs(predicted)}
         columns |= {f"residual {name} real": residual.real, f"residual {name} imaginary": residual.imag}
@@ -386,13 +384,12 @@ def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
     return view
 
 
-def _label(recording: ShownFrf, both: bool) -> str:
+def _label(shown: ShownFrf, both: bool) -> str:
+    recording, drawn = shown.recording, len(shown.frequency_hz)
     where = f"{recording.sensor}, R {recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
-    drawn = len(recording.frequency_hz)
-    lines = "" if drawn == recording.count else f"; {drawn} of {recording.count} lines"
-    before = f"{_percent(recording.misfit_before)} before, " if both else ""
-    after = f"{_percent(recording.misfit_after)}{' after' if both else ''}"
-    return f"{recording.name} ({where}): misfit {before}{after}{lines}"
+    lines = "" if drawn == shown.count else f"; {drawn} of {shown.count} lines"
+    before, after = map(_percent, shown.misfits.values())
+    return f"{recording.id} ({where}): misfit {f'{before} before, {after} after' if both else after}{lines}"
 
 
 def _percent(value: float) -> str:
