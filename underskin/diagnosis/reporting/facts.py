@@ -29,9 +29,8 @@ from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, 
 from underskin.findings.codes import FindingCode, Lacking, Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
-from underskin.mechanisms.base import Mechanism, Stage
+from underskin.mechanisms.base import Stage
 from underskin.mechanisms.laws import contact_creep, strain_stiffening
-from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.expressions import CurveLaw
 from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
@@ -433,12 +432,10 @@ class Facts:
     def _contacts_kept(self) -> list[Finding]:
         """Contacts of FRFs that lie within the tables with the fitted modulus, and beyond them with the declared."""
         best, model, skin = self.shown.best, self.shown.model, self.problem.lines.campaign.skin
-        if not isinstance(model, FrfModel):
-            return []
         contacts = len(np.unique(best.hypothesis.lines.recording[best.prediction.inside & ~model.valid]))
         if not contacts:
             return []
-        assert skin.youngs_modulus_mpa is not None
+        assert skin.youngs_modulus_mpa is not None  # as of all FRFs, which alone can be beyond tables as declared
         fit = dict(zip([parameter.name for parameter in model.parameters], self.shown.point.fit, strict=True))
         fitted_mpa = None
         if _FACTOR in fit:
@@ -455,7 +452,12 @@ class Facts:
     def _thickness_unknown(self) -> list[Finding]:
         """A thickness inferred from curves alone."""
         mechanisms = self.problem.lines.mechanisms
-        stiffening = [name for name in self.shown.names if name in _STIFFENS or _is_of_depth(mechanisms[name])]
+        stiffening = [
+            name
+            for name in self.shown.names
+            if name in _STIFFENS
+            or (isinstance(law := mechanisms[name], CurveLaw) and law.description.axis in _ALONG_CURVE)
+        ]
         if not self._has_unknown_thickness or not stiffening:
             return []
         is_tried = "layered_contact" in mechanisms.named
@@ -487,7 +489,3 @@ _MEANINGS = {
     contact_creep.ContactCreep.name: contact_creep.meaning,
     strain_stiffening.StrainStiffening.name: strain_stiffening.meaning,
 }
-
-
-def _is_of_depth(mechanism: Mechanism) -> bool:
-    return isinstance(mechanism, CurveLaw) and mechanism.description.axis in ("displacement_mm", "force_n")

@@ -27,10 +27,8 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion.mixed_model import LEVEL, ROBUST, SDS_OF_95, mixture_quantile
 from underskin.mechanisms.base import Parameter
-from underskin.mechanisms.models.composed import Model
-from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
-from underskin.units import Array, Floats
+from underskin.units import Floats
 
 ENDS = ("value", "low", "high")
 QUANTILES_OF_95 = (0.5, 0.025, 0.975)  # for these
@@ -281,19 +279,13 @@ def law_levels(problem: FittingProblem, explanation: Explanation, factors: Colle
     for name, span in parameter_slices(other_names, without.lines).items():
         fit[span] = explanation.coordinates(name)
     fit[without.mechanism_parameter_count :] = explanation.point.fit[with_law.mechanism_parameter_count :]
-    here, there = np.abs(_response(with_law.model, explanation.point.fit)), np.abs(_response(without.model, fit))
+    here, there = (
+        np.abs(hypothesis.model.predict(at).value)
+        for hypothesis, at in ((with_law, explanation.point.fit), (without, fit))
+    )
     nonzero = (there > 0) & (here > 0)
     shares = (np.arange(_LEVELS) + 0.5) / _LEVELS
     return np.quantile(np.log(here[nonzero] / there[nonzero]), shares)
-
-
-def _response(model: Model, fit: Floats) -> Array:
-    """FRFs or forces (rows,) at one point."""
-    return (
-        model.predict(fit, slopes=False, place=False).value
-        if isinstance(model, FrfModel)
-        else model.forces(fit[None])[0]
-    )
 
 
 def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any]]:

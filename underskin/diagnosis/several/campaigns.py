@@ -111,7 +111,8 @@ def _document(
         progress((index + 1) / (len(with_frf) + 1))
     suspected = [_outlying_sensors(result) for result in results]
     # Single sensors that changed since the previous campaign are no physics of the skin
-    alone = [_sensors_alone(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
+    answers = [None if result.search is None else result.search.answers[0].explanation for result in results]
+    alone = [_sensors_under(*campaign, table) for campaign in zip(campaigns, results, answers, strict=True)]
     steps = SensorsOverDates(alone, np.arange(len(alone), dtype=float), [0.0] * len(alone), suspected).steps
     for index, campaign in enumerate(campaigns):
         as_before = without_steps(campaign, steps, index)
@@ -181,15 +182,10 @@ def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:
     return frozenset(str(finding.arguments["sensor"]) for finding in result.findings if finding.reason in reasons)
 
 
-def _sensors_alone(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> dict[str, Sensor]:
-    """The sensors of a campaign under its own answer, or without any mechanism."""
-    leader = None if result.search is None else result.search.answers[0].explanation
-    return _sensors_under(campaign, result, leader, table)
-
-
 def _sensors_under(
     campaign: Campaign, result: DiagnosisResult, fit: Explanation | None, table: SigmaTable
 ) -> dict[str, Sensor]:
+    """The sensors of a campaign under an answer, or without any mechanism."""
     shared = {} if fit is None else {name: SharedParameters.of(fit, [name]) for name in fit.names}
     values = {name: parameter_values(of_name.parameters, of_name.mean) for name, of_name in shared.items()}
     return sensors_of(campaign, values, table, used_recordings(result))
@@ -222,11 +218,7 @@ def curves_once(campaigns: Sequence[Campaign], seen: set[bytes]) -> list[Campaig
     that was added to the FRFs of two dates is one measurement."""
     distinct = []
     for campaign in campaigns:
-        curves = {
-            recording.id: recording.displacement_mm.tobytes() + recording.force_n.tobytes()
-            for recording in campaign.recordings
-            if not isinstance(recording, FrfRecording)
-        }
+        curves = {curve.id: curve.displacement_mm.tobytes() + curve.force_n.tobytes() for curve in campaign.curves}
         remaining = tuple(recording for recording in campaign.recordings if curves.get(recording.id) not in seen)
         distinct.append(replace(campaign, recordings=remaining))
         seen |= set(curves.values())

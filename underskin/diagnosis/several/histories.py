@@ -103,12 +103,12 @@ def keeps_strength(before: Explanation, after: Explanation, mechanism: str) -> b
 
 def parameter_values(parameters: Sequence[Parameter], fit: Floats) -> dict[str, float]:
     """Parameters at these fit coordinates, in their units, by name."""
-    values = {
+    values: dict[str | None, float] = {None: 1.0}
+    values |= {
         parameter.name: parameter.from_fit(float(coordinate))
         for parameter, coordinate in zip(parameters, fit, strict=True)
     }
-    units = {parameter.name: parameter.relative_to for parameter in parameters}
-    return {name: value * (1.0 if (unit := units[name]) is None else values[unit]) for name, value in values.items()}
+    return {parameter.name: values[parameter.name] * values[parameter.relative_to] for parameter in parameters}
 
 
 @dataclass(frozen=True)

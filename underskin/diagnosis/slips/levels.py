@@ -208,7 +208,7 @@ def models_of_laws(conditions: Conditions, table: SigmaTable, *, along_frequency
     of the others."""
     models = {}
     for name, mechanism in CATALOGUE.items():
-        if "frf" not in mechanism.kinds or mechanism.needs_lines is not along_frequency:
+        if not mechanism.acts_on_frfs or mechanism.needs_lines is not along_frequency:
             continue
         try:
             model = compose((name,), conditions, table, "frf")
