@@ -99,12 +99,6 @@ def covariance_of(explanation: Explanation, indices: Sequence[int]) -> Floats:
     return block
 
 
-def product(explanation: Explanation, indices: Sequence[int]) -> tuple[float, float]:
-    """The product of parameters on logarithmic scales, and the factor from it to the ends of its 95 % interval."""
-    deviation = float(np.sqrt(max(covariance_of(explanation, indices).sum(), 0.0)))
-    return float(np.exp(explanation.point.fit[list(indices)].sum())), float(np.exp(SDS_OF_95 * deviation))
-
-
 def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, Any]:
     """A parameter's most probable value and 95 % interval within its bounds: ±1.96 standard deviations.
 
@@ -131,8 +125,9 @@ def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, A
         ends[side] = ends[side] if end is None else end
     values = [parameter.from_fit(at) for at in (middle, *ends)]
     if parameter.relative_to is not None:
-        unit = multiple_of(explanation, parameter)
-        value, factor = product(explanation, [index, parameter_index(explanation, parameter.relative_to)])
+        unit, both = multiple_of(explanation, parameter), [index, parameter_index(explanation, parameter.relative_to)]
+        deviation = np.sqrt(max(float(covariance_of(explanation, both).sum()), 0.0))
+        value, factor = float(np.exp(explanation.point.fit[both].sum())), float(np.exp(SDS_OF_95 * deviation))
         least, most = min(parameter.low * unit, value), parameter.high * unit
         values = [value, max(value / factor, least), min(value * factor, most)]
     at_bound = parameter.ends_search(middle)

@@ -11,7 +11,7 @@ else is calculated with the exchange undone.
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date, datetime
+from datetime import date
 from enum import StrEnum
 from functools import cached_property
 from itertools import combinations
@@ -37,10 +37,10 @@ from underskin.inversion.array_history import (
 from underskin.inversion.array_history import changes as changes_between_ends
 from underskin.inversion.invert import invert
 from underskin.inversion.mixed_model import SDS_OF_95, mixture_quantile
+from underskin.mechanisms.unlisted.forms import local_times
 from underskin.prediction.adopted_model import AdoptedModel
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.readers.text import time_zone
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab
 
@@ -114,9 +114,8 @@ def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
 
 def _first_time(campaign: Campaign) -> float | None:
     """Of its recordings, in seconds; None where none has a time."""
-    zone, written = time_zone(), (recording.recorded_at for recording in frf_recordings(campaign))
-    times = (datetime.fromisoformat(time) for time in written if time is not None)
-    return min(((time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in times), default=None)
+    timed = [recording for recording in frf_recordings(campaign) if recording.recorded_at is not None]
+    return min((time.timestamp() for time in local_times(timed) or ()), default=None)
 
 
 @dataclass(frozen=True)

@@ -245,8 +245,7 @@ class DeclaredOfRecordings(DeclaredOfFrf):
         if self.acts_on == "gain":
             return first
         if self.acts_on == "force":
-            force = np.array([tables.force[key] for key in design.ids])
-            return tables.factor("force", rows, log_positive(first / force))
+            return tables.factor("force", rows, log_positive(first / tables.forces(design.ids)))
         return tables.factor(self.acts_on, rows, log_of(first))
 
 

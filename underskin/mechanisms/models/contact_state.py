@@ -66,7 +66,6 @@ def together(pickups: Sequence[Pickup]) -> Pickup | None:
 # What mechanisms and tables must have room for: each component of an offset, and a factor on the thickness
 LARGEST_OFFSET_MM, LARGEST_STRETCH = 2.0, 1.55
 NEIGHBOUR_PITCHES = 1.2
-_SPARSE = 8  # contacts times frequencies for each row, beyond which most were not measured
 
 
 class FrfDesign:
@@ -120,15 +119,9 @@ class FrfDesign:
         self.recording: Indices = np.repeat(np.arange(count), [len(column) for column in lines_hz])
         self._dynamic_forces = np.array([recording.dynamic_force_n for recording in recordings])
         distinct, frequency = _distinct(lines_hz)
-        self.line: Indices
         line_of_row = contact[self.recording] * len(distinct) + frequency
-        if len(contacts) * len(distinct) > _SPARSE * len(line_of_row):
-            lines, self.line = np.unique(line_of_row, return_inverse=True)
-        else:  # without sorting all rows
-            measured = np.zeros(len(contacts) * len(distinct), dtype=bool)
-            measured[line_of_row] = True
-            lines = np.flatnonzero(measured)
-            self.line = (np.cumsum(measured) - 1)[line_of_row]
+        self.line: Indices
+        lines, self.line = np.unique(line_of_row, return_inverse=True)
         self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
 
     @property

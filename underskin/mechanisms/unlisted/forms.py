@@ -98,7 +98,7 @@ def every_axis(conditions: Conditions, origin: datetime | None = None) -> list[A
     positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors}
     position = np.array([recording.position_mm or positions[recording.sensor] for recording in recordings])
     columns |= {"x_mm": position[:, 0].tolist(), "y_mm": position[:, 1].tolist()}
-    times = _times(recordings)
+    times = local_times(recordings)
     if times is not None:
         origin = origin or min(times).replace(hour=0, minute=0, second=0, microsecond=0)
         columns["recorded_at"] = [(time - origin).total_seconds() / 3600 for time in times]
@@ -119,7 +119,7 @@ def every_axis(conditions: Conditions, origin: datetime | None = None) -> list[A
 
 def recording_order(recordings: Sequence[FrfConditions]) -> Floats:
     """The rank of each recording, from 0 (recordings,): by time, else by load cycles, else as listed."""
-    times = _times(recordings)
+    times = local_times(recordings)
     seconds = None if times is None else [time.timestamp() for time in times]
     cycles = [float(recording.load_cycles) for recording in recordings if recording.load_cycles is not None]
     for column in (seconds, cycles):
@@ -128,12 +128,12 @@ def recording_order(recordings: Sequence[FrfConditions]) -> Floats:
     return np.arange(len(recordings), dtype=float)
 
 
-def _times(recordings: Sequence[FrfConditions]) -> list[datetime] | None:
-    """Local times; None where one is missing."""
+def local_times(recordings: Sequence[FrfConditions]) -> list[datetime] | None:
+    """When they were recorded, in the lab's zone; None where one has no time."""
     if any(recording.recorded_at is None for recording in recordings):
         return None
     zone = time_zone()
-    times = [datetime.fromisoformat(str(recording.recorded_at).replace("Z", "+00:00")) for recording in recordings]
+    times = [datetime.fromisoformat(str(recording.recorded_at)) for recording in recordings]
     return [time.astimezone(zone) if time.tzinfo else time.replace(tzinfo=zone) for time in times]
 
 

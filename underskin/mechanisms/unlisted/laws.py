@@ -78,12 +78,16 @@ class LevelTables:
         self._conditions = Conditions(conditions.name, conditions.skin, tuple(recordings))
         self._table = table
         self._row_numbers = {recording.id: number for number, recording in enumerate(recordings)}
-        self.force = {recording.id: recording.preload_n for recording in recordings}
+        self._force = np.array([recording.preload_n for recording in recordings])
         self._curves: dict[str, Curve] = {}
 
     def rows(self, ids: Sequence[str]) -> Indices:
         """Row indices of these recordings in the tables."""
         return np.array([self._row_numbers[name] for name in ids], dtype=np.intp)
+
+    def forces(self, ids: Sequence[str]) -> Floats:
+        """The preloads of these recordings [N]."""
+        return np.asarray(self._force[self.rows(ids)])
 
     def factor(self, acts_on: str, rows: Indices, log: Differentiated) -> Differentiated:
         """level(quantity · e^s)/level(quantity) of recordings, from s (…, recordings)."""
@@ -106,7 +110,7 @@ class LevelTables:
     @cached_property
     def usual_force(self) -> float:
         """The median preload [N]."""
-        return float(np.median(list(self.force.values())))
+        return float(np.median(self._force))
 
     @cached_property
     def _model(self) -> FrfModel:
@@ -278,7 +282,7 @@ class RecordingLaw(UnlistedLaw):
     def factor(self, ids: tuple[str, ...], values: Values) -> Differentiated:
         """The factor on each of these recordings."""
         features = self.features(ids, values)
-        rows = self._rows(ids)
+        rows = self.tables.rows(ids)
         if self._acts_on == "position":
             half = len(self.amplitudes) // 2
             x, y = (
@@ -290,8 +294,7 @@ class RecordingLaw(UnlistedLaw):
         if self.shape.logarithmic:
             log = change
         elif self._acts_on == "force":
-            force = np.array([self.tables.force[name] for name in ids])
-            log = log_positive(change / force)
+            log = log_positive(change / self.tables.forces(ids))
         else:
             log = log_positive(change)
         if self._acts_on == "gain":
@@ -300,7 +303,7 @@ class RecordingLaw(UnlistedLaw):
 
     def sensitivity(self, ids: tuple[str, ...]) -> Floats:
         """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a position by x and y (…, 2)."""
-        rows = self._rows(ids)
+        rows = self.tables.rows(ids)
         if self._acts_on == "position":
             none = Differentiated(np.zeros((1, 1)), np.zeros((2, 1, 1)))
             x, y = (Differentiated(none.value, np.eye(2)[index][:, None, None]) for index in (0, 1))
@@ -310,16 +313,7 @@ class RecordingLaw(UnlistedLaw):
             return np.ones((len(ids), 1))
         seed = Differentiated(np.zeros((1, len(ids))), np.ones((1, 1, len(ids))))
         by_log = self.tables.factor(self._acts_on, rows, seed).slopes[0, 0]
-        scale = np.array([self.tables.force[name] for name in ids]) if self._acts_on == "force" else 1.0
-        return np.asarray(by_log / scale)[:, None]
-
-    def _rows(self, ids: tuple[str, ...]) -> Indices:
-        return _rows(self.tables, ids)
-
-
-@lru_cache(maxsize=16)
-def _rows(tables: LevelTables, ids: tuple[str, ...]) -> Indices:
-    return tables.rows(ids)
+        return np.asarray(by_log / (self.tables.forces(ids) if self._acts_on == "force" else 1.0))[:, None]
 
 
 def log_positive(change: Differentiated) -> Differentiated:
