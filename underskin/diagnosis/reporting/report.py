@@ -21,7 +21,7 @@ from underskin.diagnosis.selection.answers import Search
 SCHEMA = "report/1"
 ALTERNATIVES = 6
 LEAST_PROBABILITY = 0.005  # of an alternative, or a mechanism, that is listed
-_EMPTY: Mapping[str, Any] = {  # the report of recordings that say too little, and the order of all reports
+EMPTY: Mapping[str, Any] = {  # the report of recordings that say too little, and the order of all reports
     "schema": SCHEMA,
     "campaign": "",
     "verdict": "insufficient_data",
@@ -61,7 +61,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     if diagnosis.search is None:
         findings = [finding.in_report() for finding in diagnosis.findings]
         document = {
-            **_EMPTY,
+            **EMPTY,
             "campaign": diagnosis.name,
             "probability": 1.0,
             "statement": statement.insufficient_statement(diagnosis.lacking, findings),
@@ -74,7 +74,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     facts = Facts(diagnosis)
     search, leading = facts.search, facts.leading
     document = {
-        **_EMPTY,
+        **EMPTY,
         "campaign": diagnosis.name,
         "verdict": facts.verdict,
         "probability": round(facts.leader.probability, 3),

@@ -24,7 +24,7 @@ from underskin.diagnosis.data.names import (
 from underskin.diagnosis.reporting.d33 import StatedD33
 from underskin.diagnosis.reporting.headline import WORDS, within_words
 from underskin.diagnosis.reporting.numbers import at_bound_in_words, rounded
-from underskin.diagnosis.reporting.report import ALTERNATIVES, LEAST_PROBABILITY, SCHEMA, Reported
+from underskin.diagnosis.reporting.report import ALTERNATIVES, EMPTY, LEAST_PROBABILITY, Reported
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
 from underskin.diagnosis.several.population import D33, REGULAR, STATED, Populations
 from underskin.diagnosis.several.sensors import (
@@ -138,25 +138,21 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
     first += [*bounds, *(_rivals_in_words(skin) if verdict == "ambiguous" else [])]
     closing = [skin.dates.order_clause(), _d33_of_last(names[-1], last)]
     return {
-        **_begun(name, list(skin.reports), verdict, probability),
+        **_of_parts("campaign", skin.reports, skin.provenance, exchanged),
+        "campaign": name,
+        "campaigns": list(skin.reports),
+        "verdict": verdict,
+        "probability": round(probability, 3),
         "headline": _headline(skin, [*sensors, *_contradictions_in_brief(skin.reports)], stated, brief),
         "statement": of_clauses(first, _change_clauses(skin), closing, names=names),
-        "location": _nowhere("campaign"),
         "mechanisms": mechanisms,
         "presence": [
             *_presence(skin),
             *(_share(sorted(change.causes), change.probability) for change in skin.changes if change.causes),
         ],
-        "unnamed": None,
         "alternatives": _alternatives(skin)[:ALTERNATIVES],
         "not_identifiable": _not_identifiable({names[-1]: last}),
-        "findings": [*(finding.in_report() for finding in exchanged), *_prefixed(skin.reports, "findings")],
-        **_of_kinds(skin.reports),
-        "fit": None,
-        "power": [],
         "d33": {**(last.document or {}), **_UNQUOTED, "per_sensor": _per_sensor(skin), **_per_campaign(skin)},
-        "next_experiment": None,
-        "provenance": {**skin.provenance, "each": _each("campaign", skin.reports)},
     }
 
 
@@ -175,41 +171,45 @@ def fleet_document(name: str, campaigns: Sequence[str], fleet: Fleet) -> dict[st
     probability = 1 - fleet.p_described if unexplained else p_sets * p_departures
     d33 = quantities[0]
     asides = [*_contradiction_clauses(fleet.reports), *_asides(fleet), _d33_of_skins(d33, mechanisms, fleet.reports)]
-    first = _fleet_in_words(mechanisms, unexplained, probability)
+    first, departures = _fleet_in_words(mechanisms, unexplained, probability), _departure_clauses(fleet, quantities)
     names = [*fleet.reports, *fleet.lacking, *campaigns]
     return {
-        **_begun(name, campaigns, verdict, probability),
-        "headline": within_words([*_departure_clauses(fleet.quantities, quantities), first]),
-        "statement": of_clauses([first], _departure_clauses(fleet.quantities, quantities), asides, names=names),
-        "location": _nowhere("skin"),
+        **_of_parts("skin", fleet.reports, fleet.provenance),
+        "campaign": name,
+        "campaigns": list(campaigns),
+        "verdict": verdict,
+        "probability": round(probability, 3),
+        "headline": within_words([*departures, first]),
+        "statement": of_clauses([first], departures, asides, names=names),
         "mechanisms": mechanisms,
         "presence": [_share([mechanism["name"]], mechanism["probability"]) for mechanism in mechanisms],
-        "unnamed": None,
-        "alternatives": [],
         "not_identifiable": _not_identifiable({skin: report.d33 for skin, report in fleet.reports.items()}),
-        "findings": _prefixed(fleet.reports, "findings"),
-        **_of_kinds(fleet.reports),
-        "fit": None,
-        "power": [],
         "population": quantities,
         "d33": {"name": D33, "unit": d33["unit"], "value": d33["mean"], **_UNQUOTED, "per_skin": d33["skins"]},
-        "next_experiment": None,
-        "provenance": {**fleet.provenance, "each": _each("skin", fleet.reports)},
     }
 
 
-def _begun(name: str, campaigns: Sequence[str], verdict: str, probability: float) -> dict[str, Any]:
-    document = {"schema": SCHEMA, "campaign": name, "campaigns": list(campaigns)}
-    return {**document, "verdict": verdict, "probability": round(probability, 3)}
+def _of_parts(
+    part: str, reports: Mapping[str, Reported], provenance: Mapping[str, Any], findings: Sequence[Finding] = ()
+) -> dict[str, Any]:
+    """What the reports on campaigns, or skins, say by themselves, in the order of a joint one, which fills in the rest.
 
-
-def _nowhere(part: str) -> dict[str, Any]:
-    return {"axes": [], "region": {}, "effect_percent": None, "statement": f"See each {part}'s own diagnosis."}
-
-
-def _each(part: str, reports: Mapping[str, Reported]) -> list[dict[str, Any]]:
-    verdicts = [{key: report.document[key] for key in ("verdict", "probability")} for report in reports.values()]
-    return [{part: name, **verdict} for name, verdict in zip(reports, verdicts, strict=True)]
+    `by_kind` and `contradictions` are there where a report has several kinds of recordings.
+    """
+    own = [(name, report.document) for name, report in reports.items()]
+    by_kind = [row for _, document in own for row in document.get("by_kind", ())]
+    of_kinds = {"by_kind": by_kind, "contradictions": _prefixed(reports, "contradictions")} if by_kind else {}
+    each = [{part: name, **{key: document[key] for key in ("verdict", "probability")}} for name, document in own]
+    nowhere = {"axes": [], "region": {}, "effect_percent": None, "statement": f"See each {part}'s own diagnosis."}
+    return {
+        **{name: EMPTY[name] for name in EMPTY if name not in ("idealised", "remainder")},
+        "campaigns": [],
+        "location": nowhere,
+        "findings": [*(finding.in_report() for finding in findings), *_prefixed(reports, "findings")],
+        **of_kinds,
+        "next_experiment": None,
+        "provenance": {**provenance, "each": each},
+    }
 
 
 def _prefixed(reports: Mapping[str, Reported], key: str) -> list[dict[str, Any]]:
@@ -219,12 +219,6 @@ def _prefixed(reports: Mapping[str, Reported], key: str) -> list[dict[str, Any]]
         for name, report in reports.items()
         for row in report.document.get(key, ())
     ]
-
-
-def _of_kinds(reports: Mapping[str, Reported]) -> dict[str, Any]:
-    """`by_kind` and `contradictions`; empty where no report has several kinds of recordings."""
-    by_kind = [row for report in reports.values() for row in report.document.get("by_kind", ())]
-    return {"by_kind": by_kind, "contradictions": _prefixed(reports, "contradictions")} if by_kind else {}
 
 
 def _contradiction_clauses(reports: Mapping[str, Reported]) -> list[str]:
@@ -647,9 +641,9 @@ def _fleet_in_words(mechanisms: Sequence[Mapping[str, Any]], unexplained: Sequen
     return f"By skin: {missing} ({in_percent(probability)} probability)"
 
 
-def _departure_clauses(quantities: Sequence[PooledQuantity], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def _departure_clauses(fleet: Fleet, rows: Sequence[Mapping[str, Any]]) -> list[str]:
     ways: dict[str, list[str]] = {}
-    for quantity, row in zip(quantities, rows, strict=True):
+    for quantity, row in zip(fleet.quantities, rows, strict=True):
         unit = "" if row["unit"] == "-" else f" {row['unit']}"
         for departure in row["departures"]:
             others = f"{row['mean']:g} ± {row['sd']:g}"
