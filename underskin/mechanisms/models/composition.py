@@ -6,7 +6,7 @@ the modulus and the contact points, and of indentations the share of finite stra
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,15 +144,17 @@ class Composition:
             raise InvalidInput("fit", np.shape(fit), allowed, code=ErrorCode.UNEQUAL_LENGTHS)
         value = np.where(self._log, np.exp(np.where(self._log, fit, 0.0)), fit)
         numbers = [Differentiated(value[..., [index]], np.zeros((0, *np.shape(fit)[:-1], 1))) for index in range(count)]
-        by_mechanism: dict[str, Values] = {}
-        for name, indices in self.indices.items():
-            values = {key: numbers[index] for key, index in indices.items()}
-            for key, index in indices.items():
-                other = self.parameters[index].relative_to
-                if other is not None:
-                    values[key] = values[key] * values[other]
-            by_mechanism[name] = values
+        by_mechanism = {name: self.values_of(name, numbers.__getitem__) for name in self.indices}
         return by_mechanism, {name: numbers[index] for name, index in self.nuisances.items()}
+
+    def values_of(self, mechanism: str, value: Callable[[int], Differentiated]) -> Values:
+        """A mechanism's parameters in their units, from the `value` of the parameter at an index."""
+        indices = self.indices[mechanism]
+        values = {name: value(index) for name, index in indices.items()}
+        for name, index in indices.items():
+            if other := self.parameters[index].relative_to:
+                values[name] = values[name] * values[other]
+        return values
 
 
 def parameters_together(

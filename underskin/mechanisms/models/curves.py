@@ -19,6 +19,7 @@ from underskin.autodiff import constant
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Kind, Mechanism, Parameter, Values
 from underskin.mechanisms.models.composition import (
+    STRAIN_SHARE,
     Composition,
     Prediction,
     contact_point,
@@ -85,9 +86,25 @@ class CurveModel(ABC):
         self._high = bounds[:, 1]
         self._step = np.where(logarithmic, _STEP, _STEP * np.minimum(1.0, bounds[:, 1] - bounds[:, 0]))
 
-    @abstractmethod
+    @property
+    def poisson_ratio(self) -> float:
+        """ν of the material."""
+        return self._skin.poisson_ratio
+
     def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
         """The quantities that govern the curves, numbers (points, 1), as changed by the mechanisms."""
+        modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
+        thickness_mm = self._skin.thickness_mm if "thickness" in nuisances else None
+        curve = Curve(
+            modulus=modulus,
+            poisson_ratio=constant(self.poisson_ratio, 0, modulus.value.shape[:-1]),
+            strain_share=nuisances.get(STRAIN_SHARE.name),
+            thickness=None if thickness_mm is None else to_si("thickness_mm", thickness_mm) * nuisances["thickness"],
+            times=self.times,
+        )
+        for mechanism in self._mechanisms:
+            mechanism.act(curve, values[mechanism.name])
+        return curve
 
     @abstractmethod
     def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
@@ -165,6 +182,8 @@ class CompressionModel(CurveModel):
     conditions alone, contact is around displacement 0 and the modulus must be declared.
     """
 
+    poisson_ratio = INCOMPRESSIBLE
+
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
         recordings = [recording for recording in conditions.recordings if isinstance(recording, CompressionConditions)]
@@ -176,17 +195,6 @@ class CompressionModel(CurveModel):
         self._shape_factor = diameter / (4 * self._height)
         self._loaded = np.array([_loaded(recording) for recording in recordings])[:, None]
         self._leaves = np.array([_leaves(recording) for recording in recordings])[:, None]
-
-    def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
-        modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
-        curve = Curve(
-            modulus=modulus,
-            poisson_ratio=constant(INCOMPRESSIBLE, 0, modulus.value.shape[:-1]),
-            times=self.times,
-        )
-        for mechanism in self._mechanisms:
-            mechanism.act(curve, values[mechanism.name])
-        return curve
 
     def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
         strain = (self.displacement - contact) / self._height

@@ -319,12 +319,7 @@ class FrfModel:
 
     def values_of(self, mechanism: Mechanism, variables: _Variables) -> Values:
         """A mechanism's parameters in their units."""
-        indices = self._composition.indices[mechanism.name]
-        values = {name: variables.of(index) for name, index in indices.items()}
-        for name, index in indices.items():
-            if other := self.parameters[index].relative_to:
-                values[name] = values[name] * values[other]
-        return values
+        return self._composition.values_of(mechanism.name, variables.of)
 
     def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False, lines: bool = True) -> Response:
         """The response at points (…, parameters); its derivatives by the parameters (`slopes`) and by the contact's

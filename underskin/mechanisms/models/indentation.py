@@ -17,9 +17,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from underskin.autodiff import constant
 from underskin.errors import InvalidInput
-from underskin.mechanisms.base import Mechanism, Parameter, Values
+from underskin.mechanisms.base import Mechanism, Parameter
 from underskin.mechanisms.laws.adhesion import Adhesion as AdhesionLaw
 from underskin.mechanisms.models.composition import (
     STRAIN_SHARE,
@@ -29,7 +28,7 @@ from underskin.mechanisms.models.composition import (
     thickness_parameter,
 )
 from underskin.mechanisms.models.curve_state import Curve, Samples, numbers, speeds
-from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
+from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.models.sphere_contact import (
     Adhesion,
     Layers,
@@ -90,20 +89,6 @@ class IndentationModel(CurveModel):
         ]
         self._again = np.array([presses_again(travel) for travel in travels])
         self._deep = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
-
-    def _curve(self, values: dict[str, Values], nuisances: Values) -> Curve:
-        thickness = self._skin.thickness_mm
-        modulus = declared_modulus(self._skin.youngs_modulus_mpa) * nuisances["youngs_modulus"]
-        curve = Curve(
-            modulus=modulus,
-            poisson_ratio=constant(self._skin.poisson_ratio, 0, modulus.value.shape[:-1]),
-            strain_share=nuisances[STRAIN_SHARE.name],
-            thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
-            times=self.times,
-        )
-        for mechanism in self._mechanisms:
-            mechanism.act(curve, values[mechanism.name])
-        return curve
 
     def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
         travel = self.displacement - contact

@@ -20,7 +20,7 @@ from underskin.mechanisms.base import Kind, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve, SampleLaw, Samples
 from underskin.mechanisms.unlisted.forms import EVERYWHERE, Axis, Feature, Shape, reference, shapes
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
-from underskin.mechanisms.unlisted.laws import PREFIX, LagLaw, LawDescription, RecordingLaw, UnlistedLaw, changes
+from underskin.mechanisms.unlisted.laws import LagLaw, LawDescription, RecordingLaw, UnlistedLaw, changes
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, AXES, ActsOn, Form
 from underskin.units import Array, Floats
 
@@ -65,18 +65,14 @@ class CurveLaw(UnlistedLaw):
 
     def __init__(self, acts_on: ActsOn, axis: Axis, shape: Shape, extent: Extent) -> None:
         """Bind the form to the ranges of the campaign's curves."""
-        self.name = PREFIX + "__".join(filter(None, (acts_on, axis.name, shape.form, shape.variant)))
-        self.description = LawDescription(acts_on, axis.name, shape.form)
-        self.axis, self.shape = axis, shape
-        self._extent = extent
+        self.axis, self.shape, self.grid, self._extent = axis, shape, shape.points, extent
         unit, share, largest = {
             "force": ("N", _OF_LARGEST, extent.force_n),
             "position": ("mm", _OF_LARGEST, extent.depth_mm),
         }.get(acts_on, ("-", _RELATIVE, 1.0))
-        amplitudes = changes("law_change", unit, share * largest, shape.count, _MOST / share)
-        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
-        self.parameters_stated = (*amplitudes, *shape.shape_parameters)
-        self.grid = shape.points
+        sizes = changes("law_change", unit, share * largest, shape.count, _MOST / share)
+        description = LawDescription(acts_on, axis.name, shape.form)
+        self.describe(description, (shape.form, shape.variant), sizes, shape.shape_parameters)
 
     def act(self, state: Curve, values: Values) -> None:
         """Add the law at these parameter values to the curve's laws."""
@@ -219,9 +215,9 @@ def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitud
     a = amplitudes[0]
     sign, size = _signed(a)
     name = symbol(axis)
-    if axis.words and shape.form == "step":
-        return f"{sign} {size}·[{name} = {shape.variant}]"
     match shape.form:
+        case "power" if isinstance(law, CurveLaw):
+            return f"{sign} {size}·({name}/{_with_unit(axis.high, axis.unit)})^{number(values['law_exponent'])}"
         case "linear":
             return _linear_text(axis, shape, a)
         case "exponential":
@@ -241,7 +237,7 @@ def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitud
             inside = f"{name} − {_with_unit(onset, axis.unit)}" if above else f"{_with_unit(onset, axis.unit)} − {name}"
             return f"{sign} {slope}{per}·max(0, {inside})"
         case "step":
-            return f"{sign} {size}·[{name} > {_with_unit(float(shape.variant), axis.unit)}]"
+            return f"{sign} {size}·[{_beyond(axis, shape.variant)}]"
         case "periodic":
             size_of, start = wave(law, values, amplitudes)
             period = _with_unit(values["law_period"], axis.unit)
@@ -251,6 +247,13 @@ def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitud
             return f"{sign} {size}/(1 + ({_less(axis, values['law_centre'])}/{width})²)"
         case _:
             return f"+ s({name}), {f'a value for each {name}' if axis.words else 'a smooth course'}"
+
+
+def _beyond(axis: Axis, edge: str) -> str:
+    """Where a step applies."""
+    if axis.words:
+        return f"{symbol(axis)} = {edge}"
+    return "on the way back" if edge == TURN else f"{symbol(axis)} > {_with_unit(float(edge), axis.unit)}"
 
 
 def _linear_text(axis: Axis, shape: Shape, a: float) -> str:
@@ -307,16 +310,7 @@ def _of_lag(law: LagLaw, values: Numbers) -> str:
 
 
 def _of_curves(law: CurveLaw, values: Numbers) -> str:
-    amplitudes = [values[name] for name in law.amplitudes]
-    sign, size = _signed(amplitudes[0])
-    match law.description.form:
-        case "power":
-            over = f"{symbol(law.axis)}/{_with_unit(law.axis.high, law.axis.unit)}"
-            change = f"{sign} {size}·({over})^{number(values['law_exponent'])}"
-        case "step":
-            change = f"{sign} {size}·[on the way back]"
-        case _:
-            change = change_text(law, values, amplitudes)
+    change = change_text(law, values, [values[name] for name in law.amplitudes])
     return {
         "modulus": f"F = F0·(1 {change})",
         "gain": f"F read = F·(1 {change})",

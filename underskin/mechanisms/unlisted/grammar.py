@@ -24,7 +24,6 @@ from underskin.mechanisms.models.contact_state import FrfState
 from underskin.mechanisms.unlisted.forms import Axis, Shape, axes_of, constant, every_axis, shapes
 from underskin.mechanisms.unlisted.laws import (
     DISPERSIONS,
-    PREFIX,
     LagLaw,
     LawDescription,
     LevelTables,
@@ -63,11 +62,9 @@ class FrequencyLaw(UnlistedLaw):
         share: float = 1.0,
     ) -> None:
         """`factor` at frequencies, as a function of the amplitudes and the shape parameters."""
-        self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", form, variant])
-        self.description = LawDescription("frequency_response", "frequency_hz", form)
+        description = LawDescription("frequency_response", "frequency_hz", form)
+        self.describe(description, (form, variant), amplitudes, shape_parameters)
         self.variant, self.share, self.factor = variant, share, factor
-        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
-        self.parameters_stated = (*amplitudes, *shape_parameters)
         self.grid = np.array(grid, dtype=float).reshape(len(grid), -1)
 
     def act(self, state: FrfState, values: Values) -> None:

@@ -227,6 +227,16 @@ class UnlistedLaw(Mechanism):
     log_share: float = 0.0  # in the prior of an unlisted law
     screened_fits: tuple[Floats, ...] = ()  # fit coordinates from screenings
 
+    def describe(
+        self, of: LawDescription, variant: Sequence[str], sizes: Sequence[Parameter], shape: Sequence[Parameter]
+    ) -> None:
+        """Set the description, the name, which ends with the parts of its `variant`, and the parameters: the sizes of
+        changes, then those of its shape."""
+        self.description = of
+        self.name = PREFIX + "__".join(filter(None, (of.acts_on, of.axis, *variant)))
+        self.amplitudes = tuple(parameter.name for parameter in sizes)
+        self.parameters_stated = (*sizes, *shape)
+
     def guesses(self, conditions: object, kind: Kind) -> Sequence[Sequence[float]]:
         """The fits of screenings that found it."""
         return [
@@ -249,21 +259,14 @@ class RecordingLaw(UnlistedLaw):
 
     def __init__(self, acts_on: ActsOn, axis: Axis, shape: Shape, tables: LevelTables) -> None:
         """Bind the form to the axis of a campaign and to its levels."""
-        self.name = _name(acts_on, axis, shape)
-        self.description = LawDescription(acts_on, axis.name, shape.form)
-        self.axis, self.shape = axis, shape
-        self.share = shape.share
-        self._acts_on, self.tables = acts_on, tables
-        self._unit = _unit_of_change(acts_on)
-        scale = tables.usual_force if acts_on == "force" else 1.0
-        usual = _USUAL[acts_on] * scale
-        count = shape.count * (2 if acts_on == "position" else 1)
-        if shape.form == "free":
-            usual = usual / 2
-        amplitudes = changes("law_change", self._unit, usual, count)
-        self.amplitudes = tuple(parameter.name for parameter in amplitudes)
-        self.parameters_stated = (*amplitudes, *shape.shape_parameters)
-        self.grid = shape.points
+        self.axis, self.shape, self._acts_on, self.tables = axis, shape, acts_on, tables
+        self.share, self.grid = shape.share, shape.points
+        unit = {"force": "N", "position": "mm"}.get(acts_on, "-")
+        usual = _USUAL[acts_on] * (tables.usual_force if acts_on == "force" else 1.0)
+        usual = usual / 2 if shape.form == "free" else usual
+        sizes = changes("law_change", unit, usual, shape.count * (2 if acts_on == "position" else 1))
+        variant = ("relative" if axis.relative else "", shape.form, shape.variant)
+        self.describe(LawDescription(acts_on, axis.name, shape.form), variant, sizes, shape.shape_parameters)
 
     def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
         """The same law on other recordings."""
@@ -337,15 +340,6 @@ def changes(name: str, unit: str, usual: float, count: int, most: float = _MOST)
     return tuple(Parameter(label, unit, -most * usual, most * usual, prior, "linear", 0.0, _REASON) for label in names)
 
 
-def _unit_of_change(acts_on: ActsOn) -> str:
-    return {"force": "N", "position": "mm"}.get(acts_on, "-")
-
-
-def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
-    relative = "relative" if axis.relative else ""
-    return PREFIX + "__".join(filter(None, (acts_on, axis.name, relative, shape.form, variant, shape.variant)))
-
-
 class LagLaw(UnlistedLaw):
     """A phase lag, or a fall-off over the lines, that follows an axis of the recordings.
 
@@ -359,18 +353,16 @@ class LagLaw(UnlistedLaw):
 
     def __init__(self, dispersion: Dispersion, axis: Axis, shape: Shape, lines: Floats) -> None:
         """Over the band of these lines [Hz]."""
-        self.name = _name("frequency_response", axis, shape, dispersion)
-        self.description = LawDescription("frequency_response", axis.name, shape.form)
         self.axis, self.shape, self.dispersion = axis, shape, dispersion
         self.share = shape.share / len(DISPERSIONS)
         self.lowest_hz, self.highest_hz = float(lines[0]), float(lines[-1])
         self.middle_hz = float(np.exp(np.log(lines).mean()))
         usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(dispersion, 1.0)
-        power = shape.logarithmic
-        lags = changes("law_lag", "-", usual, shape.count)
-        self.amplitudes = tuple(parameter.name for parameter in lags)
-        self.parameters_stated = (*lags, *([_EXPONENT] if power else []), *shape.shape_parameters)
-        self.grid = _EXPONENTS if power else shape.points
+        self.grid = _EXPONENTS if shape.logarithmic else shape.points
+        of_shape = (_EXPONENT, *shape.shape_parameters) if shape.logarithmic else shape.shape_parameters
+        variant = ("relative" if axis.relative else "", shape.form, dispersion, shape.variant)
+        description = LawDescription("frequency_response", axis.name, shape.form)
+        self.describe(description, variant, changes("law_lag", "-", usual, shape.count), of_shape)
 
     def on(self, axis: Axis) -> "LagLaw":
         """The same law on other recordings."""
