@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
-from underskin.findings.formatting import in_digits, significant
+from underskin.findings.formatting import few, in_digits, significant
 from underskin.findings.sentences import (
     DefectKind,
     ImplausibleD33,
@@ -28,7 +28,6 @@ from underskin.findings.sentences import (
     labels_permuted,
     lines_left_out,
     listed,
-    listed_sensors,
     more_alike,
     no_simple_law,
     noise_in_frf,
@@ -71,13 +70,14 @@ class _Template(string.Formatter):
         return str(super().format_field(value, format_spec))
 
 
+_MOST_SENSORS = 3  # named one by one
 _WORDS: Mapping[str, Callable[[Any, str], str]] = {
     "digits": lambda value, digits: in_digits(value, int(digits)),
     "significant": lambda value, digits: significant(value, int(digits)),
     "or": lambda texts, _: ", or ".join(texts),
     "count": lambda ids, _: str(len(ids)),
     "listed": listed,
-    "sensors": lambda ids, _: listed_sensors(ids),
+    "sensors": lambda ids, _: f"sensors {few(ids, _MOST_SENSORS)}",
     "more": more_alike,
     "defect": lambda kind, _: DefectKind(kind).words,
     "implausible": lambda kind, _: ImplausibleD33(kind).words,

@@ -39,6 +39,11 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
+def few(names: Sequence[str], most: int) -> str:
+    """The first names, joined, and the number of further ones."""
+    return listed([*names[:most], *([f"{len(names) - most} more"] if len(names) > most else [])])
+
+
 _END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # end of a sentence within a clause
 _END_OR_STOP = re.compile(r"([.?!]) +")
 _STOP = re.compile(r"\. +")

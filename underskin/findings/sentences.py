@@ -78,7 +78,6 @@ class DefectKind(StrEnum):
         }[self]
 
 
-_MOST_SENSORS = 3  # named one by one
 _MOST_CURVES = 6  # with their moduli, in a sentence
 _MOST_LISTED = 6
 
@@ -165,13 +164,6 @@ def curves_differ(ids: Sequence[str], factors: Sequence[float], remedies: Sequen
 def more_alike(count: int, noun: str) -> str:
     """The number of further cases, in brackets; empty for 0."""
     return f" ({count} more {noun}{'s' if count > 1 else ''} like it)" if count else ""
-
-
-def listed_sensors(ids: Sequence[str]) -> str:
-    """Some sensors by their ids."""
-    if len(ids) > _MOST_SENSORS:
-        return f"sensors {', '.join(ids[:_MOST_SENSORS])} and {len(ids) - _MOST_SENSORS} more"
-    return f"sensors {', '.join(ids[:-1])} and {ids[-1]}"
 
 
 def listed(ids: Sequence[str], noun: str) -> str:

@@ -6,6 +6,7 @@ the low frequencies as they are, or the high ones, and d33 differs by what the l
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,10 @@ from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.residuals import declared_d33, with_hidden_mechanism
 from underskin.diagnosis.reporting.numbers import (
     HIDES,
-    LEAST_DESCRIBED,
     covariance_of,
-    explanations_of,
     law_levels,
     of_logarithms,
+    over_answers,
     parameter_index,
 )
 from underskin.diagnosis.selection.answers import Search
@@ -42,21 +42,15 @@ def d33_over_answers(search: Search, problem: FittingProblem, unsure: float) -> 
     tolerances of the skin's declared values widen the interval, but not `relative`, which is for comparing sensors,
     dates and spheres. `unsure` is a further relative standard uncertainty.
     """
-    weighted = explanations_of(search)
-    if sum(probability for probability, _ in weighted) < LEAST_DESCRIBED:
+    parts = over_answers(search, partial(_d33_under, search, problem))
+    if not parts:
         return None
-    mixtures = [
-        _d33_under(search, problem, explanation, probability).times(probability)
-        for probability, explanation in weighted
-    ]
-    mixture = NormalMixture.joined(mixtures)
-    declared = np.repeat(
-        [declared_d33(problem, explanation) for _, explanation in weighted], [len(part.share) for part in mixtures]
-    )
+    mixture = NormalMixture.joined([part for _, part in parts])
+    declared = np.repeat([declared_d33(problem, fit) for fit, _ in parts], [len(part.share) for _, part in parts])
     shares = mixture.share / mixture.share.sum()
     relative = np.hypot(mixture.deviation, unsure)
     relative_ends = of_logarithms(shares, mixture.mean, relative)
-    _, first = weighted[0]
+    first, _ = parts[0]
     return {
         "name": "d33",
         "unit": first.model.parameters[parameter_index(first, "d33")].unit,

@@ -4,7 +4,6 @@
 in sample and on held-out groups, mechanisms with their parameters, d33 and whether it is to be quoted, findings.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -22,7 +21,6 @@ from underskin.diagnosis.reporting.modulus import modulus_over_answers, modulus_
 from underskin.diagnosis.reporting.numbers import parameter_index, parameters_of, rounded
 from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, law_document
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Power
@@ -37,9 +35,7 @@ from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
 from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign
 
-_STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})
-# Mechanisms that stiffen the response with depth, as a layer on a stiff base does
-_STIFFENS = (*_STIFFER_WITH_DEPTH, "compressible_layer")
+_STIFFENS = ("layered_contact", "strain_stiffening", "compressible_layer")  # as a layer on a stiff base, with depth
 _ALONG_CURVE = ("displacement_mm", "force_n")  # axes along which the contact's force grows itself
 _LARGEST_FLOOR = 20.0  # % of the response: noise above which no d33 is quoted
 
@@ -107,7 +103,6 @@ class Facts:
         if self.leader.names == (NOTHING_MISSING,):
             return "no_mismatch"
         certain = self.leader.probability >= EXPLAINED and not self.idle and not self.doubts
-        certain = certain and not self._may_be_the_other
         return "explained" if certain else "ambiguous"
 
     @cached_property
@@ -122,11 +117,6 @@ class Facts:
             return []
         names = self.shown.names
         return [name for name in numbers.without_effect(self.shown) if not self.joined.shows_on_curves(name, names)]
-
-    @property
-    def _has_unknown_thickness(self) -> bool:
-        """Whether an indented sample has no declared thickness."""
-        return self.problem.kind == "indentation" and self.problem.lines.campaign.skin.thickness_mm is None
 
     @property
     def curves_differ(self) -> list[str]:
@@ -146,22 +136,6 @@ class Facts:
             for finding in self.diagnosis.findings
             if finding.reason == Reason.THICKNESS_DIFFERS or (finding.reason == Reason.HELD_OUT_NO_BETTER and is_far)
         ]
-
-    @property
-    def _may_be_the_other(self) -> bool:
-        """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens with depth.
-
-        That is so where the evidence of one in place of the other is above that which an idealised contact law may
-        have.
-        """
-        names = frozenset(self.shown.names)
-        stiffening = names & _STIFFER_WITH_DEPTH
-        if not self._has_unknown_thickness or len(stiffening) != 1:
-            return False
-        other = names ^ _STIFFER_WITH_DEPTH
-        least = self.shown.log_evidence - least_evidence(self.shown)
-        evidence = {frozenset(fitted.names): fitted.log_evidence for fitted in self.search.explanations}
-        return evidence.get(other, -math.inf) > least
 
     @cached_property
     def leading(self) -> LeadingLaw | None:
@@ -451,14 +425,14 @@ class Facts:
 
     def _thickness_unknown(self) -> list[Finding]:
         """A thickness inferred from curves alone."""
-        mechanisms = self.problem.lines.mechanisms
+        mechanisms, campaign = self.problem.lines.mechanisms, self.problem.lines.campaign
         stiffening = [
             name
             for name in self.shown.names
             if name in _STIFFENS
             or (isinstance(law := mechanisms[name], CurveLaw) and law.description.axis in _ALONG_CURVE)
         ]
-        if not self._has_unknown_thickness or not stiffening:
+        if self.problem.kind != "indentation" or campaign.skin.thickness_mm is not None or not stiffening:
             return []
         is_tried = "layered_contact" in mechanisms.named
         arguments = {"answer": self._answer(stiffening), "is_tried": is_tried}

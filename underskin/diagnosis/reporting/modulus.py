@@ -25,11 +25,8 @@ def modulus_under(problem: FittingProblem, explanation: Explanation) -> dict[str
 def modulus_over_answers(search: Search, problem: FittingProblem, shown: Explanation) -> dict[str, Any] | None:
     """The report's E of curves over all answers; `shown`, the fit behind the leading one, tells whether E is at a bound
     of its search. None where answers without a fit are more probable than all others: nothing describes the curves."""
-    weighted = numbers.explanations_of(search)
-    if sum(probability for probability, _ in weighted) < numbers.LEAST_DESCRIBED:
-        return None
-    mixtures = [_log_modulus(problem, explanation).times(probability) for probability, explanation in weighted]
-    return _entry(problem, shown, NormalMixture.joined(mixtures))
+    parts = numbers.over_answers(search, lambda explanation, _: _log_modulus(problem, explanation))
+    return _entry(problem, shown, NormalMixture.joined([part for _, part in parts])) if parts else None
 
 
 def _log_modulus(problem: FittingProblem, explanation: Explanation) -> NormalMixture:

@@ -8,7 +8,7 @@
 - Sensors whose d33 lies far from the others'.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.special import chdtri
 from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, MOST_NAMED, NAMED
 from underskin.diagnosis.inference.evidence import levels_covariance, profile_end
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.inference.residuals import residuals, row_prediction, with_hidden_mechanism
 from underskin.diagnosis.selection.answers import Answer, Search
@@ -246,6 +247,17 @@ def explanations_of(search: Search) -> list[tuple[float, Explanation]]:
             explanations[key] = explanation
             probabilities[key] = answer.probability * share + probabilities.get(key, 0.0)
     return [(probability, explanations[key]) for key, probability in probabilities.items() if probability > COUNTS]
+
+
+def over_answers(
+    search: Search, under: Callable[[Explanation, float], NormalMixture]
+) -> list[tuple[Explanation, NormalMixture]]:
+    """A quantity `under` each explanation and its probability, times that probability; none where answers without a fit
+    are more probable than all others."""
+    weighted = explanations_of(search)
+    if sum(probability for probability, _ in weighted) < LEAST_DESCRIBED:
+        return []
+    return [(fit, under(fit, probability).times(probability)) for probability, fit in weighted]
 
 
 _LEVELS = 9  # quantiles over the rows

@@ -32,6 +32,7 @@ from underskin.diagnosis.reporting.page_styles import (
     is_logarithmic,
     with_minus,
 )
+from underskin.findings.formatting import in_digits
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.base import Parameter
 from underskin.units import Floats, readable_unit
@@ -388,13 +389,8 @@ def _label(shown: ShownFrf, both: bool) -> str:
     recording, drawn = shown.recording, len(shown.frequency_hz)
     where = f"{recording.sensor}, R {recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
     lines = "" if drawn == shown.count else f"; {drawn} of {shown.count} lines"
-    before, after = map(_percent, shown.misfits.values())
+    before, after = (f"{in_digits(misfit, 2)} %" for misfit in shown.misfits.values())
     return f"{recording.id} ({where}): misfit {f'{before} before, {after} after' if both else after}{lines}"
-
-
-def _percent(value: float) -> str:
-    """Two digits, never as a power of ten."""
-    return np.format_float_positional(value, precision=2, fractional=False, trim="-") + " %"
 
 
 _MARGIN = 1.0  # of an interval, on either side of it

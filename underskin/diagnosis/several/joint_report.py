@@ -39,7 +39,7 @@ from underskin.diagnosis.several.sensors import (
 )
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.findings.formatting import in_percent, listed, of_clauses
+from underskin.findings.formatting import few, in_percent, listed, of_clauses
 from underskin.inversion.array_history import FEWEST_DATES, TWO_DATES, array_change_in_words
 from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.units import Floats
@@ -440,13 +440,13 @@ def _failure_clauses(skin: SkinOverDates) -> dict[str, str]:
     clauses = {}
     for failure, sensors in skin.failures.items():
         single = len(sensors) == 1
-        who, few = (f"sensor{'' if single else 's'} {named}" for named in (listed(sensors), _few(sensors)))
+        who, brief = (f"sensor{'' if single else 's'} {named}" for named in (listed(sensors), few(sensors, MOST_NAMED)))
         state, _, why = failure.fault.partition(": ")
         start = skin.dates.called(failure.first)
         if failure.after is not None:
             again = f"answer{'s' if single else ''} again on {skin.dates.called(failure.after)}"
             was = f"{'was' if single else 'were'} {state} on {start}"
-            clauses[f"{few} {was}"] = f"{who} {was} ({why}) and {again}; left out of what is compared there"
+            clauses[f"{brief} {was}"] = f"{who} {was} ({why}) and {again}; left out of what is compared there"
             continue
         when, earlier = "in all campaigns", ""
         if failure.before is not None:
@@ -455,7 +455,7 @@ def _failure_clauses(skin: SkinOverDates) -> dict[str, str]:
             level = f"{listed(had)} pC/N" if had else "a response"
             when, earlier = f"since {start}", f", after {level} on {skin.dates.called(failure.before)}"
         is_so = f"{'is' if single else 'are'} {state} {when}"
-        clauses[f"{few} {is_so}"] = f"{who} {is_so}: {why}{earlier}; left out of all that follows"
+        clauses[f"{brief} {is_so}"] = f"{who} {is_so}: {why}{earlier}; left out of all that follows"
     return clauses
 
 
@@ -471,7 +471,7 @@ def _exchange_clauses(skin: SkinOverDates) -> dict[str, str]:
         )
         look = f"look exchanged since {skin.dates.called(ring[0].since)}"
         names, source = [str(change.sensor) for change in ring], "the other" if len(ring) == 2 else "another"
-        clauses[f"sensors {_few(names)} {look}"] = (
+        clauses[f"sensors {few(names, MOST_NAMED)} {look}"] = (
             f"sensors {listed(names)} {look}: each has the d33 that {source} had ({sizes})"
         )
     return clauses
@@ -568,17 +568,12 @@ def _d33_of_skins(
         of_fleet = [f"its own diagnosis lacks {in_words(lacking)}"] if lacking else []
         by_reason.setdefault(" and ".join(report.d33.reasons or of_fleet), []).append(skin)
     may = by_reason.pop("")
-    others = [f"not of {_few(skins)} ({reason})" for reason, skins in by_reason.items()]
-    quotable = ", ".join([f"of {_few(may) if may else 'none'}", *others])
+    others = [f"not of {few(skins, MOST_NAMED)} ({reason})" for reason, skins in by_reason.items()]
+    quotable = ", ".join([f"of {few(may, MOST_NAMED) if may else 'none'}", *others])
     return (
         f"d33 is not to be quoted, because {d33['mean']:.3g} {d33['unit']} is the mean of the skins and no skin's own; "
         f"by its own recordings alone it may be quoted {quotable}"
     )
-
-
-def _few(skins: Sequence[str]) -> str:
-    further = len(skins) - MOST_NAMED
-    return listed([*skins[:MOST_NAMED], *([f"{further} more"] if further > 0 else [])])
 
 
 def _population(quantity: PooledQuantity) -> dict[str, Any]:

@@ -195,20 +195,18 @@ class DeclaredOfFrf(DeclaredMechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Axes that recordings lack, or that do not vary."""
-        axes = self.bound.axes if self.bound is not None else _bound(conditions).axes
+        axes, names = (self.bound or _bound(conditions)).axes, self.axes_of_recordings
         ids = [recording.id for recording in conditions.recordings]
-        for name in self.axes_read:
-            if name == FREQUENCY:
-                continue
+        for name in names:
             if name not in axes:
                 return f"not every recording has {name}, as a number"
-        differing = [name for name in self.axes_read if name != FREQUENCY]
-        same = all(len({axes[name][key] for key in ids}) == 1 for name in differing)
-        return f"{differing[0]} is the same in all recordings" if differing and same and not self._of_lines else None
+        same = FREQUENCY not in self.axes_read and all(len({axes[name][key] for key in ids}) == 1 for name in names)
+        return f"{names[0]} is the same in all recordings" if same else None
 
     @property
-    def _of_lines(self) -> bool:
-        return FREQUENCY in self.axes_read
+    def axes_of_recordings(self) -> list[str]:
+        """The axes that the law reads, without frequency."""
+        return [name for name in self.axes_read if name != FREQUENCY]
 
     def _evaluated(self, values: Values, axes: dict[str, Floats], rows: int) -> list[Differentiated]:
         """The value of each expression on this number of rows."""
@@ -224,7 +222,7 @@ class DeclaredOfFrf(DeclaredMechanism):
 
     def _axes(self, design: FrfDesign, ids: Sequence[str]) -> dict[str, Floats]:
         bound = self.bound or _bound(design.conditions)
-        return {name: np.array([bound.axes[name][key] for key in ids]) for name in self.axes_read if name != FREQUENCY}
+        return {name: np.array([bound.axes[name][key] for key in ids]) for name in self.axes_of_recordings}
 
 
 class DeclaredOfRecordings(DeclaredOfFrf):
@@ -257,7 +255,7 @@ class DeclaredOfLines(DeclaredOfFrf):
     @property
     def reads(self) -> tuple[str, ...]:  # type: ignore[override]
         """The recordings, where the law reads an axis of theirs."""
-        return ("id",) if any(name != FREQUENCY for name in self.axes_read) else ()
+        return ("id",) if self.axes_of_recordings else ()
 
     def act(self, state: FrfState, values: Values) -> None:
         """Set the complex factor on each distinct line."""
