@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.mechanisms.models.composed import Model
-from underskin.recordings.campaign import FrfRecording
+from underskin.mechanisms.models.composition import Prediction
+from underskin.mechanisms.models.frf import FrfModel
+from underskin.recordings.campaign import Campaign, Conditions, FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.frf.flat_zone import without_chain_phase
 from underskin.recordings.frf.spectra import stacked
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, Mask
 
 LEAST_RECORDINGS = 3  # so that one can contradict the others
@@ -26,6 +28,25 @@ LEAST_LINES = 4  # for a median of their differences
 _MEAN, _LINES = 9.0, 3.0  # over their variance
 _FLAT_HZ = 130.0  # below it the response is about flat
 LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a zero crossing, a level or sign is not informative
+
+
+_ONE_LINE = np.ones(1)  # Hz: the base model is the same at all
+
+
+def base_model(
+    campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable, lines_hz: Floats = _ONE_LINE
+) -> tuple[FrfModel, Floats, Prediction]:
+    """The base model of recordings' contacts at these lines, its declared values, and the FRFs by them."""
+    contacts = tuple(recording.without_measurements(frequency_hz=lines_hz) for recording in recordings)
+    model = FrfModel((), Conditions("contacts", campaign.skin, contacts), table)
+    start = np.array([parameter.start for parameter in model.parameters])
+    return model, start, model.predict(start)
+
+
+def position_slopes(prediction: Prediction) -> Floats:
+    """|∂FRF/∂position| (rows,) [C/N/mm]."""
+    assert prediction.position_slopes is not None
+    return np.asarray(1e-3 * np.hypot(*np.abs(prediction.position_slopes)))
 
 
 def aligned_lines(recordings: Sequence[FrfRecording]) -> list[Complexes]:
@@ -77,12 +98,10 @@ class Comparison:
     expected: Floats
 
 
-def compared(recordings: Sequence[FrfRecording], model: Model) -> Comparison:
-    """The recordings compared with the base model."""
+def compared(recordings: Sequence[FrfRecording], shape: Floats) -> Comparison:
+    """The recordings compared with the base model's FRFs (recordings,) [C/N]."""
     aligned = aligned_lines(recordings)
     unresponsive, variance = no_response(aligned)
-    predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
-    shape = predicted[np.searchsorted(model.recording, np.arange(len(aligned)))].real
     telling = ~unresponsive & (np.abs(shape) > LEAST_RESPONSE * np.abs(shape[~unresponsive]).max(initial=0.0))
     flat = [_flat(lines_of(recording).frequency) for recording in recordings]
     median = np.array([float(np.nanmedian(values.real[low])) for values, low in zip(aligned, flat, strict=True)])

@@ -17,21 +17,20 @@ the other stays as wrong as before; the gain of each sensor shows this.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import dist, log
 
 import numpy as np
 from scipy.special import logsumexp
 
-from underskin.diagnosis.slips.comparison import aligned_lines, flat_level, no_response
+from underskin.diagnosis.slips.comparison import aligned_lines, base_model, flat_level, no_response, position_slopes
 from underskin.diagnosis.slips.levels import LEAST_LEVELS, POSITION_MM, Alternative
 from underskin.diagnosis.slips.table import ASTRAY, GAIN, Screened
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.unlisted.forms import recording_order
-from underskin.recordings.campaign import Conditions, FrfRecording
+from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats
 
 _SCATTER, _REACHES = 0.2, 0.05  # s, f; p is the largest of a stage
@@ -133,19 +132,10 @@ def _responses(screened: Screened, indices: Sequence[int], sensors: Sequence[str
     """|FRF| of the base model [C/N] and its slope over position [C/N/mm] (2, recordings) if the given sensors answered;
     the contact is on the sensor that the recording names where its position is not given."""
     chosen = [screened.recordings[index] for index in indices]
-    contacts = tuple(
-        recording.without_measurements(
-            frequency_hz=np.ones(1),
-            sensor=sensor,
-            position_mm=recording.position_mm or screened.positions[recording.sensor],
-        )
-        for recording, sensor in zip(chosen, sensors, strict=True)
-    )
-    model = compose((), Conditions("contacts", screened.campaign.skin, contacts), screened.table, "frf")
-    prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
-    assert prediction.position_slopes is not None
-    slope = 1e-3 * np.hypot(*np.abs(prediction.position_slopes))
-    return np.nan_to_num([np.abs(prediction.value), slope])
+    pressed = [recording.position_mm or screened.positions[recording.sensor] for recording in chosen]
+    there = [replace(one, sensor=name, position_mm=at) for one, name, at in zip(chosen, sensors, pressed, strict=True)]
+    *_, prediction = base_model(screened.campaign, there, screened.table)
+    return np.nan_to_num([np.abs(prediction.value), position_slopes(prediction)])
 
 
 def _permutations(links: Sequence[tuple[str, str]], best: Labels) -> list[dict[str, str]]:

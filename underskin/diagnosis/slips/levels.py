@@ -27,7 +27,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.noise import GAIN_FALL, Plateau
-from underskin.diagnosis.slips.comparison import LEAST_RESPONSE, flat_level
+from underskin.diagnosis.slips.comparison import LEAST_RESPONSE, base_model, flat_level, position_slopes
 from underskin.findings.finding import Finding
 from underskin.halton import halton
 from underskin.inversion.mixed_model import GAIN_RANGE
@@ -96,17 +96,13 @@ class Levels:
 def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable) -> Levels:
     """The levels of a campaign's recordings, whose signs are correct."""
     subset = replace(campaign, recordings=tuple(recordings))
-    model = compose((), subset, table, "frf")
-    prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
-    first = np.searchsorted(model.recording, np.arange(len(recordings)))
-    shape = np.abs(prediction.value[first].real)
+    model, _, prediction = base_model(campaign, recordings, table)
+    shape = np.abs(prediction.value.real)
     level = np.array([flat_level(recording) for recording in recordings])
     chosen = np.flatnonzero(
-        model.valid[first] & (shape > LEAST_RESPONSE * shape.max(initial=0.0)) & (level > 0) & np.isfinite(level)
+        model.valid & (shape > LEAST_RESPONSE * shape.max(initial=0.0)) & (level > 0) & np.isfinite(level)
     )
-    slope = np.zeros(len(recordings))
-    if prediction.position_slopes is not None:
-        slope = 1e-3 * np.hypot(*np.abs(prediction.position_slopes[:, first])) / np.where(shape > 0, shape, 1.0)
+    slope = position_slopes(prediction) / np.where(shape > 0, shape, 1.0)
     offset = offsets(subset)
     columns = [axis.of([recording.id for recording in recordings]) for axis in axes_of(subset)]
     columns += [*offset.T, np.hypot(*offset.T)]
@@ -176,11 +172,7 @@ class Explained:
 
 def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Levels, table: SigmaTable) -> list[Cause]:
     """All causes that may change the levels of a campaign's recordings, for the rows of `levels`."""
-    contacts = tuple(recording.without_measurements(frequency_hz=np.ones(1)) for recording in recordings)
-    conditions = Conditions("contacts", campaign.skin, contacts)
-    base = compose((), conditions, table, "frf")
-    start = np.array([parameter.start for parameter in base.parameters])
-    prediction = base.predict(start)
+    base, start, prediction = base_model(campaign, recordings, table)
     value = prediction.value[levels.index]
     declared = np.stack(
         [
@@ -191,7 +183,7 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
         axis=1,
     )
     laws = []
-    for model in models_of_laws(conditions, table, along_frequency=False).values():
+    for model in models_of_laws(base.design.conditions, table, along_frequency=False).values():
         if not any(parameter.moves_covariance for parameter in model.parameters):
             relative = np.abs([changed[levels.index] / value for changed in model.values(_drawn(model, start))])
             change = np.log(np.maximum(relative, _LEAST_RATIO))

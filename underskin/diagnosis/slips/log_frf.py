@@ -5,19 +5,18 @@ prior, which costs ½ χ² as its density falls.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from scipy.optimize import nnls
 
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.slips.comparison import LEAST_LINES
+from underskin.diagnosis.slips.comparison import LEAST_LINES, base_model
 from underskin.diagnosis.slips.levels import models_of_laws
 from underskin.mechanisms.base import Normal, Parameter
-from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import Campaign, Conditions, frf_recordings
+from underskin.recordings.campaign import Campaign, frf_recordings
 from underskin.recordings.frf.line_choice import MAINS_HZ
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Complexes, Floats, Mask
@@ -133,18 +132,16 @@ def listed_elements(campaign: Campaign, table: SigmaTable, frequency: Floats) ->
     order = np.argsort([recording.preload_n * recording.indenter_radius_mm for recording in frf_recordings(campaign)])
     some = order[np.linspace(0, len(order) - 1, _CONTACTS).astype(int)]
     recordings = [frf_recordings(campaign)[index] for index in some.tolist()]
-    contacts = [one.without_measurements(frequency_hz=frequency, position_mm=None) for one in recordings]
-    conditions = Conditions("contacts", campaign.skin, tuple(contacts))
-    base = compose((), conditions, table, "frf")
-    start = np.array([parameter.start for parameter in base.parameters])
+    contacts = [replace(one, position_mm=None) for one in recordings]
+    base, start, prediction = base_model(campaign, contacts, table, frequency)
     listed = {}
-    for name, model in models_of_laws(conditions, table, along_frequency=True).items():
+    for name, model in models_of_laws(base.design.conditions, table, along_frequency=True).items():
         if "phase" not in CATALOGUE[name].axes:
             continue
         points, cost = _over_prior(model.parameters[: len(model.parameters) - len(start)])
         values = np.array(list(model.values(np.hstack([points, np.tile(start, (len(points), 1))]))))
         with np.errstate(divide="ignore", invalid="ignore"):
-            logarithm = np.log(values / base.predict(start).value).reshape(len(points), _CONTACTS, -1).mean(axis=1)
+            logarithm = np.log(values / prediction.value).reshape(len(points), _CONTACTS, -1).mean(axis=1)
         if np.isfinite(logarithm).all():  # not beyond the tables
             listed[name] = logarithm.T, cost
     return listed

@@ -13,7 +13,7 @@ from math import isnan, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.comparison import Comparison, compared, times
+from underskin.diagnosis.slips.comparison import Comparison, base_model, compared, times
 from underskin.diagnosis.slips.levels import (
     LEAST_LEVELS,
     NO_SLIP,
@@ -26,7 +26,6 @@ from underskin.diagnosis.slips.levels import (
     levels,
 )
 from underskin.findings.finding import Finding
-from underskin.mechanisms.models.composed import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask
@@ -53,8 +52,8 @@ class Screened:
     @cached_property
     def comparison(self) -> Comparison:
         """The recordings beside the base model and each other."""
-        model = compose((), replace(self.campaign, recordings=tuple(self.recordings)), self.table, "frf")
-        return compared(self.recordings, model)
+        *_, prediction = base_model(self.campaign, self.recordings, self.table)
+        return compared(self.recordings, prediction.value.real)
 
     @cached_property
     def levels(self) -> Levels | None:
