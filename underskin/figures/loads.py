@@ -1,6 +1,7 @@
 """Several loads, or a map of pressure, on an array, and the charge on its sensors."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -10,7 +11,6 @@ from underskin.array_stress.answer import BaseStress
 from underskin.diagnosis.reporting.page_styles import BOUND
 from underskin.figures.array_map import Quantity, array_map
 from underskin.figures.style import COLOURS, styled
-from underskin.units import Floats
 
 _ROOM = 0.06  # of the map, between a load and its edge
 _TENSION = 0.01  # of the largest compression, below which colours do not show tension
@@ -70,16 +70,8 @@ def pressure_on_array(
             hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>%{z:.5g} MPa<extra></extra>",
         )
     )
-    outlines = [_circle(position, sensor_radius_mm) for position in sensors_mm]
-    figure.add_scatter(
-        x=np.concatenate([x for x, _ in outlines]),
-        y=np.concatenate([y for _, y in outlines]),
-        mode="lines",
-        name="sensor",
-        hoverinfo="skip",
-        showlegend=True,
-        line={"color": "#D55E00", "width": 2},
-    )
+    look = {"showlegend": True, "line": {"color": "#D55E00", "width": 2}}
+    _outline(figure, "sensor", sensors_mm, [sensor_radius_mm] * len(sensors_mm), look)
     figure.update_xaxes(title="x [mm]", showgrid=False, zeroline=False)
     figure.update_yaxes(title="y [mm]", showgrid=False, zeroline=False, scaleanchor="x", scaleratio=1)
     return styled(figure, "Pressure on the array")
@@ -112,21 +104,10 @@ def stress_on_base(
             hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>compression %{z:.4g} MPa<extra></extra>",
         )
     )
-    contacts = [
-        _circle(position, radius) for position, radius in zip(contacts_mm, stress.contact_radius_mm, strict=True)
-    ]
-    for name, outlines, line in (
-        ("contact", contacts, {"color": COLOURS[3], "width": 2, "dash": BOUND}),
-        ("sensor", [_circle(position, sensor_radius_mm) for position in sensors_mm], {"color": COLOURS[1], "width": 2}),
-    ):
-        figure.add_scatter(
-            x=np.concatenate([x for x, _ in outlines]),
-            y=np.concatenate([y for _, y in outlines]),
-            mode="lines",
-            name=name,
-            hoverinfo="skip",
-            line=line,
-        )
+    edge = {"line": {"color": COLOURS[3], "width": 2, "dash": BOUND}}
+    _outline(figure, "contact", contacts_mm, stress.contact_radius_mm, edge)
+    disc = {"line": {"color": COLOURS[1], "width": 2}}
+    _outline(figure, "sensor", sensors_mm, [sensor_radius_mm] * len(sensors_mm), disc)
     for update, coordinates in ((figure.update_xaxes, stress.x_mm), (figure.update_yaxes, stress.y_mm)):
         update(
             range=[float(coordinates[0]), float(coordinates[-1])], constrain="domain", showgrid=False, zeroline=False
@@ -136,7 +117,11 @@ def stress_on_base(
     return styled(figure, "Stress on the base")
 
 
-def _circle(centre: tuple[float, float], radius: float) -> tuple[Floats, Floats]:
-    """The outline of a circle, followed by a gap."""
+def _outline(
+    figure: go.Figure, name: str, centres: Sequence[tuple[float, float]], radii: ArrayLike, look: dict[str, Any]
+) -> None:
+    """Draw circles, each followed by a gap."""
     angle = np.append(np.linspace(0, 2 * np.pi, 33), np.nan)
-    return centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)
+    (x, y), radius = np.reshape(centres, (-1, 2)).T[..., None], np.asarray(radii)[:, None]
+    along, across = (x + radius * np.cos(angle)).ravel(), (y + radius * np.sin(angle)).ravel()
+    figure.add_scatter(x=along, y=across, mode="lines", name=name, hoverinfo="skip", **look)

@@ -17,7 +17,6 @@ from underskin.findings.formatting import capital, in_percent
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 
 WORDS = 20  # read at a glance
-_DIGITS = 3
 _DOUBTS = (FindingCode.THICKNESS_DIFFERS, FindingCode.PULLED_OR_PRESSED)
 _LAYER = "layered_contact"  # the name of the law, which says little to who reads a headline alone
 
@@ -140,7 +139,7 @@ def _with_strength(mechanism: Document) -> str:
 def _value(parameter: Document) -> str:
     parameter = in_its_unit(parameter)
     called = quantity_in_words(parameter["name"])
-    value, low, high = (number(parameter[end], _DIGITS) for end in ("value", "low", "high"))
+    value, low, high = (number(parameter[end], digits=3) for end in ("value", "low", "high"))
     size = f"{value} {unit(parameter['unit'])}".rstrip()
     if parameter.get("at_bound"):
         return f"{called} at or beyond {size}"

@@ -224,7 +224,6 @@ COUNTS = 0.003  # probability below which an answer is left out of averages
 LEAST_DESCRIBED = 0.5  # probability of all answers with a fit, below which none has a number
 HIDES = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
 _TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
-_LEAST_NAMED = 3  # groups, however improbable
 _ALIKE = 0.5  # of the noise: answers that differ by less have the same predictions
 
 
@@ -309,7 +308,7 @@ def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any
     return [
         {"mechanisms": group, "probability": round(probability, 3)}
         for rank, (probability, group) in enumerate(groups)
-        if rank < _LEAST_NAMED or probability >= NAMED
+        if rank < MOST_NAMED or probability >= NAMED
     ]
 
 

@@ -393,7 +393,6 @@ def _label(shown: ShownFrf, both: bool) -> str:
     return f"{recording.id} ({where}): misfit {f'{before} before, {after} after' if both else after}{lines}"
 
 
-_MARGIN = 1.0  # of an interval, on either side of it
 _ROW, _SPACING = 140, 0.73  # height of a parameter's row [pixels], and the share of it for labels
 
 
@@ -424,7 +423,7 @@ def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, An
             x=[parameter["value"]], y=[0], mode="markers", name="most probable", showlegend=panel == 1,
             marker={"color": MEASURED, "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=panel, col=1,
         )  # fmt: skip
-        margin = _MARGIN * (high - low) or 0.1 * abs(low) or 1.0
+        margin = (high - low) or 0.1 * abs(low) or 1.0
         start = low - margin if low < 0 else max(low - margin, 0.0)  # positive parameters have no negative range
         figure.update_xaxes(range=[start, high + margin], row=panel, col=1)
     figure.update_yaxes(visible=False, range=[-1, 1])

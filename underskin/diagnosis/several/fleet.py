@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
@@ -44,7 +44,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST_SKINS = 3  # of a population
-_PRUNE_NATS = 40.0  # nats behind the best set of a skin, at most
 _P_DIFFERS = 0.03  # probability that a skin differs from the others by one mechanism
 # Of the logarithm of a strength: its spread from skin to skin; sd of its mean, and of a skin that departs in it
 _STRENGTH, _STRENGTH_SD, _DEPARTURE_SD = Spread(0.1, 2.0), 10.0, 1.0
@@ -115,7 +114,7 @@ class CommonSet:
 def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], supported: int) -> CommonSet:
     """Of skins fitted under these sets and the smaller ones; `supported` is the number of mechanisms."""
     evidence = np.array([[skin.log_evidence(names, len(skins)) for names in sets] for skin in skins])
-    log_evidence = np.maximum(evidence - evidence.max(axis=1, keepdims=True), -_PRUNE_NATS)
+    log_evidence = np.maximum(evidence - evidence.max(axis=1, keepdims=True), -PRUNE_NATS)
     changes = np.array([[log_change(len(common ^ names), supported, _P_DIFFERS) for names in sets] for common in sets])
     shown = np.array([[_is_supported(skin, names, len(skins)) for names in sets] for skin in skins])
     allowed = shown[:, None] | np.eye(len(sets), dtype=bool)  # (skins, common sets, sets)
