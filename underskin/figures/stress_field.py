@@ -27,16 +27,13 @@ def stress_section(field: StressField, row: int) -> go.Figure:
     largest force."""
     heat, contact, sphere = _section(field, row)
     depth = to_lab("depth_mm", field.depth)
-    half, h, sensor = _half_width(field), float(depth[-1]), _sensor(field)
-    figure = go.Figure(_heatmap(heat, _largest(field, 0), power=2.0))
-    figure.update_traces(y=depth, hovertemplate="x %{x:.3g} mm, depth %{y:.3g} mm<br>compression %{z:.4g} MPa")
+    h, sensor = float(depth[-1]), _sensor(field)
+    figure = go.Figure(_heatmap({**heat, "y": depth}, "depth", _largest(field, 0), power=2.0))
     figure.add_scatter(**contact, name="contact", line={"color": CONTACT, "width": 5})
     figure.add_scatter(**sphere, name="sphere", line={"color": SPHERE, "width": 2})
     figure.add_scatter(x=[-sensor, sensor], y=[h, h], name="sensor", line={"color": SENSOR, "width": 5})
-    figure.update_traces(mode="lines", hoverinfo="skip", selector={"type": "scatter"})
-    figure.update_xaxes(title="x [mm]", range=[-half, half], constrain="domain", showgrid=False, zeroline=False)
     figure.update_yaxes(title="depth [mm]", range=[1.05 * h, -_ABOVE * h])
-    return _equal(styled(figure, "Section through the layer", _HEIGHT))
+    return _equal(styled(figure, "Section through the layer", _HEIGHT), _half_width(field))
 
 
 def stress_on_base(field: StressField, row: int) -> go.Figure:
@@ -44,14 +41,11 @@ def stress_on_base(field: StressField, row: int) -> go.Figure:
     force."""
     heat, contact = _base(field, row)
     half = _half_width(field)
-    figure = go.Figure(_heatmap(heat, _largest(field, -1), power=1.0))
-    figure.update_traces(y=heat["x"], hovertemplate="x %{x:.3g} mm, y %{y:.3g} mm<br>compression %{z:.4g} MPa")
+    figure = go.Figure(_heatmap({**heat, "y": heat["x"]}, "y", _largest(field, -1), power=1.0))
     figure.add_scatter(**contact, name="contact", line={"color": CONTACT, "width": 2, "dash": BOUND})
     figure.add_scatter(**_circle(_sensor(field)), name="sensor", line={"color": SENSOR, "width": 3})
-    figure.update_traces(mode="lines", hoverinfo="skip", selector={"type": "scatter"})
-    figure.update_xaxes(title="x [mm]", range=[-half, half], constrain="domain", showgrid=False, zeroline=False)
     figure.update_yaxes(title="y [mm]", range=[-half, half])
-    return _equal(styled(figure, "The base from above", _HEIGHT))
+    return _equal(styled(figure, "The base from above", _HEIGHT), half)
 
 
 def frames(field: StressField, row: int) -> dict[str, Sequence[dict[str, Any]]]:
@@ -93,13 +87,14 @@ def _largest(field: StressField, depth: int) -> float:
     return float(np.nanmax(to_lab("sigma_zz_mpa", -field.sigma_zz[:, depth])))
 
 
-def _heatmap(heat: dict[str, Any], largest: float, power: float) -> go.Heatmap:
+def _heatmap(heat: dict[str, Any], along: str, largest: float, power: float) -> go.Heatmap:
     """Compression in colours; with a power of 2 they follow its square root, so that stress below a small contact is
     visible."""
     shade = np.linspace(0.0, 1.0, _STEPS + 1)
     colours = sample_colorscale("Cividis", shade.tolist())
     return go.Heatmap(
         **heat,
+        hovertemplate=f"x %{{x:.3g}} mm, {along} %{{y:.3g}} mm<br>compression %{{z:.4g}} MPa",
         zmin=0.0,
         zmax=largest,
         zsmooth="best",
@@ -131,8 +126,10 @@ def _circle(radius: float) -> dict[str, Any]:
     return {"x": _rounded(radius * np.cos(angle)), "y": _rounded(radius * np.sin(angle))}
 
 
-def _equal(figure: go.Figure) -> go.Figure:
-    """Equal scales of both axes, and the colour bar below."""
+def _equal(figure: go.Figure, half: float) -> go.Figure:
+    """Equal scales of both axes, this far to each side, and the colour bar below."""
+    figure.update_traces(mode="lines", hoverinfo="skip", selector={"type": "scatter"})
+    figure.update_xaxes(title="x [mm]", range=[-half, half], constrain="domain", showgrid=False, zeroline=False)
     figure.update_layout(margin={"l": 60, "r": 10, "b": 115})
     return figure.update_yaxes(scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False)
 

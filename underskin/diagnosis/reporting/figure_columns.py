@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from underskin.diagnosis.reporting.wording import unit
+from underskin.diagnosis.reporting.wording import answers, unit
 
 FigureColumns = dict[str, list[Any]]
 
@@ -19,14 +19,8 @@ def columns(name: str, report: Mapping[str, Any], figures: Mapping[str, str]) ->
 
 
 def _explanations(report: Mapping[str, Any]) -> FigureColumns:
-    stated = {"no_mismatch": ["nothing_missing"], "unexplained": ["none_of_these"]}
-    leader = stated.get(report["verdict"]) or [mechanism["name"] for mechanism in report["mechanisms"]]
-    rows = [(leader, report["probability"], "")]
-    rows += [
-        (alternative["mechanisms"], alternative["probability"], alternative["why_not"])
-        for alternative in report["alternatives"]
-    ]
-    return _by_name(("explanation", "probability", "why_not"), [(" + ".join(names), *more) for names, *more in rows])
+    rows = [(" + ".join(row["mechanisms"]), row["probability"], row["why_not"]) for row in answers(report)]
+    return _by_name(("explanation", "probability", "why_not"), rows)
 
 
 def _parameters(report: Mapping[str, Any]) -> FigureColumns:

@@ -16,6 +16,7 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.data.names import SIMPLEST, quantity_in_words
 from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.facts import DiagnosisResult, Facts
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned, shown_curves, shown_frfs
 from underskin.diagnosis.reporting.page_styles import BOUND, LINE_COLOURS
@@ -94,12 +95,9 @@ def _part(facts: Facts) -> _Part:
 
 def explanations(document: Mapping[str, Any]) -> go.Figure:
     """The probability of each explanation in a report, the stated answer on top."""
-    stated = {"no_mismatch": ["nothing_missing"], "unexplained": ["none_of_these"]}
-    leader = stated.get(document["verdict"]) or [mechanism["name"] for mechanism in document["mechanisms"]]
-    rows = [(leader, document["probability"])]
-    rows += [(alternative["mechanisms"], alternative["probability"]) for alternative in document["alternatives"]]
-    names = [_in_lines([escape(name.replace("_", " ")) for name in mechanisms]) for mechanisms, _ in rows]
-    values = [value for _, value in rows]
+    rows = wording.answers(document)
+    names = [_in_lines([escape(name.replace("_", " ")) for name in row["mechanisms"]]) for row in rows]
+    values = [row["probability"] for row in rows]
     figure = go.Figure()
     figure.add_bar(
         x=values,
@@ -208,13 +206,9 @@ def before_and_after(facts: Facts, before: Points, after: Points, part: _Part) -
         ((before, BEFORE, "square-open"), (after, AFTER, "circle")), start=1
     ):
         predicted, measured = map(part.of, (points.predicted, points.measured))
-        along = np.linspace(predicted.min(), predicted.max(), BAND_POINTS)
         # If all predictions were equal the band would have no width along the abscissa.
-        along = (
-            along
-            if np.ptp(along) > 0
-            else along + np.linspace(-1, 1, BAND_POINTS) * (np.abs(along).max() or 1.0) * 0.05
-        )
+        spare = 0.0 if np.ptp(predicted) > 0 else MARGIN * (float(np.abs(predicted).max()) or 1.0)
+        along = np.linspace(predicted.min() - spare, predicted.max() + spare, BAND_POINTS)
         # The noise of the stated explanation in both: the base model counts its misfit as noise.
         half = SDS_OF_95 * np.hypot(after.gain * along, float(np.median(after.deviation)))
         figure.add_scatter(
@@ -244,13 +238,12 @@ def before_and_after(facts: Facts, before: Points, after: Points, part: _Part) -
             row=1,
             col=panel,
         )
+        figure.update_yaxes(range=axis_range, scaleanchor=f"x{panel}", constrain="domain", row=1, col=panel)
+        figure.update_xaxes(constrain="domain", row=1, col=panel)
     figure.update_xaxes(title=f"predicted [{unit}]", title_font_size=SMALL_TITLE, range=axis_range)
     figure.update_yaxes(
         title=f"measured {facts.traits.response}{part.words} [{unit}]", title_font_size=SMALL_TITLE, col=1
     )
-    for panel in (1, 2):
-        figure.update_yaxes(range=axis_range, scaleanchor=f"x{panel}", constrain="domain", row=1, col=panel)
-        figure.update_xaxes(constrain="domain", row=1, col=panel)
     figure.update_layout(
         title="Measured against predicted",
         height=470 + further,

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 from underskin.diagnosis.data.dataset import WORDS
-from underskin.diagnosis.data.names import quantity_in_words
+from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING, quantity_in_words
 from underskin.diagnosis.reporting.figure_data import AXES
 from underskin.diagnosis.reporting.page_styles import FIELD_OF, with_minus, without_powers
 from underskin.findings.formatting import capital
@@ -145,6 +145,13 @@ def unit(label: str) -> str:
 def quantity(parameter: str) -> str:
     """A quantity of skins in words."""
     return capital(quantity_in_words(parameter))
+
+
+def answers(report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The stated answer, and the alternatives."""
+    stated = {"no_mismatch": [NOTHING_MISSING], "unexplained": [NONE_OF_THESE]}
+    leader = stated.get(report["verdict"]) or [mechanism["name"] for mechanism in report["mechanisms"]]
+    return [{"mechanisms": leader, "probability": report["probability"], "why_not": ""}, *report["alternatives"]]
 
 
 def columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
