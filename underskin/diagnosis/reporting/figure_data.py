@@ -11,7 +11,7 @@
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -295,15 +295,6 @@ class Points:
         """Measured minus predicted over |predicted|, or over 5 % of the largest where that is more."""
         residual: Complexes = 100 * (self.measured - self.predicted) / self._scale
         return residual
-
-    def times(self, factor: float) -> "Points":
-        """The points in a unit that is `factor` times smaller."""
-        return replace(
-            self,
-            measured=factor * self.measured,
-            predicted=factor * self.predicted,
-            deviation=factor * self.deviation,
-        )
 
     @property
     def noise_percent(self) -> Floats:

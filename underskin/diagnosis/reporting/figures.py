@@ -192,25 +192,23 @@ def before_and_after(facts: Facts, before: Points, after: Points, part: _Part) -
     titles = ["<br>".join(wrap(title, _TITLE)) for title in headings]
     figure = make_subplots(1, 2, subplot_titles=titles, horizontal_spacing=0.12)
     further = _TITLE_LINE * max(title.count("<br>") for title in titles)
-    unit = "pC/N"
+    unit, scale = "pC/N", 1.0
     if facts.problem.lines.curves:
-        largest = max(float(np.abs(points.measured).max()) for points in (before, after))
-        unit, per_n = readable_unit("force_n", largest)
-        before, after = before.times(per_n), after.times(per_n)
+        unit, scale = readable_unit("force_n", float(np.abs(after.measured).max()))
     both = np.concatenate([column for points in (before, after) for column in (points.predicted, points.measured)])
-    shown_part = part.of(both)
+    shown_part = scale * part.of(both)
     room = MARGIN * float(np.ptp(shown_part))
     axis_range = [float(shown_part.min()) - room, float(shown_part.max()) + room]
     ids = [escape(recording.id) for recording in facts.problem.lines.campaign.recordings]
     for panel, (points, colour, marker) in enumerate(
         ((before, BEFORE, "square-open"), (after, AFTER, "circle")), start=1
     ):
-        predicted, measured = map(part.of, (points.predicted, points.measured))
+        predicted, measured = (scale * part.of(column) for column in (points.predicted, points.measured))
         # If all predictions were equal the band would have no width along the abscissa.
         spare = 0.0 if np.ptp(predicted) > 0 else MARGIN * (float(np.abs(predicted).max()) or 1.0)
         along = np.linspace(predicted.min() - spare, predicted.max() + spare, BAND_POINTS)
         # The noise of the stated explanation in both: the base model counts its misfit as noise.
-        half = SDS_OF_95 * np.hypot(after.gain * along, float(np.median(after.deviation)))
+        half = SDS_OF_95 * np.hypot(after.gain * along, scale * float(np.median(after.deviation)))
         figure.add_scatter(
             x=[*along, *along[::-1]],
             y=[*(along + half), *(along - half)[::-1]],

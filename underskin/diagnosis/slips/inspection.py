@@ -159,14 +159,13 @@ def _with_lines(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording],
     for recording in recordings:
         values = lines_of(recording).values
         finite = np.isfinite(values)
-        if not finite.any():
-            findings.append(Finding(Reason.NO_FINITE_LINE, recording.id, "frf_re_pc_per_n"))
-        elif not np.abs(values[finite]).any():
-            findings.append(Finding(Reason.ZERO_LINES, recording.id, "frf_re_pc_per_n"))
-        else:
-            if not finite.all():
-                arguments = {"lines": int((~finite).sum())}
-                findings.append(Finding(Reason.LINES_NOT_FINITE, recording.id, "frf_re_pc_per_n", arguments))
+        reason = None if finite.all() else Reason.LINES_NOT_FINITE if finite.any() else Reason.NO_FINITE_LINE
+        if finite.any() and not np.abs(values[finite]).any():
+            reason = Reason.ZERO_LINES
+        if reason is not None:
+            arguments = {"lines": int((~finite).sum())}
+            findings.append(Finding(reason, recording.id, "frf_re_pc_per_n", arguments))
+        if reason in (None, Reason.LINES_NOT_FINITE):
             usable.append(recording)
     return usable, findings
 
