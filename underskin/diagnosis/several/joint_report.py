@@ -323,37 +323,30 @@ def _presence(skin: SkinOverDates) -> list[dict[str, Any]]:
 
 
 def _per_sensor(skin: SkinOverDates) -> list[dict[str, Any]]:
-    """d33 of each sensor over all sets of mechanisms, and by the leading history the interval relative to others."""
     return [
-        {
-            "campaign": name,
-            "sensor": sensor,
-            "unit": "pC/N",
-            **over_sets(parts, {sensor: d33}, d33),
-            "relative": _relative(d33),
-        }
-        for name, sensors, parts in zip(skin.dates.names, skin.sensors, skin.over_sets, strict=True)
+        {"sensor": sensor, **_of_campaign(skin, number, {sensor: d33}, d33)}
+        for number, sensors in enumerate(skin.sensors)
         for sensor, d33 in sensors.items()
     ]
 
 
-def _relative(d33: Sensor) -> dict[str, float | None]:
-    """The interval to compare a d33 with others, by the leading history: the shares of sets differ by campaign."""
-    _, _, low, high = d33
-    return _rounded(low=low, high=high)
-
-
 def _per_campaign(skin: SkinOverDates) -> dict[str, Any]:
-    """d33 of the array over the sensors common to the campaigns, over all sets as that of each sensor."""
+    """d33 of the array over the sensors common to the campaigns."""
     if skin.array is None:
         return {}
     rows = []
     for number, d33, sd in zip(skin.array.numbers, skin.array.d33, skin.array.uncertainty, strict=True):
         array = np.array([d33, sd, d33 - SDS_OF_95 * sd, d33 + SDS_OF_95 * sd])
-        stated = over_sets(skin.over_sets[number], skin.sensors[number], array)
-        name = skin.dates.names[number]
-        rows.append({"campaign": name, "unit": "pC/N", **stated, "relative": _relative(array)})
+        rows.append(_of_campaign(skin, number, skin.sensors[number], array))
     return {"per_campaign": rows}
+
+
+def _of_campaign(skin: SkinOverDates, number: int, level: Mapping[str, Sensor], d33: Sensor) -> dict[str, Any]:
+    """A d33 where the sensors are `level`, over all sets of mechanisms; and its interval by the leading history, which
+    compares it with others: the shares of sets differ by campaign."""
+    stated = over_sets(skin.over_sets[number], level, d33)
+    relative = _rounded(low=d33[2], high=d33[3])
+    return {"campaign": skin.dates.names[number], "unit": "pC/N", **stated, "relative": relative}
 
 
 def _sets_in_words(
