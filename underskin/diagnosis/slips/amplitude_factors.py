@@ -12,8 +12,8 @@ from math import comb, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, Alternative, Undone
-from underskin.diagnosis.slips.table import Screened
+from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, Alternative, Levels, Undone
+from underskin.diagnosis.slips.table import Screened, of_levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.units import Floats, Indices, Mask
@@ -25,11 +25,9 @@ _WELL, _APART = 0.7, 0.85  # share of recordings within a third of ln c of their
 _SKEWED = 6.5  # of ln prior: misses of the place lower levels by up to half, which two parts fit better than one
 
 
-def amplitude_factors(screened: Screened) -> Iterator[Alternative]:
+@of_levels
+def amplitude_factors(screened: Screened, levels: Levels) -> Iterator[Alternative]:
     """Each factor with the sets of recordings that may have it, and the rivals."""
-    levels = screened.levels
-    if levels is None:
-        return
     for factor, (scatter, smooth_size) in product(_FACTORS, SEARCHED):
         precision = levels.precision(scatter, smooth_size)
         off = _chosen(levels.value, precision, log(factor))

@@ -12,18 +12,16 @@ from math import log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, SPREADS, Alternative
-from underskin.diagnosis.slips.table import Screened
+from underskin.diagnosis.slips.levels import CHANGE, SEARCHED, SELDOM, SPREADS, Alternative, Levels
+from underskin.diagnosis.slips.table import Screened, of_levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.units import Indices
 
 
-def exchanged_cables(screened: Screened) -> Iterator[Alternative]:
+@of_levels
+def exchanged_cables(screened: Screened, levels: Levels) -> Iterator[Alternative]:
     """The likeliest exchange, and the rivals."""
-    levels = screened.levels
-    if levels is None:
-        return
     precision = levels.precision(*SEARCHED[0], SPREADS[-1])
     tried = list[tuple[float, list[int], Indices]]()
     for pair in map(list, combinations(np.unique(levels.sensor).tolist(), 2)):

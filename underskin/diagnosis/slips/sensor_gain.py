@@ -12,8 +12,8 @@ from math import exp, log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, LEAST_LEVELS, Alternative, Undone
-from underskin.diagnosis.slips.table import Screened
+from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, LEAST_LEVELS, Alternative, Levels, Undone
+from underskin.diagnosis.slips.table import Screened, of_levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.inversion.sensor_groups import two_groups
@@ -21,14 +21,13 @@ from underskin.inversion.sensor_groups import two_groups
 _WEAK, _WEAK_SPREAD = -2.0, 0.7  # prior of ln gain of a weak sensor: a third to a thirtieth
 
 
-def sensor_gains(screened: Screened) -> Iterator[Alternative]:
+@of_levels
+def sensor_gains(screened: Screened, levels: Levels) -> Iterator[Alternative]:
     """Each sensor as a weak one, and as one that differs."""
-    levels = screened.levels
-    sensors = [] if levels is None else np.unique(levels.sensor).tolist()
+    sensors = np.unique(levels.sensor).tolist()
     for sensor in sensors if len(sensors) > 1 else ():
-        assert levels is not None
         of_sensor = (levels.sensor == sensor).astype(float)
-        name = screened.recordings[int(levels.index[levels.sensor == sensor][0])].sensor
+        name = screened.campaign.skin.sensors[sensor].id
         offset, column = _WEAK * of_sensor, _WEAK_SPREAD * of_sensor
         undo = partial(_without_sensor, screened=screened, name=name)
         yield Alternative(-log(len(sensors)), offset=offset, column=column, undo=undo)
@@ -37,17 +36,14 @@ def sensor_gains(screened: Screened) -> Iterator[Alternative]:
             yield Alternative(-2 * log(len(sensors)), column=CHANGE * of_sensor, undo=undo)
 
 
-def groups_of(screened: Screened) -> Iterator[Alternative]:
+@of_levels
+def groups_of(screened: Screened, levels: Levels) -> Iterator[Alternative]:
     """The sensors as two groups, the factor between them being the known change."""
-    levels = screened.levels
-    if levels is None:
-        return
     sensors, of_recording = np.unique(levels.sensor, return_inverse=True)
     medians = [float(np.median(levels.value[of_recording == index])) for index in range(len(sensors))]
     groups = two_groups(np.exp(medians), np.zeros(len(sensors)))
     if groups is not None:  # those of the smaller group are taken to the level of the larger, the lower of equal ones
-        numbers = [int(levels.index[of_recording == index][0]) for index in range(len(sensors))]
-        names = [screened.recordings[number].sensor for number in numbers]
+        names = [screened.campaign.skin.sensors[sensor].id for sensor in sensors.tolist()]
         offset = np.where(np.isin(of_recording, groups.higher), log(groups.factor), 0.0)
         lower, higher = ([names[index] for index in part] for part in (groups.lower, groups.higher))
         changed, factor = (lower, groups.factor) if len(lower) < len(higher) else (higher, 1 / groups.factor)

@@ -100,6 +100,11 @@ class Screened:
 Slip = Callable[[Screened], Iterable[Alternative]]
 
 
+def of_levels(slip: Callable[[Screened, Levels], Iterable[Alternative]]) -> Slip:
+    """A slip that is looked for where there are levels."""
+    return lambda screened: () if screened.levels is None else slip(screened, screened.levels)
+
+
 def without_slips(screened: Screened, slips: Sequence[Slip]) -> Undone:
     """The recordings without the slips that the table shows, corrected or left out, and the findings."""
     findings, asked = list[Finding](), list(slips)

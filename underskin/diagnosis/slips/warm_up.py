@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, SELDOM, Alternative, Undone
-from underskin.diagnosis.slips.table import Screened
+from underskin.diagnosis.slips.levels import CHANGE, LEAST_CHANGE, SELDOM, Alternative, Levels, Undone
+from underskin.diagnosis.slips.table import Screened, of_levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.forms import recording_order
@@ -22,11 +22,9 @@ _MOST_SHARE = 0.4  # of the recordings left out at most
 _OVER = 0.01  # of the level: largest remaining drift in recordings that are used
 
 
-def warm_ups(screened: Screened) -> Iterator[Alternative]:
+@of_levels
+def warm_ups(screened: Screened, levels: Levels) -> Iterator[Alternative]:
     """Drifts of each τ, and the rivals."""
-    levels = screened.levels
-    if levels is None:
-        return
     times = [time for time in _TIMES if time <= _LONGEST * len(levels.value)]
     for time in times:
         undo = partial(_without_first, screened=screened, time=time, may_age=levels.may_age)
