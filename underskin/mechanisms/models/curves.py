@@ -193,8 +193,7 @@ class CompressionModel(CurveModel):
         diameter = to_si("sample_diameter_mm", [recording.sample_diameter_mm for recording in recordings])[:, None]
         self._area = np.pi / 4 * diameter**2
         self._shape_factor = diameter / (4 * self._height)
-        self._loaded = np.array([_loaded(recording) for recording in recordings])[:, None]
-        self._leaves = np.array([_leaves(recording) for recording in recordings])[:, None]
+        self._loaded, self._leaves = np.array([_sides(recording) for recording in recordings]).T[..., None]
 
     def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
         strain = (self.displacement - contact) / self._height
@@ -223,11 +222,18 @@ class CompressionModel(CurveModel):
         return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * numbers(curve.platen_friction)))
 
 
-def _loaded(recording: CompressionConditions) -> float:
-    """1 of a cylinder that is only compressed, −1 of one that is only pulled, 0 of both: one is slack before."""
+def _sides(recording: CompressionConditions) -> tuple[float, float]:
+    """1 of a cylinder that is only compressed, −1 of one that is only pulled, 0 of both: one is slack before.
+
+    And the same, but 0 where the force also reads the other sign, beyond what the zero may be off: a sample that
+    relaxed, drawn back, is left by a platen, which does not pull, or hangs slack, as a strip that cannot push; one that
+    is glued is not.
+    """
     if not isinstance(recording, CompressionRecording) or not is_one_sided(recording.force_n):
-        return 0.0
-    return 1.0 if recording.force_n.max() > -recording.force_n.min() else -1.0
+        return 0.0, 0.0
+    force = recording.force_n
+    side = 1.0 if force.max() > -force.min() else -1.0
+    return side, side if float((-side * force).max()) < ZERO_SD * float(np.abs(force).max()) else 0.0
 
 
 def _unloaded(force: Floats) -> int:
@@ -236,16 +242,6 @@ def _unloaded(force: Floats) -> int:
     size = np.abs(force)
     before = int(size[: int(size.argmax()) + 1].argmin())
     return before if size[before] < ZERO_SD * size.max() else int(size.argmin())
-
-
-def _leaves(recording: CompressionConditions) -> float:
-    """As `_loaded`, but 0 where the force also reads the other sign, beyond what the zero may be off: a sample that
-    relaxed, drawn back, is left by a platen, which does not pull, or hangs slack, as a strip that cannot push; one that
-    is glued is not."""
-    if not isinstance(recording, CompressionRecording):
-        return 0.0
-    side = _loaded(recording)
-    return side if float((-side * recording.force_n).max()) < ZERO_SD * float(np.abs(recording.force_n).max()) else 0.0
 
 
 def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescription) -> list[Parameter]:
