@@ -7,10 +7,10 @@ fitted, and a prior on that coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -32,8 +32,6 @@ class Normal:
     mean: float
     sd: float
     freedom: ClassVar[float] = np.inf  # degrees of freedom of its tails
-    _below: ClassVar[Callable[[float], float]] = staticmethod(ndtr)
-    _quantile: ClassVar[Callable[[float], float]] = staticmethod(ndtri)
 
     def log_shape(self, fit: float) -> float:
         """The logarithm of its density over that at the mean."""
@@ -46,11 +44,11 @@ class Normal:
 
     def below(self, fit: float) -> float:
         """The cumulative probability up to a fit coordinate."""
-        return float(self._below((fit - self.mean) / self.sd))
+        return float(ndtr((fit - self.mean) / self.sd))
 
     def at(self, probability: float) -> float:
         """The quantile of a probability."""
-        return float(self.mean + self.sd * self._quantile(probability))
+        return float(self.mean + self.sd * ndtri(probability))
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,6 @@ class HeavyTailed(Normal):
     """
 
     freedom: ClassVar[float] = 3.0
-    _below: ClassVar[Callable[[float], float]] = staticmethod(partial(stdtr, freedom))
-    _quantile: ClassVar[Callable[[float], float]] = staticmethod(partial(stdtrit, freedom))
 
     def log_shape(self, fit: float) -> float:
         """The logarithm of its density over that at the mean."""
@@ -76,6 +72,14 @@ class HeavyTailed(Normal):
         half = self.freedom / 2
         shape = gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(self.freedom * np.pi)
         return float(shape - np.log(self.sd))
+
+    def below(self, fit: float) -> float:
+        """The cumulative probability up to a fit coordinate."""
+        return float(stdtr(self.freedom, (fit - self.mean) / self.sd))
+
+    def at(self, probability: float) -> float:
+        """The quantile of a probability."""
+        return float(self.mean + self.sd * stdtrit(self.freedom, probability))
 
 
 @dataclass(frozen=True)

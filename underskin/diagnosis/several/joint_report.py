@@ -200,7 +200,12 @@ def _of_parts(
     by_kind = [row for _, document in own for row in document.get("by_kind", ())]
     of_kinds = {"by_kind": by_kind, "contradictions": _prefixed(reports, "contradictions")} if by_kind else {}
     each = [{part: name, **{key: document[key] for key in ("verdict", "probability")}} for name, document in own]
-    nowhere = {"axes": [], "region": {}, "effect_percent": None, "statement": f"See each {part}'s own diagnosis."}
+    nowhere: dict[str, Any] = {
+        "axes": [],
+        "region": {},
+        "effect_percent": None,
+        "statement": f"See each {part}'s own diagnosis.",
+    }
     return {
         **{name: EMPTY[name] for name in EMPTY if name not in ("idealised", "remainder")},
         "campaigns": [],

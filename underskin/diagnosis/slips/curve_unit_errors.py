@@ -27,8 +27,8 @@ def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
     used unless `units_checked` confirms it.
     """
     curves = [curve for curve in campaign.curves if curve.kind == kind]
-    findings = list[Finding]()
-    for step in (without_unusable, _without_copies, _within_range, _like_others):
+    curves, findings = without_unusable(curves, campaign, kind)
+    for step in (_without_copies, _within_range, _like_others):
         curves, step_findings = step(curves, campaign)
         findings += step_findings
     remaining = replace(campaign, recordings=tuple(curves))

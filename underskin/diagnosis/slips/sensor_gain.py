@@ -32,8 +32,8 @@ def sensor_gains(screened: Screened, levels: Levels) -> Iterator[Alternative]:
         undo = partial(_without_sensor, screened=screened, name=name)
         yield Alternative(-log(len(sensors)), offset=offset, column=column, undo=undo)
         if len(sensors) >= LEAST_LEVELS:
-            undo = partial(_without_gain, screened=screened, name=name)
-            yield Alternative(-2 * log(len(sensors)), column=CHANGE * of_sensor, undo=undo)
+            without_gain = partial(_without_gain, screened=screened, name=name)
+            yield Alternative(-2 * log(len(sensors)), column=CHANGE * of_sensor, undo=without_gain)
 
 
 @of_levels

@@ -9,6 +9,7 @@ from underskin.diagnosis.data.dataset import curve_lines
 from underskin.errors import InvalidInput, too_few, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CurveRecording, IndentationRecording, SkinDescription
 from underskin.recordings.curve_preparation import reject_exchanged_columns
 from underskin.recordings.modulus import estimate, of_compression, require_depth, tip_of
@@ -16,13 +17,13 @@ from underskin.units import Floats, to_si
 
 
 def without_unusable(
-    curves: Sequence[CurveRecording], campaign: Campaign
+    curves: Sequence[CurveRecording], campaign: Campaign, kind: Kind
 ) -> tuple[list[CurveRecording], list[Finding]]:
     """The curves of one kind that have enough samples, load, and are within a sphere's law.
 
     Each of the others is a finding, and so are curves under a tip that looks like a cone.
     """
-    lines = curve_lines(replace(campaign, recordings=tuple(curves)), curves[0].kind)
+    lines = curve_lines(replace(campaign, recordings=tuple(curves)), kind)
     thinned = {curve.id: curve for curve in lines.campaign.curves}
     findings, usable = [], []
     for curve in curves:
