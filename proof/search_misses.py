@@ -96,7 +96,7 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
     ordered = tuple(name for name in problem.lines.mechanisms.named if name in names)
     first = problem.explain(Request(ordered))
     assert first is not None  # without alternatives, no fit is pruned
-    requests = [Request(ordered, initial=with_true_values(first, effects))]
+    requests = [Request(ordered, with_true_values(first, effects), never_pruned=True)]
     if len(ordered) > 1:
         single_fits = problem.explain_all([Request((name,)) for name in ordered])
         requests += [Request(ordered, parent) for parent in single_fits if parent is not None]

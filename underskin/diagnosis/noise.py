@@ -131,14 +131,6 @@ class SeveralLevels:
     smooth: Floats
 
     @property
-    def at_first(self) -> "SeveralLevels":
-        """The first set at each point (points, 1, 1)."""
-        gain, level, position, spread, smooth = (
-            values[:, :1] for values in (self.gain, self.level, self.position, self.spread, self.smooth)
-        )
-        return SeveralLevels(gain, level, position, spread, None, smooth)
-
-    @property
     def first(self) -> NoiseLevels:
         """The first set, as numbers."""
         gain, level, position, spread, smooth = (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from underskin.diagnosis.data.dataset import Inspected, curve_lines
+from underskin.diagnosis.data.dataset import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, row_prediction
 from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, describe, effect, in_region, locate, region
@@ -18,9 +18,8 @@ from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.modulus import modulus_over_answers
 from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
-from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.priors import least_evidence
-from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search
+from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem
 from underskin.diagnosis.selection.unlisted_search import with_laws
 from underskin.diagnosis.slips.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.slips.inspection import inspect
@@ -129,7 +128,7 @@ def _diagnose_frf(
     inspection = inspect(replace(campaign, recordings=frf), table)
     joined: KindsTogether | None = None
     while not inspection.lacking:
-        joined = _search_frf(inspection, table, mechanisms, other_kinds)
+        joined = other_kinds.joined(*frf_problem(inspection.campaign, inspection.uneven, table, mechanisms))
         if not inspection.beyond:
             break
         beyond = inspection.beyond & inside_tables_under_posterior(joined.problem, joined.search)
@@ -142,24 +141,6 @@ def _diagnose_frf(
     problem, result = joined.problem, joined.search
     result = replace(result, laws=tuple(with_laws(problem, result)))
     return _complete(replace(partial, joined=joined), problem, result, progress, limits)
-
-
-def _search_frf(
-    inspection: Inspected, table: SigmaTable, mechanisms: ActiveCatalogue, other_kinds: OtherKinds
-) -> KindsTogether:
-    """The search on FRFs, together with other kinds."""
-    problem_alone, fitted = frf_problem(inspection.campaign, inspection.uneven, table, mechanisms)
-
-    def fit(
-        curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
-    ) -> tuple[FittingProblem, Search]:
-        """With other kinds under the same noise, so that evidences can be compared."""
-        if curve_likelihood is None:
-            return problem_alone, search(problem_alone, fitted)
-        problem = FittingProblem(problem_alone.lines, table, curve_likelihood)
-        return problem, search(problem, required_sets=required_sets)
-
-    return other_kinds.joined(fit)
 
 
 def _diagnose_curves(
@@ -177,15 +158,7 @@ def _diagnose_curves(
     def searched(curves: Campaign) -> KindsTogether:
         active = ActiveCatalogue(mechanisms.without)
         active.bind(curves, table, kind)
-        rows = replace(curve_lines(curves, kind), mechanisms=active)
-
-        def fit(
-            curve_likelihood: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
-        ) -> tuple[FittingProblem, Search]:
-            problem = FittingProblem(rows, table, curve_likelihood)
-            return problem, search(problem, required_sets=required_sets)
-
-        return other_kinds.joined(fit)
+        return other_kinds.joined(FittingProblem(replace(curve_lines(curves, kind), mechanisms=active), table))
 
     joined = searched(campaign)
     if (other_load := as_other_load(campaign)) is not None:
@@ -215,7 +188,7 @@ def _pulled_or_pressed(stated: _Searched, other: _Searched) -> tuple[Campaign, K
     is_open = [Finding(Reason.PULLED_OR_PRESSED, curve.id, "force_n", {"pulled": is_pulled})]
     if theirs.log_total < ours.log_total + least:
         return *stated, is_open if theirs.log_total > ours.log_total - least else []
-    plain = max(theirs.log_weight(fitted) for fitted in theirs.explanations if not fitted.names) - ours.log_total
+    plain = theirs.log_weight(theirs.null) - ours.log_total
     if plain < least:
         return *other, is_open
     arguments = {"pulled": not is_pulled, "less": times_in_words(plain)}
@@ -230,7 +203,7 @@ def _complete(
     signatures = Signatures(problem)
     confounded = confounding(signatures)
     progress(0.7)
-    null = next(explanation for explanation in result.explanations if not explanation.names)
+    null = result.null
     result = replace(result, unlisted_odds=_unlisted_odds(partial, problem, result, null))
     leader = result.answers[0]
     stated = result.fit_behind(leader)

@@ -7,11 +7,9 @@ outside the bounds), H the information on the mean parameters and the Hessian in
 probability that a normal with this mean and H⁻¹ gives to the bounds: one bound after another, each with the moments
 left by the ones before (exact for one bound; Mendell and Elston 1974).
 
-Indentations determine E/(1 − ν²), so that E and ν trade along a ridge, which ν between its bounds cuts short: a
-parameter that trades against one between bounds is integrated over that (`parts`). The posterior of a parameter over
-all values of the sensors' spread, which two sensors leave open by a factor, is a mixture over a grid of that spread
-(`marginalise_sensor_spread`). Where a parameter's 95 % interval reaches no effect, the profile of the posterior, which
-need not be Gaussian, ends it (`profile_end`).
+The posterior of a parameter over all values of the sensors' spread, which two sensors leave open by a factor, is a
+mixture over a grid of that spread (`marginalise_sensor_spread`). Where a parameter's 95 % interval reaches no effect,
+the profile of the posterior, which need not be Gaussian, ends it (`profile_end`).
 """
 
 from collections.abc import Sequence
@@ -25,7 +23,6 @@ from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
 from underskin.diagnosis.noise import NoiseLevels
-from underskin.mechanisms.base import Uniform
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Floats
@@ -37,7 +34,7 @@ _LEAST_COVARIANCE_CURVATURE = 0.3  # in the logarithms of noise levels: their pr
 _REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
 _LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
 NEGLIGIBLE_NATS = 12.0  # of log evidence behind the best: odds of 1 to 160,000, which no other set makes up for
-LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
+_LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
 FLAT = 1e-3  # standard deviations of a quadratic, at least, within a parameter's bounds: keeps H invertible
 
 
@@ -50,7 +47,6 @@ class Evidence:
     point: FitPoint
     cost: float
     covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
-    log_slope_gradient: Floats | None = None  # (1, recordings, parameters), see Evaluated
 
     @cached_property
     def fitter(self) -> Fitter:
@@ -60,7 +56,7 @@ class Evidence:
     @cached_property
     def at(self) -> Evaluated:
         """The most probable point, evaluated."""
-        return replace(self.fitter.evaluate(self.fitter.at(self.point)), log_slope_gradient=self.log_slope_gradient)
+        return self.fitter.evaluate(self.fitter.at(self.point))
 
     @cached_property
     def marginal(self) -> Likelihoods:
@@ -106,8 +102,6 @@ class Evidence:
 
 def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
     """Laplace's approximation at a most probable point, which is first polished until its whole gradient vanishes."""
-    if not fitter.has_log_slope_gradient(at).all():
-        at = fitter.with_log_slope_gradient(at)
     for _ in range(_POLISHING_STEPS_OF_CURVES if fitter.lines.curves else _POLISHING_STEPS):
         polished = _polished(fitter, at)
         if polished is None:
@@ -117,7 +111,7 @@ def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
     (volume,) = level_integrals(fitter, at)
     point = FitPoint(at.points.fit[0], at.points.covariance[0], at.points.sensor_log_gain[0])
     log_evidence, cost = float(value + volume), float(at.cost[0])
-    return Evidence(log_evidence, fitter.hypothesis, point, cost, covariance, at.log_slope_gradient)
+    return Evidence(log_evidence, fitter.hypothesis, point, cost, covariance)
 
 
 def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
@@ -160,9 +154,9 @@ def _definite(information: Floats) -> Floats:
     """The information with positive eigenvalues, which rounding may have made negative where it is nearly singular."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    if values[0] > LEAST_EIGENVALUE:
+    if values[0] > _LEAST_EIGENVALUE:
         return information
-    return np.asarray((vectors * np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
+    return np.asarray((vectors * np.maximum(values, _LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
 
 
 def level_integrals(fitter: Fitter, at: Evaluated) -> Floats:
@@ -207,7 +201,7 @@ def _polished(fitter: Fitter, at: Evaluated) -> Evaluated | None:
         shifted = np.clip(coordinates + step, low, high)
         trial = fitter.update_noise_levels(fitter.evaluate(replace(at.points, fit=shifted[None])), 1)
         if trial.cost[0] < at.cost[0] - 0.2 * _POLISHING_GAIN:
-            return replace(trial, log_slope_gradient=at.log_slope_gradient)
+            return trial
         step = step / 3
     return None
 
@@ -271,90 +265,6 @@ def _held_points(held: Fitter, fit: Evidence, index: int, values: Floats) -> Poi
         np.tile(level, (len(values), 1)) for level in (fit.point.covariance, fit.point.sensor_log_gain)
     )
     return Points(coordinates, covariance, sensor_log_gain)
-
-
-_UNDETERMINED = 0.3  # standard deviation over the range, at least; a uniform distribution has 0.29
-TRADING_CORRELATION = 0.9  # above which two parameters trade against each other
-_CELLS = 5  # of the range, each with the parameter held at its middle
-
-
-@dataclass(frozen=True)
-class Part:
-    """A component of a posterior: its probability, and a normal distribution of the fit coordinates."""
-
-    share: float
-    fit: Floats  # (parameters,)
-    covariance: Floats  # (mean parameters, mean parameters)
-
-
-def parts(evidence: Evidence, index: int) -> list[Part]:
-    """The posterior of the parameter at an index among the model's, and of all others.
-
-    One part, the quadratic's; or, where the parameter trades against one that the recordings do not determine between
-    its bounds, one part for each cell of that one's range.
-    """
-    trading_index = _trading_index(evidence, index)
-    if trading_index is None:
-        return [Part(1.0, evidence.point.fit, evidence.covariance)]
-    low, high = evidence.hypothesis.model.parameters[trading_index].bounds
-    values = low + (high - low) * (np.arange(_CELLS) + 0.5) / _CELLS
-    fits = _refit_at(evidence, trading_index, values)
-    logs = np.array([fit.log_evidence for fit in fits])
-    shares = np.exp(logs - np.logaddexp.reduce(logs))
-    mean_indices = np.array(evidence.hypothesis.mean_indices)
-    others, mean_index = (
-        np.flatnonzero(mean_indices != trading_index),
-        int(np.flatnonzero(mean_indices == trading_index)[0]),
-    )
-    components = []
-    for share, fit in zip(shares.tolist(), fits, strict=True):
-        covariance = np.zeros_like(evidence.covariance)
-        covariance[np.ix_(others, others)] = fit.covariance
-        covariance[mean_index, mean_index] = ((high - low) / _CELLS) ** 2 / 12  # uniform in its cell
-        components.append(Part(share, fit.point.fit, covariance))
-    return components
-
-
-def _refit_at(evidence: Evidence, index: int, values: Floats) -> list[Evidence]:
-    """The evidence with a parameter held at each of these values, all others fitted again.
-
-    Values are visited away from the most probable one, and each fit begins at the extrapolation of the two nearest:
-    on a straight line from the most probable point, samples lose their contact.
-    """
-    held = Fitter(evidence.hypothesis, held=[index])
-    mode = float(evidence.point.fit[index])
-    fitted_points: dict[float, FitPoint] = {mode: evidence.point}
-    fits: dict[float, Evidence] = {}
-    for value in sorted(values.tolist(), key=lambda value: abs(value - mode)):
-        starting_points = _held_points(held, evidence, index, np.array([value]))
-        if len(fitted_points) > 1:
-            near, far = sorted(fitted_points, key=lambda other: abs(other - value))[:2]
-            step = (fitted_points[near].fit - fitted_points[far].fit) * (value - near) / (near - far)
-            starting_points = held.at(
-                replace(fitted_points[near], fit=np.clip(fitted_points[near].fit + step, held.low, held.high))
-            )
-        fits[value] = laplace_at(held, held.descend(held.update_noise_levels(held.evaluate(starting_points), 1), 1))
-        fitted_points[value] = fits[value].point
-    return [fits[value] for value in values.tolist()]
-
-
-def _trading_index(evidence: Evidence, index: int) -> int | None:
-    """The index of the mechanisms' parameter, of uniform prior, that a parameter trades against; None for none."""
-    hypothesis = evidence.hypothesis
-    deviations = np.sqrt(np.diag(evidence.covariance))
-    mean_index = hypothesis.mean_indices.index(index)
-    correlations = np.abs(evidence.covariance[mean_index]) / (deviations[mean_index] * deviations)
-    for row, other in enumerate(hypothesis.mean_indices):
-        parameter = hypothesis.model.parameters[other]
-        low, high = parameter.bounds
-        between = (
-            other < hypothesis.mechanism_parameter_count
-            and isinstance(parameter.prior, Uniform)
-            and parameter.scale == "linear"
-        )
-        if between and correlations[row] > TRADING_CORRELATION and deviations[row] > _UNDETERMINED * (high - low):
-            return other
-    return None
 
 
 _SPREAD_VALUES = 24  # of the sensors' spread or the scatter of gains, at equal distances between its bounds
@@ -438,8 +348,7 @@ def marginalise_curve_noise(evidence: Evidence, indices: Sequence[int]) -> Norma
 
 def _with_levels(fitter: Fitter, at: Evaluated, covariance: Floats) -> Evaluated:
     """The same predictions with other covariance parameters (points, parameters)."""
-    shifted = fitter.weighed(fitter.with_covariance(at.points, covariance), at.products)
-    return replace(shifted, log_slope_gradient=at.log_slope_gradient)
+    return fitter.weighed(fitter.with_covariance(at.points, covariance), at.products)
 
 
 def _shares(values: Floats) -> Floats:

@@ -47,37 +47,22 @@ _STARTS = 3  # fitted, of each hypothesis
 _NOISE_LEVEL_STEPS, _NOISE_LEVEL_STEPS_WITHOUT_PARENT = 1, 10
 _STARTS_FROM_PARENT = 1  # of curves, where an explanation with one mechanism less is known
 _CONTACT_POINT_STARTS = 4  # points of the grid, of curves, from which contact points are searched
-_SOFTER = (1.0, 0.25, 0.06)
 _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
 
 
-@dataclass(frozen=True)
-class StartingPoint:
-    """Known values at which the fit of a hypothesis may begin.
-
-    `parent`: fit coordinates of those of its mechanisms that were fitted without the others; None where none were.
-    `nuisances`: the point with the nuisances' starting values; None for their priors' centres. `single`: fit
-    coordinates of the added mechanism, fitted on its own, as a further guess; empty where there are none.
-    """
-
-    parent: Mapping[str, Sequence[float]] | None
-    nuisances: FitPoint | None
-    single: Mapping[str, Sequence[float]]
-
-
-def best_starts(fitter: Fitter, known: StartingPoint) -> Points:
+def best_starts(fitter: Fitter, request: "Request") -> Points:
     """The best of the local minima of a grid over the new mechanisms' prior quantiles, and of the values that the
     recordings suggest."""
-    grid = _Grid(fitter.hypothesis, known)
-    initial = fitter.initial(grid.coordinates, known.nuisances)
-    many_steps = fitter.covariance_indices.size and known.parent is None
+    grid = _Grid(fitter.hypothesis, request.parent)
+    initial = fitter.initial(grid.coordinates, request.start)
+    many_steps = fitter.covariance_indices.size and request.parent is None
     at = fitter.update_noise_levels(initial, _NOISE_LEVEL_STEPS_WITHOUT_PARENT if many_steps else _NOISE_LEVEL_STEPS)
     cost = at.cost[: grid.size].reshape(grid.shape)
     # Many steps move the mechanisms' covariance parameters off the grid, so that all its points are kept.
     on_grid = np.arange(grid.size) if many_steps else np.flatnonzero(_are_lowest(cost))
     lowest = at[np.append(on_grid, np.arange(grid.size, len(at)))]
     if fitter.lines.curves:
-        return _starts_of_curves(fitter, lowest, len(at) - grid.size, grid.new_names, known)
+        return _starts_of_curves(fitter, lowest, len(at) - grid.size, grid.new_names, request)
     return lowest.points[np.sort(_cheapest(lowest)[:_STARTS])]
 
 
@@ -88,9 +73,9 @@ class _Grid:
     `size` of the grid; `new_names`, the mechanisms that the parent lacks.
     """
 
-    def __init__(self, hypothesis: Hypothesis, starting_point: StartingPoint) -> None:
+    def __init__(self, hypothesis: Hypothesis, explained: "Explanation | None") -> None:
         slices = parameter_slices(hypothesis.model.names, hypothesis.lines)
-        parent = starting_point.parent or {}
+        parent = {} if explained is None else {name: explained.coordinates(name) for name in explained.names}
         # A mechanism also counts as new if its parameters differ from those in the parent.
         self.new_names = [name for name, span in slices.items() if len(parent.get(name, ())) != span.stop - span.start]
         parameters = {name: hypothesis.model.parameters[slices[name]] for name in self.new_names}
@@ -108,25 +93,11 @@ class _Grid:
         self.shape = [len(axis) for axis in axes] or [1]
         self.size = len(points)
         points += map(tuple, _guesses(self.new_names, hypothesis))
-        single = [value for name in self.new_names for value in starting_point.single.get(name, ())]
-        if self.new_names and len(single) == len(columns):
-            points.append(tuple(single))
         self.coordinates = np.zeros((len(points), hypothesis.mechanism_parameter_count))
         for name, values in parent.items():
             if name not in self.new_names:
                 self.coordinates[:, slices[name]] = values
         self.coordinates[:, columns] = points
-
-
-def _with_softer_moduli(fitter: Fitter, at: Evaluated) -> Evaluated:
-    """Of curves with an undeclared modulus: also with smaller moduli, since adhesion makes a sample look stiffer."""
-    indices = [index for index, parameter in enumerate(fitter.model.parameters) if parameter.proportional]
-    if not indices:
-        return at
-    points = at.points[np.repeat(np.arange(len(at)), len(_SOFTER))]
-    fit = points.fit.copy()
-    fit[:, indices] += np.tile(np.log(_SOFTER), len(at))[:, None]
-    return fitter.evaluate(replace(points, fit=fit), slopes=False)
 
 
 def _with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
@@ -159,7 +130,7 @@ def _with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
 
 
 def _starts_of_curves(
-    fitter: Fitter, lowest: Evaluated, guess_count: int, new_names: Sequence[str], starting_point: StartingPoint
+    fitter: Fitter, lowest: Evaluated, guess_count: int, new_names: Sequence[str], request: "Request"
 ) -> Points:
     """The best starts of curves, with contact points searched where none are known; the last `guess_count` of `lowest`
     are guesses."""
@@ -168,48 +139,17 @@ def _starts_of_curves(
     candidates = lowest[np.append(np.sort(ranked), np.arange(grid_count, len(lowest)))]
     is_single = len(fitter.model.names) == 1
     moves_contact = is_single and Adhesion.name in new_names
-    if fitter.lines.kind == "indentation" and (moves_contact or starting_point.nuisances is None):
-        candidates = _with_contact_points(
-            fitter, _with_softer_moduli(fitter, candidates) if moves_contact else candidates
-        )
+    if fitter.lines.kind == "indentation" and (moves_contact or request.start is None):
+        candidates = _with_contact_points(fitter, candidates)
     begins_at_guesses = any(isinstance(fitter.lines.mechanisms[name], UnlistedLaw) for name in new_names)
-    count = _STARTS_FROM_PARENT if starting_point.parent is not None and not begins_at_guesses else _STARTS
+    count = _STARTS_FROM_PARENT if request.parent is not None and not begins_at_guesses else _STARTS
     starts = candidates.points[np.sort(_cheapest(candidates)[:count])]
-    if new_names and starting_point.parent is not None and starting_point.nuisances is not None:
-        starts = Points.joined(
-            starts, _without_effect(fitter, new_names, starting_point.parent, starting_point.nuisances)
-        )
     if not (moves_contact and guess_count):
         return starts
     # The null hypothesis' modulus and contact points may lead away from the jumps of the curves: the best guess is also
     # fitted from the priors' centres.
     initial = fitter.initial(lowest.points.fit[grid_count:, : fitter.hypothesis.mechanism_parameter_count])
-    return Points.joined(starts, initial.best.points)
-
-
-def _without_effect(
-    fitter: Fitter, new_names: Sequence[str], parent: Mapping[str, Sequence[float]], nuisances: FitPoint
-) -> Points:
-    """The parent's fit, with the added mechanisms as near as their bounds allow to no effect."""
-    hypothesis = fitter.hypothesis
-    coordinates = np.zeros((1, hypothesis.mechanism_parameter_count))
-    for name, span in parameter_slices(hypothesis.model.names, hypothesis.lines).items():
-        coordinates[0, span] = (
-            [_no_effect_coordinate(parameter) for parameter in hypothesis.model.parameters[span]]
-            if name in new_names
-            else parent.get(name, ())
-        )
-    return replace(fitter.start(coordinates, nuisances), covariance=nuisances.covariance[None])
-
-
-def _no_effect_coordinate(parameter: Parameter) -> float:
-    """The fit coordinate within the bounds that is nearest to no effect; the prior's centre where no value has none."""
-    if parameter.limit is None:
-        return parameter.start
-    low, high = parameter.bounds
-    if parameter.fit_limit is not None:
-        return float(np.clip(parameter.fit_limit, low, high))
-    return high if parameter.limit > 0 else low
+    return Points.joined([starts, initial.best.points])
 
 
 def _cheapest(at: Evaluated) -> Indices:
@@ -306,29 +246,18 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Request:
-    """A set of mechanisms to explain.
-
-    `parent`: the explanation of the set without one of them; `single`: that of this one on its own.
-    """
+    """A set of mechanisms to explain; `parent` is the explanation of the set without one of them."""
 
     names: tuple[str, ...]
     parent: Explanation | None = None
-    single: Explanation | None = None
     nuisances: FitPoint | None = None  # starting values of the nuisances, if not the parent's
-    initial: Explanation | None = None  # starting values of all parameters
     rival: Explanation | None = None  # what a fit must gain on, if not on the parent's
     never_pruned: bool = False  # fitted to convergence and explained, however far behind and even without gain
 
     @property
-    def starting_point(self) -> StartingPoint:
-        """What is known of its parameters."""
-        parent, nuisances = self.parent, self.nuisances
-        coordinates = None if parent is None else {name: parent.coordinates(name) for name in parent.names}
-        if self.initial is not None:
-            coordinates = {name: self.initial.coordinates(name) for name in self.names}
-            nuisances = self.initial.point
-        single = {} if self.single is None else {name: self.single.coordinates(name) for name in self.single.names}
-        return StartingPoint(coordinates, parent.point if parent and nuisances is None else nuisances, single)
+    def start(self) -> FitPoint | None:
+        """The point with the nuisances' starting values; None for their priors' centres."""
+        return self.parent.point if self.nuisances is None and self.parent is not None else self.nuisances
 
     @property
     def without_scatter(self) -> bool:
@@ -402,7 +331,7 @@ class FittingProblem:
         log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER]).tolist()
         fits: list[tuple[float, Evidence]] = []
         if request.without_scatter:
-            improved, evidence = _fitted(plain, best_starts(plain, request.starting_point), request, best)
+            improved, evidence = _fitted(plain, best_starts(plain, request), request, best)
             if evidence is None and parent is not None and parent.p_position_scatter <= 0.5:
                 return None
             tries_scatter = (
@@ -417,7 +346,7 @@ class FittingProblem:
                 return Explanation.of(fits) if fits else None
             starts = scattered.with_scatter(improved)
         else:
-            starts = best_starts(scattered, request.starting_point)
+            starts = best_starts(scattered, request)
         improved, evidence = _fitted(scattered, starts, request, best)
         if evidence is None:
             gains = fits and fits[0][1].cost < request.cost_to_beat(has_position_scatter=True)
@@ -468,9 +397,9 @@ class FittingProblem:
         if self.lines.curves:
             return False
         products = fitter.products(points, slopes=False, place=True)
-        if products.place_slopes is None:
+        if products.squared_slopes is None:
             return False
-        first = (products.place_slopes**2).sum(axis=0) / (products.level**2 + 1e-300)
+        first = products.squared_slopes / (products.level**2 + 1e-300)
         effect = POSITION_RANGE[1] ** 2 * first + 0.5 * POSITION_RANGE[1] ** 4 * self.curvature.square
         return bool((effect > _LEAST_SCATTER**2).any())
 

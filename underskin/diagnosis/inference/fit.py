@@ -23,10 +23,9 @@ from underskin.diagnosis.inference.hypothesis import (
     Points,
     log_likelihoods,
     normal_equations,
-    parameter_slices,
 )
 from underskin.diagnosis.inference.least_squares import LeastSquares, between_samples
-from underskin.diagnosis.inference.products import FrfProducts, Products, joined
+from underskin.diagnosis.inference.products import FrfProducts, Products
 from underskin.diagnosis.noise import DISCREPANCY, GAIN_PRIOR, POSITION_PRIOR, START_GAIN, USUAL, SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.curves import CurveModel
@@ -42,7 +41,6 @@ _SETTLING = 20
 _SMOOTH_STARTS = (USUAL.low, DISCREPANCY.low)  # of curves: close fit, and loose
 _CURVE_SETTLING = 8
 _PROMISED, _MARGIN = 10.0, 2.0  # times the gain by the gradient, and nats beyond it, that a fit may still gain
-_SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's slopes
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
 _LEAST_CURVATURE = 1e-10
@@ -118,7 +116,7 @@ class Fitter:
         """The inner products at points; with derivatives if `slopes`, with position slopes if `place`."""
         if self.lines.curves:
             return self.hypothesis.curve_products(points.fit, slopes=slopes)
-        return joined(
+        return FrfProducts.joined(
             [
                 FrfProducts.of(
                     self.hypothesis.frf_lines,
@@ -133,14 +131,6 @@ class Fitter:
         """Slices of points small enough that arrays with derivatives by so many variables stay small."""
         count = max(_NUMBERS_AT_ONCE // self.hypothesis.frf_model.numbers(variables), 1)
         return [slice(first, first + count) for first in range(0, len(points), count)]
-
-    def place_slopes(self, points: Points) -> Floats:
-        """∂m/∂x and ∂m/∂y of recordings, without the dynamics (2, points, recordings)."""
-        slopes = np.empty((2, len(points), self.lines.recordings))
-        for batch in self._at_once(points, 0):
-            response = self.hypothesis.frf_model.respond(points.fit[batch], slopes=False, place=True, lines=False)
-            slopes[:, batch] = response.place_slopes
-        return slopes
 
     def weighed(self, points: Points, products: Products) -> Evaluated:
         """Points with known predictions and their costs; where the sensors' gains are free, at the most probable
@@ -211,9 +201,7 @@ class Fitter:
         Held parameters have gradient 0 and information 1.
         """
         levels, sensor_log_gain = self.levels(at.points.covariance[:, None]), at.points.sensor_log_gain
-        information, gradient = normal_equations(
-            self.lines, self.curvature, at.products, levels, sensor_log_gain, at.log_slope_gradient
-        )
+        information, gradient = normal_equations(self.lines, self.curvature, at.products, levels, sensor_log_gain)
         offset = at.points.fit - self._centre
         precision = self._prior_precision(offset)
         others = self.hypothesis.other_kinds
@@ -277,7 +265,7 @@ class Fitter:
             moving = moving[gained >= _LEAST_GAIN]
             if not len(moving):
                 break
-        return Evaluated(points, at.products, cost, at.log_slope_gradient)
+        return Evaluated(points, at.products, cost)
 
     def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
         """Gradient and Hessian of the costs in the covariance parameters, by differences; without the mixed terms of
@@ -399,14 +387,6 @@ class Fitter:
         """Index of the parameter that the prediction is proportional to."""
         return [parameter.proportional for parameter in self.model.parameters].index(True)
 
-    @cached_property
-    def _moves_position_slopes(self) -> Mask:
-        """Parameters that may change ∇σ/σ at the contact: not d33, nor those of the dynamics."""
-        moves = np.array([not parameter.proportional for parameter in self.model.parameters])
-        for name, span in parameter_slices(self.model.names, self.lines).items():
-            moves[span] &= not self.lines.mechanisms[name].needs_lines
-        return moves
-
     def improve(self, start: Points, cost_to_beat: CostToBeat | None = None, near_cost: float = np.inf) -> Evaluated:
         """The most probable points near the starts; only roughly where they will not reach `cost_to_beat`.
 
@@ -464,7 +444,7 @@ class Fitter:
             if cost_to_beat is not None:
                 promising = part.cost - _PROMISED * promised - _MARGIN < cost_to_beat(best)[moving]
                 moving, part, step, slope = moving[promising], part[promising], step[promising], slope[promising]
-            resting = (slope < _CONVERGED) & self.has_log_slope_gradient(part)
+            resting = slope < _CONVERGED
             going = np.ones(len(part), dtype=bool)
             if resting.any():
                 settled = self.update_noise_levels(part[resting], settling)
@@ -485,81 +465,28 @@ class Fitter:
     def _after_step(
         self, at: Evaluated, step: Floats, damping: Floats, settling: int
     ) -> tuple[Evaluated, Floats, Mask]:
-        """The points after steps, where these gain; their damping; and which of them continue.
-
-        A point that does not gain first needs the gradient of its position slopes, then shorter steps.
-        """
+        """The points after steps, where these gain; their damping; and which of them continue."""
         fit = np.clip(at.points.fit + step, self.low, self.high)
         tried = self.update_noise_levels(self.evaluate(replace(at.points, fit=fit)), settling)
         gained = at.cost - tried.cost
         better = gained > 0
-        after = self.replaced(
-            at, np.flatnonzero(better), replace(tried, log_slope_gradient=at.log_slope_gradient)[better]
-        )
+        after = self.replaced(at, np.flatnonzero(better), tried[better])
         stuck = ~better & ((damping > 1e4) | (np.abs(step).max(axis=1) < 1e-7))
-        blind = np.flatnonzero(~better & ~stuck & ~self.has_log_slope_gradient(at))
-        if len(blind):
-            after = self.replaced(after, blind, self.with_log_slope_gradient(at[blind]))
         failed = ~better & ~stuck
-        failed[blind] = False
         damping = np.where(better, np.maximum(damping / 10, 1e-6), damping)
         damping = np.where(failed, np.maximum(damping * 10, 1e-2), damping)
         idle = failed & (gained > -_CONVERGED) & (damping > 1)
         return after, damping, ~(stuck | idle | (better & (gained < _CONVERGED)))
 
-    def has_log_slope_gradient(self, at: Evaluated) -> Mask:
-        """Points whose `log_slope_gradient` is known or not needed."""
-        if not self.has_position_scatter:
-            return np.ones(len(at), dtype=bool)
-        if at.log_slope_gradient is None:
-            return np.zeros(len(at), dtype=bool)
-        return np.asarray(np.isfinite(at.log_slope_gradient).all(axis=(1, 2)))
-
     def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
         """With other points in place of those at indices `where`, in rising order."""
         if not len(where):
             return at
-        if len(where) == len(at) and (at.log_slope_gradient is None or other.log_slope_gradient is not None):
+        if len(where) == len(at):
             return other
         order = np.arange(len(at))
         order[where] = len(at) + np.arange(len(other))
-
-        def merged(first: Floats, second: Floats) -> Floats:
-            return np.concatenate([first, second])[order]
-
-        base, replacements = at.points, other.points
-        points = Points(
-            merged(base.fit, replacements.fit),
-            merged(base.covariance, replacements.covariance),
-            merged(base.sensor_log_gain, replacements.sensor_log_gain),
-        )
-        log_slope_gradient = None
-        if at.log_slope_gradient is not None or other.log_slope_gradient is not None:
-            unknown = np.full((1, self.lines.recordings, len(self.low)), np.nan)
-            log_slope_gradient = merged(
-                *(
-                    np.repeat(unknown, len(evaluated), axis=0)
-                    if evaluated.log_slope_gradient is None
-                    else evaluated.log_slope_gradient
-                    for evaluated in (at, other)
-                )
-            )
-        products = joined([at.products, other.products])[order]
-        return Evaluated(points, products, merged(at.cost, other.cost), log_slope_gradient)
-
-    def with_log_slope_gradient(self, at: Evaluated) -> Evaluated:
-        """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position slopes t, by differences."""
-        step = _SLOPE_STEP * self._range
-        step = np.where(at.points.fit + step <= self.high, step, -step)
-        number, index = np.nonzero(np.broadcast_to(self.free & self._moves_position_slopes, step.shape))
-        moved = at.points[number]
-        fit = moved.fit.copy()
-        fit[np.arange(len(fit)), index] += step[number, index]
-        here, there = (_log_size(self.place_slopes(points)) for points in (at.points, replace(moved, fit=fit)))
-        log_slope_gradient = np.zeros((len(at), here.shape[1], len(self.low)))
-        log_slope_gradient[:, :, self._d33] = 2.0  # the response is proportional to d33
-        log_slope_gradient[number, :, index] = (there - here[number]) / step[number, index][:, None]
-        return replace(at, log_slope_gradient=log_slope_gradient)
+        return Evaluated.joined([at, other])[order]
 
     def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats, Floats]:
         """Damped Gauss–Newton steps of the mean parameters within the bounds, limited in length, and the gains that the
@@ -606,8 +533,3 @@ def _smooth_range(fitter: Fitter) -> tuple[float, float]:
     """Range of starting values of the log smooth error of curves."""
     smooth = fitter.hypothesis.smooth
     return smooth.low, max(smooth.high, DISCREPANCY.low)
-
-
-def _log_size(slopes: Floats) -> Floats:
-    """log |t|² (points, recordings) of position slopes (2, points, recordings)."""
-    return np.log((slopes**2).sum(axis=0) + 1e-300)

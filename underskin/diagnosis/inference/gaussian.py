@@ -16,6 +16,7 @@ import numpy as np
 from underskin.units import Floats
 
 _INFORMS = 0.2  # of a prior's precision: the least that informative recordings add
+_LEAST_SHARE = 1e-11  # of a prior's variance: less is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,8 @@ class Gaussian:
         limit.
         """
         root = np.sqrt(precision)
-        values, vectors = np.linalg.eigh(np.linalg.inv(root[:, None] * covariance * root))
+        shares, vectors = np.linalg.eigh(root[:, None] * covariance * root)
+        values = 1 / np.maximum(shares, _LEAST_SHARE)
         informing = vectors[:, values > 1 + _INFORMS]
         ratios = values[values > 1 + _INFORMS]
         added = (informing * (ratios - 1)) @ informing.T * np.outer(root, root)

@@ -17,7 +17,6 @@ with H, the Hessian of σ, of the base model.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from underskin.autodiff import contiguous
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.products import (
+    AtPoints,
     CurveLines,
     CurveProducts,
     FrfLines,
@@ -73,8 +73,8 @@ def log_likelihoods(
     about_means, numbers = lines.about_means
     further = sums.log_determinant + 2 * numbers * np.log(levels.level) + about_means / levels.level**2
     log_likelihood = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
-    slopes = products.place_slopes
-    squared_slopes = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    slopes = products.squared_slopes
+    squared_slopes = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)
     arrays = map(contiguous, (products.level, sums.uu, sums.uy, sums.across, squared_slopes))
     add(
@@ -89,14 +89,12 @@ def normal_equations(
     products: Products,
     levels: SeveralLevels,
     sensor_log_gain: Floats,
-    log_slope_gradient: Floats | None = None,
 ) -> tuple[Floats, Floats]:
     """Information Jᵀ C⁻¹ J (points, P, P) on the parameters and gradient of the log likelihood (points, P), at the
     first set of noise levels.
 
-    The gradient is that of −½ log|C| − ½ rᵀC⁻¹r by the mean and by all columns of C that depend on the model.
-    `log_slope_gradient` is ∂ log |t|²/∂θ (points, recordings, P) of the position slopes t; where it is not finite, t is
-    taken to change as L does, or not at all where t dominates.
+    The gradient is that of −½ log|C| − ½ rᵀC⁻¹r by the mean and by all columns of C that depend on the model. The
+    position slopes t are taken to change as L does, or not at all where t dominates.
     """
     from underskin.diagnosis.inference.kernels import normal_equations as fill
 
@@ -106,8 +104,8 @@ def normal_equations(
     none = np.zeros((points, recordings, 0))
     by_level = none if products.level_slopes is None else products.level_slopes
     turned = (none, none, none[..., None]) if slope_sums is None else (slope_sums.uv, slope_sums.vy, slope_sums.vv)
-    slopes = products.place_slopes if np.any(levels.position) else None
-    squared_slopes = np.zeros((points, 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    slopes = products.squared_slopes if np.any(levels.position) else None
+    squared_slopes = np.zeros((points, 0)) if slopes is None else slopes
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)[:, 0]
     count = max(by_level.shape[-1], turned[0].shape[-1])
     information, gradient = np.empty((points, count, count)), np.empty((points, count))
@@ -118,7 +116,6 @@ def normal_equations(
         uy,
         *turned,
         squared_slopes,
-        none if log_slope_gradient is None else log_slope_gradient,
     )
     curvatures = curvature.laplacian, curvature.square
     fill(
@@ -149,8 +146,8 @@ class Likelihoods:
         a = products.level[:, None] * factor
         uu, ur = sums.uu / k2, (sums.uy - a * (1 - log_gains) * sums.uu) / k2
         variance = (levels.gain**2 + 0.5 * p2**2 * curvature.square) * a**2
-        if products.place_slopes is not None:
-            variance = variance + p2 * (products.place_slopes**2).sum(axis=0)[:, None] * factor**2
+        if products.squared_slopes is not None:
+            variance = variance + p2 * products.squared_slopes[:, None] * factor**2
         reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
         self._shrink, self._weight = variance * reduced, a * reduced
         tau2 = levels.spread**2
@@ -266,7 +263,7 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
 
 
 @dataclass(frozen=True)
-class Points:
+class Points(AtPoints):
     """Coordinates of fits of one hypothesis: of the model (points, parameters), of the covariance, and the sensors' log
     gains."""
 
@@ -277,28 +274,14 @@ class Points:
     def __len__(self) -> int:
         return len(self.fit)
 
-    def __getitem__(self, points: Indices | Mask | slice) -> "Points":
-        return Points(self.fit[points], self.covariance[points], self.sensor_log_gain[points])
-
-    @classmethod
-    def joined(cls, first: "Points", second: "Points") -> Self:
-        """The points of both."""
-        names = "fit", "covariance", "sensor_log_gain"
-        return cls(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
-
 
 @dataclass(frozen=True)
-class Evaluated:
-    """Points with their products and `cost`, minus the log posterior density up to a constant that all share.
-
-    `log_slope_gradient` is ∂ log |t|²/∂θ of the position slopes (points, recordings, parameters), not finite where a
-    fit has not needed it.
-    """
+class Evaluated(AtPoints):
+    """Points with their products and `cost`, minus the log posterior density up to a constant that all share."""
 
     points: Points
     products: Products
     cost: Floats
-    log_slope_gradient: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -306,12 +289,6 @@ class Evaluated:
     def subset(self, points: Indices) -> "Evaluated":
         """Some of the points, in their order; itself where that is all of them."""
         return self if len(points) == len(self) else self[points]
-
-    def __getitem__(self, points: Indices | Mask | slice) -> "Evaluated":
-        if isinstance(points, np.ndarray) and points.dtype == bool and points.all():
-            return self
-        log_slope_gradient = None if self.log_slope_gradient is None else self.log_slope_gradient[points]
-        return Evaluated(self.points[points], self.products[points], self.cost[points], log_slope_gradient)
 
     @property
     def best(self) -> "Evaluated":

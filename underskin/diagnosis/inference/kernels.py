@@ -412,7 +412,6 @@ def _add_position_gradient(
     level: Floats,
     level_slopes: Floats,
     squared_slopes: Floats,
-    log_slope_gradient: Floats,
     uv: Floats,
     vy: Floats,
     inverse: float,
@@ -421,7 +420,8 @@ def _add_position_gradient(
     of_sensors: Floats,
     slope: Floats,
 ) -> None:
-    """Add the gradient by the column of the position slopes."""
+    """Add the gradient by the column of the position slopes t, taken to change as L does, or not at all where t
+    dominates."""
     for r in range(len(terms)):
         row = terms[r]
         _, _, shrink, gain = of_sensors[sensor[r]]
@@ -431,9 +431,7 @@ def _add_position_gradient(
         u_information = row[_UU] * row[_REDUCED] - shrink * um * um  # uᵀ C⁻¹ u
         slopes_dominate = _FROM_SLOPES**2 * squared_slopes[r] > level[r] ** 2
         for p in range(len(slope)):
-            log_gradient = log_slope_gradient[r, p] if log_slope_gradient.shape[1] else np.nan
-            if np.isnan(log_gradient):
-                log_gradient = 0.0 if slopes_dominate else 2 * level_slopes[r, p] / level[r]
+            log_gradient = 0.0 if slopes_dominate else 2 * level_slopes[r, p] / level[r]
             by_slopes = 0.5 * (explained * explained - u_information) * log_gradient
             if uv.shape[1]:
                 along, with_r = uv[r, p] * inverse, (vy[r, p] - row[_MEAN] * uv[r, p]) * inverse
@@ -445,7 +443,7 @@ def _add_position_gradient(
 
 @compiled(
     f"void(float64[:, ::1], {_OF_PARAMETERS}, float64[:, ::1], float64[:, ::1], {_OF_PARAMETERS}, {_OF_PARAMETERS}, "
-    f"{_OF_PAIRS}, float64[:, ::1], {_OF_PARAMETERS}, int64[::1], float64[:, ::1], float64[::1], float64[::1], "
+    f"{_OF_PAIRS}, float64[:, ::1], int64[::1], float64[:, ::1], float64[::1], float64[::1], "
     f"float64[:, ::1], {_OF_PARAMETERS}, float64[:, ::1])"
 )
 def normal_equations(
@@ -457,7 +455,6 @@ def normal_equations(
     vy: Floats,
     vv: Floats,
     squared_slopes: Floats,
-    log_slope_gradient: Floats,
     sensor: NDArray[np.int64],
     sensor_log_gain: Floats,
     laplacian: Floats,
@@ -475,9 +472,8 @@ def normal_equations(
     uu, uy, uv, vy, vv
         The sums Re u*u, Re u*y (points, recordings), with the derivatives v of u Re u*v, Re v*y (points, recordings,
         P) and Re v*v (points, recordings, P, P), or P = 0 where u does not change.
-    squared_slopes, log_slope_gradient
-        |t|² of the position slopes (points, recordings), or (points, 0) without positioning scatter, and ∂ log |t|²/∂θ
-        (points, recordings, P); NaN where t is taken to change as L does, or not at all where t dominates; or P = 0.
+    squared_slopes
+        |t|² of the position slopes (points, recordings), or (points, 0) without positioning scatter.
     sensor, sensor_log_gain, laplacian, square
         See `log_likelihoods`.
     noise
@@ -524,7 +520,6 @@ def normal_equations(
                 level[point],
                 level_slopes[point],
                 squared_slopes[point],
-                log_slope_gradient[point],
                 uv[point],
                 vy[point],
                 1 / levels[1],

@@ -7,10 +7,10 @@ each line, 1 without dynamics; of curves L = 1 and u is the force, transformed s
 pick-up weigh less, and the sums are corrected for it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -49,21 +49,38 @@ class Sums:
 
 
 @dataclass(frozen=True)
-class SlopeSums:
+class AtPoints:
+    """Arrays over points (points, …), or further such classes; None where something is not there."""
+
+    shared: ClassVar[Collection[str]] = ()  # the fields that are the same at all points
+
+    def _by_points(self) -> dict[str, Any]:
+        values = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in self.shared}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def __getitem__(self, points: Array | slice) -> Self:
+        """At some of the points."""
+        return replace(self, **{name: value[points] for name, value in self._by_points().items()})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """At the points of several, one after another."""
+        if len(parts) == 1:
+            return parts[0]
+        joined = {}
+        for name, value in parts[0]._by_points().items():
+            values = [getattr(part, name) for part in parts]
+            joined[name] = value.joined(values) if isinstance(value, AtPoints) else np.concatenate(values)
+        return replace(parts[0], **joined)
+
+
+@dataclass(frozen=True)
+class SlopeSums(AtPoints):
     """Re u*v and Re v*y (points, recordings, parameters), and Re v*v (points, recordings, parameters, parameters)."""
 
     uv: Floats
     vy: Floats
     vv: Floats
-
-    def __getitem__(self, points: Array | slice) -> "SlopeSums":
-        """At some of the points."""
-        return SlopeSums(self.uv[points], self.vy[points], self.vv[points])
-
-    @classmethod
-    def joined(cls, parts: Sequence["SlopeSums"]) -> Self:
-        """At the points of several, one after another."""
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("uv", "vy", "vv")))
 
 
 class PickupRows:
@@ -102,20 +119,17 @@ class CurveLines:
         self.columns = self.whitening.columns
         self.edges = np.append(lines.first, len(self.measured))
 
-    def sums(self, products: Floats) -> Floats:
-        """Over the samples of each recording (…, samples) to (…, recordings)."""
-        return np.add.reduceat(products, self.first, axis=-1)
-
 
 @dataclass(frozen=True)
-class CurveProducts:
+class CurveProducts(AtPoints):
     """Of curves: forces (points, samples) and derivatives (points, parameters, samples) on transformed samples."""
 
     lines: CurveLines
     force: Floats
     force_slopes: Floats | None
+    shared = ("lines",)
     level_slopes = None
-    place_slopes = None
+    squared_slopes = None
 
     @classmethod
     def of(cls, lines: CurveLines, force: Floats, slopes: Floats | None) -> Self:
@@ -125,11 +139,6 @@ class CurveProducts:
 
     def __len__(self) -> int:
         return len(self.force)
-
-    def __getitem__(self, points: Array | slice) -> Self:
-        """At some of the points."""
-        slopes = None if self.force_slopes is None else self.force_slopes[points]
-        return replace(self, force=self.force[points], force_slopes=slopes)
 
     @property
     def values(self) -> Self:
@@ -157,60 +166,32 @@ class CurveProducts:
 
     def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives, at the first of the sets of noise levels."""
-        slopes = self.force_slopes
-        assert slopes is not None
-        woodbury = _WoodburyProducts(self.lines, levels.at_first)
-        force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
-        by_slopes = woodbury.projections(slopes)  # (points, parameters, recordings, columns)
-        uv = woodbury.products(slopes, force, by_slopes, woodbury.projections(force))
-        vy = woodbury.products(slopes, measured, by_slopes, woodbury.projections(measured))
-        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), woodbury.squares(slopes, by_slopes))
+        assert self.force_slopes is not None
+        measured = np.broadcast_to(self.lines.measured, self.force.shape)
+        rows = np.concatenate([self.force_slopes, self.force[:, None], measured[:, None]], axis=1)
+        grams = np.stack([*self._grams(rows, levels)], axis=1)
+        return SlopeSums(grams[..., :-2, -2], grams[..., :-2, -1], grams[..., :-2, :-2])
 
     def with_force_changes(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
         """Re u*J (recordings, P) and Re JᵀJ (P, P) of changes of the force J (P, samples), at the first point and set
         of noise levels."""
-        woodbury = _WoodburyProducts(self.lines, levels.at_first)
-        turned, force = self.lines.whitening.turned(rows)[None], self.force[:1, None]
-        by_rows = woodbury.projections(turned)
-        by_force_changes = woodbury.products(turned, force, by_rows, woodbury.projections(force))
-        return by_force_changes[0].T, woodbury.squares(turned, by_rows)[0].sum(axis=0)
+        changes = np.concatenate([self.lines.whitening.turned(rows), self.force[:1]])[None]
+        along, square = [], np.zeros((len(rows), len(rows)))
+        for (gram,) in self._grams(changes, levels):
+            along.append(gram[-1, :-1])
+            square += gram[:-1, :-1]
+        return np.array(along), square
 
-
-class _WoodburyProducts:
-    """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity."""
-
-    def __init__(self, lines: CurveLines, levels: SeveralLevels) -> None:
-        """At noise levels (points, sets, 1)."""
-        ratio = levels.smooth / levels.level
-        self._lines = lines
-        self.weight = lines.whitening.weight(ratio)  # (points, sets, rows)
-        count = len(lines.columns)
-        first, second = np.triu_indices(count)
-        square = lines.sums(self.weight[..., None, :] * (lines.columns[first] * lines.columns[second]))
-        matrix = np.empty((*square.shape[:-2], square.shape[-1], count, count))
-        matrix[..., first, second] = matrix[..., second, first] = np.moveaxis(square, -2, -1)
-        level = levels.level[..., None, None] ** 2
-        capacitance = matrix + level * np.eye(count)
-        self.inverse = np.linalg.inv(capacitance)  # (points, sets, recordings, columns, columns)
-
-    def projections(self, rows: Floats) -> Floats:
-        """Pᵀ times transformed rows (points, sets, rows): (points, sets, recordings, columns)."""
-        weighed = (self.weight * rows)[..., None, :] * self._lines.columns
-        return np.moveaxis(self._lines.sums(weighed), -2, -1)
-
-    def squares(self, rows: Floats, by_rows: Floats) -> Floats:
-        """Of transformed rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
-        edges = [*self._lines.first, rows.shape[-1]]
-        weighed = self.weight * rows
-        unprojected = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
-        columns = np.moveaxis(by_rows, 1, 2)  # (points, recordings, P, columns)
-        return np.asarray(np.stack(unprojected, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
-
-    def products(self, rows: Floats, others: Floats, by_rows: Floats, by_others: Floats) -> Floats:
-        """Of transformed rows (points, sets, rows) of each recording."""
-        unprojected = self._lines.sums(self.weight * rows * others)
-        projected = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
-        return np.asarray(unprojected - projected)
+    def _grams(self, rows: Floats, levels: SeveralLevels) -> Iterator[Floats]:
+        """Of each recording the products κ² X C⁻¹ Xᵀ (points, P, P) of transformed rows X (points, P, samples), with
+        C = κ² D + η² B + P Pᵀ by Woodbury's identity, at the first of the sets of noise levels."""
+        lines, level = self.lines, levels.level[:, :1]
+        weight = lines.whitening.weight(levels.smooth[:, :1] / level)
+        for low, high in pairwise(lines.edges):
+            weighed, columns = weight[..., low:high] * rows[..., low:high], lines.columns[:, low:high]
+            by_columns = weighed @ columns.T
+            inverse = np.linalg.inv(weight[..., low:high] * columns @ columns.T + level**2 * np.eye(len(columns)))
+            yield weighed @ rows[..., low:high].swapaxes(1, 2) - by_columns @ inverse @ by_columns.swapaxes(1, 2)
 
 
 _LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, above which blocks are dense
@@ -284,7 +265,7 @@ def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
 
 
 @dataclass(frozen=True)
-class FrfProducts:
+class FrfProducts(AtPoints):
     """Of FRFs; `turning`, the sums with derivatives of u, is None where u is 1 or derivatives were not requested."""
 
     yy: Floats  # (recordings,)
@@ -292,9 +273,10 @@ class FrfProducts:
     uy: Floats
     level: Floats
     level_slopes: Floats | None  # (points, recordings, parameters)
-    place_slopes: Floats | None  # (2, points, recordings)
+    squared_slopes: Floats | None  # |t|² of the slopes over the contact's place (points, recordings)
     turning: SlopeSums | None
     pickup: "PickupProducts | None" = None
+    shared = ("yy",)
 
     @classmethod
     def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
@@ -307,24 +289,11 @@ class FrfProducts:
             uu, uy, turning = _products_of_factor(lines, factor.value, factor.slopes.transpose(1, 0, 2))
             turning = None if slopes is None else turning
         of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
-        return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
+        place = None if response.place_slopes is None else (response.place_slopes**2).sum(axis=0)
+        return cls(lines.yy, uu, uy, level.value, slopes, place, turning, of_pickup)
 
     def __len__(self) -> int:
         return len(self.level)
-
-    def __getitem__(self, points: Array | slice) -> Self:
-        """At some of the points."""
-        position_slopes, level_slopes = self.place_slopes, self.level_slopes
-        return replace(
-            self,
-            uu=self.uu[points],
-            uy=self.uy[points],
-            level=self.level[points],
-            level_slopes=None if level_slopes is None else level_slopes[points],
-            place_slopes=None if position_slopes is None else position_slopes[:, points],
-            turning=None if self.turning is None else self.turning[points],
-            pickup=None if self.pickup is None else self.pickup[points],
-        )
 
     @property
     def values(self) -> Self:
@@ -332,33 +301,12 @@ class FrfProducts:
         pickup = None if self.pickup is None else replace(self.pickup, v=None)
         return replace(self, level_slopes=None, turning=None, pickup=pickup)
 
-    @classmethod
-    def joined(cls, parts: Sequence["FrfProducts"]) -> Self:
-        """At the points of several, one after another."""
-
-        def of(name: str, axis: int = 0) -> Any:
-            values = [getattr(part, name) for part in parts]
-            return None if values[0] is None else np.concatenate(values, axis=axis)
-
-        turning = [part.turning for part in parts if part.turning is not None]
-        pickup = [part.pickup for part in parts if part.pickup is not None]
-        return cls(
-            parts[0].yy,
-            of("uu"),
-            of("uy"),
-            of("level"),
-            of("level_slopes"),
-            of("place_slopes", axis=1),
-            SlopeSums.joined(turning) if turning else None,
-            PickupProducts.joined(pickup) if pickup else None,
-        )
-
     def scaled(self, factor: Floats) -> Self:
         """With levels multiplied by `factor` (points,)."""
         column = factor[:, None]
         level_slopes = None if self.level_slopes is None else self.level_slopes * column[..., None]
-        position_slopes = None if self.place_slopes is None else self.place_slopes * column
-        return replace(self, level=self.level * column, level_slopes=level_slopes, place_slopes=position_slopes)
+        squared = None if self.squared_slopes is None else self.squared_slopes * column**2
+        return replace(self, level=self.level * column, level_slopes=level_slopes, squared_slopes=squared)
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
@@ -373,13 +321,14 @@ class FrfProducts:
 
 
 @dataclass(frozen=True)
-class PickupProducts:
+class PickupProducts(AtPoints):
     """u (points, lines) and v (points, parameters, lines) on the distinct lines of the rows with pick-up; v is None
     where it is 0."""
 
     rows: PickupRows
     u: Array
     v: Array | None
+    shared = ("rows",)
 
     @classmethod
     def of(cls, rows: PickupRows, points: int, factor: Differentiated | None) -> Self:
@@ -388,17 +337,6 @@ class PickupProducts:
             return cls(rows, np.ones((points, len(rows.lines)), dtype=complex), None)
         slopes = factor.slopes.transpose(1, 0, 2)[..., rows.lines] if len(factor.slopes) else None
         return cls(rows, factor.value[:, rows.lines], slopes)
-
-    def __getitem__(self, points: Array | slice) -> Self:
-        """At some of the points."""
-        return replace(self, u=self.u[points], v=None if self.v is None else self.v[points])
-
-    @classmethod
-    def joined(cls, parts: Sequence["PickupProducts"]) -> Self:
-        """At the points of several, one after another."""
-        slopes = [part.v for part in parts if part.v is not None]
-        u = np.concatenate([part.u for part in parts])
-        return cls(parts[0].rows, u, np.concatenate(slopes) if slopes else None)
 
     def without_pickup(self, sums: Sums, levels: SeveralLevels) -> Sums:
         """The sums corrected for pick-up."""
@@ -451,15 +389,3 @@ def _products_of_factor(lines: FrfLines, u: Array, slopes: Array) -> tuple[Float
 
 
 Products = FrfProducts | CurveProducts
-
-
-def joined(parts: Sequence[Products]) -> Products:
-    """Products of one model at several sets of points, one after another."""
-    if len(parts) == 1:
-        return parts[0]
-    curves = [part for part in parts if isinstance(part, CurveProducts)]
-    if curves:
-        slopes = [part.force_slopes for part in curves if part.force_slopes is not None]
-        force = np.concatenate([part.force for part in curves])
-        return CurveProducts(curves[0].lines, force, np.concatenate(slopes) if slopes else None)
-    return FrfProducts.joined([part for part in parts if isinstance(part, FrfProducts)])

@@ -128,6 +128,11 @@ class Search:
     unlisted_odds: float = 0.0  # least odds of what is unlisted beside the leading set
 
     @property
+    def null(self) -> Explanation:
+        """The null hypothesis."""
+        return next(fitted for fitted in self.explanations if not fitted.names)
+
+    @property
     def supported(self) -> int:
         """How many mechanisms the campaign supports."""
         lines = self.explanations[0].best.hypothesis.lines

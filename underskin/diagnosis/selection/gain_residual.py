@@ -28,7 +28,6 @@ _NEGLIGIBLE = 60.0  # nats behind the best node, from which on a node cannot mat
 _USUAL_POSITION = np.geomspace(*POSITION_RANGE, 4)  # [m], with a law; without one the scatter may be larger
 _ALL_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)  # [m]
 _BLOCK = 16  # sets of features per block
-_FEW_FEATURES = 3  # up to which products of pairs are fewer than copies weighted for each scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,28 +44,22 @@ class ScatterNodes:
 
 @dataclass(frozen=True, eq=False)
 class SensorPairs:
-    """Pairs of a sensor and one of its recordings, sorted by sensor, for sensors with several recordings.
+    """Pairs of a sensor and one of its recordings, sorted by sensor.
 
-    `row` is the recording (pairs,), `first` the index of each sensor's first pair (sensors + 1,); `single` marks
-    recordings that are the only one of their sensor, whose spread is an independent variance.
+    `row` is the recording (pairs,), `first` the index of each sensor's first pair (sensors + 1,).
     """
 
     row: Indices
     first: Indices
-    single: Mask
 
     @classmethod
     def of(cls, sensor: Indices) -> "SensorPairs":
         """From the sensor of each recording (recordings,)."""
-        single = np.bincount(sensor)[sensor] == 1
         row = np.argsort(sensor, kind="stable")
-        row = row[~single[row]]
-        return cls(row, np.append(np.flatnonzero(np.diff(sensor[row], prepend=-1)), len(row)), single)
+        return cls(row, np.append(np.flatnonzero(np.diff(sensor[row], prepend=-1)), len(row)))
 
     def sums(self, values: Floats) -> Floats:
         """Sums over the pairs of each sensor, of values (…, pairs)."""
-        if len(self.row) == 0:
-            return values
         return np.asarray(np.add.reduceat(values, self.first[:-1], axis=-1))
 
     def spread(self, values: Array) -> Array:
@@ -95,8 +88,7 @@ class _WithoutLaw:
     @classmethod
     def of(cls, nodes: ScatterNodes, fixed: Floats, pairs: SensorPairs, spread: float) -> "_WithoutLaw":
         """With `fixed` columns (recordings, columns) and the `spread` of the sensors' log gains."""
-        variances = nodes.variances + spread**2 * pairs.single
-        precision = 1 / variances
+        precision = 1 / nodes.variances
         by_sensor = precision[:, pairs.row]
         total = pairs.sums(by_sensor)
         sensor_columns = by_sensor * pairs.spread(spread / np.sqrt(1 + spread**2 * total))
@@ -114,7 +106,7 @@ class _WithoutLaw:
         projector = np.linalg.solve(lower, fixed_inverse)
         projection = projector @ nodes.residual
         weighted = times_inverse(nodes.residual[None, None])[:, 0] - (projection[:, None] @ projector)[:, 0]
-        log_determinant = np.log(variances).sum(axis=1) + np.log1p(spread**2 * total).sum(axis=1)
+        log_determinant = np.log(nodes.variances).sum(axis=1) + np.log1p(spread**2 * total).sum(axis=1)
         log_determinant += 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
         log_density = nodes.log_weights - 0.5 * (weighted @ nodes.residual + log_determinant)
         return cls(log_density, np.sqrt(precision), sensor_columns, projector, weighted, pairs)
@@ -144,7 +136,7 @@ class _WithoutLaw:
         from underskin.diagnosis.kernels import less_shared
 
         grams = np.ascontiguousarray(
-            _weighted_grams(columns, count, self.root) - _grams(self.projector @ columns, count)
+            _grams(columns * self.root[:, :, None], count) - _grams(self.projector @ columns, count)
         )
         less_shared(np.ascontiguousarray(self.sensor_columns), self.pairs.row, self.pairs.first, columns, grams)
         return grams
@@ -251,19 +243,6 @@ def _grams(columns: Floats, count: int) -> Floats:
     size)."""
     blocks = columns.reshape(*columns.shape[:2], count, -1).transpose(2, 0, 3, 1)
     return np.asarray(blocks @ blocks.swapaxes(-1, -2))
-
-
-def _weighted_grams(columns: Floats, count: int, root: Floats) -> Floats:
-    """The same of columns (rows, columns) whose rows have the weights root² (scatters, rows)."""
-    size = columns.shape[1] // count
-    if size > _FEW_FEATURES:
-        return _grams(columns * root[:, :, None], count)
-    first, second = np.triu_indices(size)
-    blocks = columns.reshape(len(columns), count, size)
-    products = root**2 @ (blocks[..., first] * blocks[..., second]).reshape(len(columns), -1)
-    grams = np.empty((count, len(root), size, size))
-    grams[..., first, second] = grams[..., second, first] = products.reshape(len(root), count, -1).swapaxes(0, 1)
-    return grams
 
 
 def _position_probabilities(positions: Floats) -> dict[float, float]:

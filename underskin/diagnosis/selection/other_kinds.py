@@ -11,19 +11,20 @@ hide whatever the curves look like (friction at the platens). The thickness of i
 declared wrongly, which FRFs tell (`thickness_error`), and must not be absorbed by the modulus.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.dataset import Lines, curve_lines
-from underskin.diagnosis.inference.evidence import LEAST_EIGENVALUE, NEGLIGIBLE_NATS, TRADING_CORRELATION, parts
+from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.gaussian import Gaussian, moments
 from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence, log_prior
-from underskin.mechanisms.base import Kind, Mechanism, Parameter, Unsupported, Values
+from underskin.mechanisms.base import Kind, Mechanism, Parameter, Values
 from underskin.mechanisms.laws import platen_friction, strain_stiffening
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.thickness_error import ThicknessError
@@ -92,13 +93,13 @@ class CurvePosterior:
 
     def is_ratio(self, index: int) -> bool:
         """Whether only the ratio of a quantity to another one of its mechanism is known."""
-        mechanism = self.quantities[index][0]
         deviation = np.sqrt(np.diag(self.covariance))
-        correlated = np.abs(self.covariance[index]) > TRADING_CORRELATION * deviation[index] * deviation
+        correlated = np.abs(self.covariance[index]) > _RATIO * deviation[index] * deviation
+        mechanisms = [mechanism for mechanism, _ in self.quantities]
         return any(
-            correlated[other] and quantity[0] == mechanism
-            for other, quantity in enumerate(self.quantities)
-            if other != index
+            correlated[other]
+            for other in range(len(deviation))
+            if mechanisms[other] == mechanisms[index] and other != index
         )
 
     @property
@@ -110,20 +111,16 @@ class CurvePosterior:
 class OtherKind:
     """The curves of one kind in a campaign that is diagnosed by recordings of another."""
 
-    def __init__(self, kind: Kind, problem: FittingProblem, explanations: Sequence[Explanation]) -> None:
-        """Curves with the modulus free (`free_modulus_problem`), and the explanations that a search found for them."""
+    def __init__(
+        self, kind: Kind, problem: FittingProblem, explanations: Sequence[Explanation], unsupported: Collection[str]
+    ) -> None:
+        """Curves with the modulus free (`free_modulus_problem`), the explanations that a search found for them, and the
+        mechanisms that they do not support."""
         self.kind, self.problem = kind, problem
         self._explanations = {frozenset(explanation.names): explanation for explanation in explanations}
-        self.supported = tuple(name for name in problem.lines.mechanisms.named if self._supports(name))
+        self.supported = tuple(name for name in problem.lines.mechanisms.named if name not in unsupported)
         self._may_hide = may_hide(problem.lines.campaign, self.supported)
         self.posteriors: dict[frozenset[str], CurvePosterior] = {}
-
-    def _supports(self, name: str) -> bool:
-        try:
-            self.problem.hypothesis((name,), has_position_scatter=False)
-        except Unsupported:
-            return False
-        return True
 
     def posterior(self, names: Collection[str], shared: Sequence[str]) -> CurvePosterior:
         """Under a set of the mechanisms `shared` by both kinds, summed over those of the curves alone."""
@@ -233,16 +230,20 @@ def _mixture(
 
 
 def _posterior(explanation: Explanation, shared: frozenset[str]) -> tuple[tuple[Quantity, ...], Floats, Floats]:
-    """Shared quantities (logarithm of the modulus, parameters of mechanisms), their mean and covariance."""
+    """Shared quantities (logarithm of the modulus, parameters of mechanisms), their mean and covariance.
+
+    A uniform prior counts as a normal one of its variance about the fit, as in `_moments`: indentations determine
+    E/(1 − ν²), so that E and ν trade along a ridge, which ν between its bounds cuts short.
+    """
     modulus = [entry.name for entry in explanation.model.parameters].index("youngs_modulus")
-    components = parts(explanation.best, modulus)
-    expansions = [_quantities(explanation, part.fit, shared, modulus) for part in components]
-    mean_indices = explanation.best.hypothesis.mean_indices
-    slopes = [rows[:, mean_indices] for _, _, rows in expansions]
-    covariances = [jacobian @ part.covariance @ jacobian.T for jacobian, part in zip(slopes, components, strict=True)]
-    return expansions[0][0], *moments(
-        np.array([part.share for part in components]), [mean for _, mean, _ in expansions], covariances
-    )
+    best = explanation.best
+    indices, (precision, *_) = best.hypothesis.mean_indices, best.hypothesis.priors
+    widths = np.ptp(best.hypothesis.bounds, axis=0)
+    bounded = np.where(precision == 0, 12 / np.maximum(widths, 1e-12) ** 2, 0.0)[indices]
+    covariance = np.linalg.inv(np.linalg.inv(best.covariance) + np.diag(bounded))
+    quantities, mean, rows = _quantities(explanation, best.point.fit, shared, modulus)
+    slopes = rows[:, indices]
+    return quantities, mean, slopes @ covariance @ slopes.T
 
 
 def _quantities(
@@ -281,12 +282,11 @@ def _unit_slope(parameter: Parameter, fit: Floats, index: int, count: int) -> Fl
     return slopes
 
 
-_INFORMATIVE = 0.8  # of a prior's standard deviation: a posterior that is wider is not informative
 _MOST_SETS = 3  # of a kind of curves
+_RATIO = 0.9  # correlation above which of two quantities only the ratio is known
 
-# A prior as a normal one: mean, variance, whether it is flat (then the variance is that of a normal one of the same
-# height), and by how much its log density at the curves' mean exceeds that of the normal one
-Moments = tuple[float, float, bool, float]
+# A prior as a normal one: mean, precision, and by how much its log density at the curves' mean exceeds the normal one's
+Moments = tuple[float, float, float]
 
 
 class CurveLikelihood:
@@ -295,7 +295,7 @@ class CurveLikelihood:
     def __init__(self, kinds: Sequence[OtherKind], explanations: Sequence[Explanation]) -> None:
         """Of at least one kind; `explanations` are fits to the diagnosed recordings without these kinds."""
         self.kinds = tuple(kinds)
-        self._explanations = sorted(explanations, key=lambda explanation: -explanation.log_evidence)
+        self._explanations = explanations
         self._shared: dict[Kind, tuple[str, ...]] = {}
 
     def __call__(self, model: Model, lines: Lines) -> Gaussian:
@@ -381,28 +381,20 @@ class CurveLikelihood:
 
     def _kind_likelihood(self, kind: OtherKind, model: Model, lines: Lines) -> Gaussian:
         posterior = self.posterior(kind, model.names)
-        matrix, offset, priors = _in_model(posterior, model, lines, self._initial_values(model.names, lines))
-        return _likelihood(posterior, matrix, offset, priors)
+        return _likelihood(posterior, *_in_model(posterior, model, lines, partial(self._alone, model.names)))
 
-    def _initial_values(self, names: Sequence[str], lines: Lines) -> dict[Quantity, tuple[float, float]]:
-        """Fit coordinates of mechanisms' parameters and their variances by the first kind alone.
+    def _alone(self, names: Sequence[str], mechanism: str, parameter: str) -> tuple[float, float]:
+        """Fit coordinate of a mechanism's parameter, and its variance, by the first kind alone.
 
-        Under this set of mechanisms, else under the best one that holds the mechanism.
+        Under this set of mechanisms, else under the best one that holds the mechanism; 0 and ∞ where none does.
         """
-        initial_values: dict[Quantity, tuple[float, float]] = {}
-        for explanation in sorted(
-            self._explanations, key=lambda explanation: frozenset(explanation.names) != frozenset(names)
-        ):
-            variances = dict(
-                zip(explanation.best.hypothesis.mean_indices, np.diag(explanation.best.covariance), strict=True)
-            )
-            for mechanism, span in parameter_slices(explanation.names, lines).items():
-                for index in range(span.start, span.stop):
-                    key = (mechanism, explanation.model.parameters[index].name)
-                    initial_values.setdefault(
-                        key, (float(explanation.point.fit[index]), float(variances.get(index, np.inf)))
-                    )
-        return initial_values
+        fits = [fit for fit in self._explanations if mechanism in fit.names]
+        if not fits:
+            return 0.0, np.inf
+        fit = max(fits, key=lambda fit: ({*fit.names} == {*names}, fit.log_evidence))
+        index = [stated.name for stated in fit.model.parameters].index(parameter)
+        row = fit.best.hypothesis.mean_indices.index(index)
+        return float(fit.point.fit[index]), float(fit.best.covariance[row, row])
 
 
 def _acts_on(name: str, lines: Lines) -> bool:
@@ -412,12 +404,12 @@ def _acts_on(name: str, lines: Lines) -> bool:
 
 
 def _in_model(
-    posterior: CurvePosterior, model: Model, lines: Lines, initial_values: Mapping[Quantity, tuple[float, float]]
+    posterior: CurvePosterior, model: Model, lines: Lines, alone: Callable[[str, str], tuple[float, float]]
 ) -> tuple[Floats, Floats, list[Moments]]:
     """The quantities as matrix · x + offset of the model's fit coordinates x, and the prior of each.
 
-    A row of zeros where the model has no such quantity. `initial_values`: fit coordinates by the first kind alone, and
-    their variances.
+    A row of zeros where the model has no such quantity. `alone` gives the fit coordinate of a mechanism's parameter by
+    the first kind alone, and its variance.
     """
     quantities = posterior.quantities
     spans = parameter_slices(model.names, lines)
@@ -431,7 +423,7 @@ def _in_model(
             if MODULUS_ERROR in spans:
                 matrix[row, spans[MODULUS_ERROR].start] = 1.0
             offset[row] = np.log(to_si("youngs_modulus_mpa", 1.0 if declared is None else declared))
-            priors.append((float(posterior.mean[row]), WIDE_SD**2, False, 0.0))
+            priors.append((float(posterior.mean[row]), WIDE_SD**-2, 0.0))
             continue
         if (mechanism, key) == THICKNESS:
             matrix[row, names.index("thickness")] = 1.0
@@ -443,17 +435,15 @@ def _in_model(
         indices = [index for index in range(span.start, span.stop) if names[index] == key]
         if indices:
             parameter = model.parameters[indices[0]]
-            matrix[row, indices[0]], offset[row] = _tangent(
-                posterior, row, parameter, initial_values.get((mechanism, key))
-            )
+            matrix[row, indices[0]], offset[row] = _tangent(posterior, row, parameter, *alone(mechanism, key))
             priors.append(_moments(parameter, float(posterior.mean[row])))
         else:
-            priors.append((0.0, 0.0, False, 0.0))
+            priors.append((0.0, 0.0, 0.0))
     return matrix, offset, priors
 
 
 def _tangent(
-    posterior: CurvePosterior, row: int, parameter: Parameter, initial: tuple[float, float] | None
+    posterior: CurvePosterior, row: int, parameter: Parameter, start: float, variance: float
 ) -> tuple[float, float]:
     """Slope and offset of a quantity over its fit coordinate.
 
@@ -462,60 +452,29 @@ def _tangent(
     the first kind alone if that is more precise than the curves'; else the fit is near the curves' mean, where the
     tangent is the identity.
     """
-    mean, (start, variance) = float(posterior.mean[row]), initial or (0.0, np.inf)
-    if (
-        parameter.scale == "log"
-        or not posterior.is_ratio(row)
-        or min(mean, start) <= 0
-        or variance > posterior.covariance[row, row]
-    ):
+    mean = float(posterior.mean[row])
+    is_far = variance < posterior.covariance[row, row] and min(mean, start) > 0 and parameter.scale != "log"
+    if not (is_far and posterior.is_ratio(row)):
         return 1.0, 0.0
     return mean / start, mean * float(np.log(start / mean))
 
 
 def _moments(parameter: Parameter, mean: float) -> Moments:
+    """About the curves' mean: of a uniform prior, those of a uniform distribution there."""
     low, high = parameter.bounds
     inside = float(np.clip(mean, low, high))
     precision, centre = quadratic_of_prior(parameter, inside)
     if not precision:
-        return (low + high) / 2, (high - low) ** 2 / (2 * np.pi), True, 0.0
+        precision, centre = 12 / (high - low) ** 2, inside
     normal = 0.5 * float(np.log(precision / (2 * np.pi)) - precision * (inside - centre) ** 2)
-    return centre, 1 / precision, False, parameter.log_prior(inside) - normal
+    return centre, precision, parameter.log_prior(inside) - normal
 
 
 def _likelihood(posterior: CurvePosterior, matrix: Floats, offset: Floats, priors: Sequence[Moments]) -> Gaussian:
-    """Normal ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence."""
-    centre, variance, flat, log_height_ratio = (np.array(column) for column in zip(*priors, strict=True))
-    flat = flat.astype(bool)
-    widest = np.where(flat, variance * (2 * np.pi / 12), variance)  # between bounds: a uniform distribution's
-    informative = matrix.any(axis=1) & (np.diag(posterior.covariance) < _INFORMATIVE**2 * widest)
-    if not informative.any():
-        return Gaussian(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), posterior.log_weight)
-    posterior_precision = _inverse(posterior.covariance[np.ix_(informative, informative)])
-    centre, variance, flat = centre[informative], variance[informative], flat[informative]
-    prior_precision = np.diag(np.where(flat, 0.0, 1 / variance))
-    precision = _definite(posterior_precision - prior_precision)
-    mean = np.linalg.solve(precision, posterior_precision @ posterior.mean[informative] - prior_precision @ centre)
-    # The evidence is the integral of the likelihood over the prior; a flat prior as a normal one of the same height
-    prior = np.diag(variance)
-    shift = mean - centre
-    volume = np.linalg.slogdet(np.eye(len(mean)) + precision @ prior)[1]
-    height = posterior.log_weight + 0.5 * volume - float(log_height_ratio[informative].sum())
-    height += 0.5 * shift @ np.linalg.solve(np.linalg.inv(precision) + prior, np.where(flat, 0.0, shift))
-    tolerance = np.array(
-        [posterior.tolerance**2 * (posterior.quantities[row] == MODULUS) for row in np.flatnonzero(informative)]
-    )
-    return Gaussian.of(mean, precision, float(height)).of_mean(tolerance).over(matrix[informative], offset[informative])
-
-
-def _inverse(covariance: Floats) -> Floats:
-    """Inverse of a covariance whose correlations may be nearly singular (only a ratio of quantities is known)."""
-    deviation = np.sqrt(np.diag(covariance))
-    values, vectors = np.linalg.eigh(covariance / np.outer(deviation, deviation))
-    return np.asarray((vectors / np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T / np.outer(deviation, deviation))
-
-
-def _definite(precision: Floats) -> Floats:
-    """With eigenvalues of at least 1e-9."""
-    values, vectors = np.linalg.eigh(precision)
-    return np.asarray((vectors * np.maximum(values, 1e-9)) @ vectors.T)
+    """ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence."""
+    known = np.flatnonzero(matrix.any(axis=1)).tolist()
+    centre, precision, log_height_ratio = np.array([priors[row] for row in known]).reshape(-1, 3).T
+    covariance, evidence = posterior.covariance[np.ix_(known, known)], posterior.log_weight - log_height_ratio.sum()
+    of_curves = Gaussian.from_posterior(evidence, posterior.mean[known], covariance, centre, precision)
+    tolerance = np.array([posterior.tolerance**2 * (posterior.quantities[row] == MODULUS) for row in known])
+    return of_curves.of_mean(tolerance).over(matrix[known], offset[known])

@@ -15,7 +15,7 @@ the skin's is rarer than a modulus that was declared wrong.
 """
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,8 +24,7 @@ import numpy as np
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.fit import Fitter, Scatter
-from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.answers import Search, remainder
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
 from underskin.diagnosis.selection.priors import LARGEST, even_laws, least_evidence
 from underskin.mechanisms.base import Kind, Stage, Unsupported
@@ -37,8 +36,6 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_SMOOTH_ERROR = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
-_ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
 _DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted
 _PARENTS, _LARGEST_OF_ONE_KIND = 3, 3
 _PAIRED = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.LOAD_INCREMENT)  # of which two may cancel
@@ -123,10 +120,9 @@ class _Sets:
             pairs = self._pairs(self.names)
             self.explain(pairs)
             self._refit_from_prior(pairs)
-            self._refit_smaller()
             return
         requests = [
-            Request(self.ordered(frozenset({*parent.names, name})), parent, self.explanations.get(frozenset([name])))
+            Request(self.ordered(frozenset({*parent.names, name})), parent)
             for parent in self._parents(size)
             for name in self.names
             if name not in parent.names
@@ -143,8 +139,6 @@ class _Sets:
                 if name not in self.contact and (name in best.names or mechanisms[name].stage in _PAIRED)
             ]
             self.explain(beside, however_far=True)
-        if curves:
-            self._refit_smaller()
 
     def _pairs(self, names: Sequence[str]) -> list[Request]:
         """Every pair, from the better of its two."""
@@ -172,18 +166,11 @@ class _Sets:
         """Fit pairs of curves from starts over the parameters of both, where the best set leaves something for that to
         matter; a fit that is better takes the place of the one from a single."""
         best = min(self.explanations.values(), key=lambda fitted: fitted.best.cost)
-        if smooth_error_gain(best) < _SMOOTH_ERROR:
+        if remainder(best) is None:
             return
         self._improve(
             [Request(pair.names, nuisances=None if Adhesion.name in pair.names else best.point) for pair in pairs]
         )
-
-    def _refit_smaller(self) -> None:
-        """Fit the sets with one mechanism less than the best one from its values: a law that hardly acts may have led
-        the others out of a lesser minimum."""
-        best = max(self.explanations.values(), key=self.search.log_weight)
-        smaller = [frozenset(best.names) - {name} for name in best.names if len(best.names) > 1]
-        self._improve([Request(self.ordered(names), initial=best) for names in smaller])
 
     def _improve(self, requests: Sequence[Request]) -> None:
         """Fits that are better take the place of those before."""
@@ -198,18 +185,6 @@ class _Sets:
             fitted = self.problem.explain(replace(request, rival=rival), best)
             if fitted is not None:
                 self.explanations[names] = fitted
-
-
-def smooth_error_gain(explanation: Explanation) -> float:
-    """Nats that a smooth error brings an explanation of curves over the least one and rougher noise."""
-    fitter = Fitter(explanation.best.hypothesis)
-    at = fitter.evaluate(fitter.at(explanation.point), slopes=False)
-    points = at.points[np.zeros(len(_ROUGHER), dtype=np.intp)]
-    covariance = points.covariance.copy()
-    covariance[:, Scatter.LEVEL] += np.log(_ROUGHER)
-    covariance[:, Scatter.SMOOTH] = explanation.best.hypothesis.covariance[Scatter.SMOOTH].low
-    without = fitter.evaluate(replace(points, covariance=covariance), slopes=False)
-    return float(without.cost.min() - at.cost[0])
 
 
 def frf_problem(
@@ -248,9 +223,6 @@ def frf_problem(
 _OF_THE_OTHERS = 2  # answers of the recordings alone whose sets are tried together with those of the curves
 _DETERMINED = 0.05  # standard deviation of the logarithm of a modulus that is determined well enough for d33
 _DIFFERENT_MATERIAL = 3e-3  # prior of kinds that are not of one material
-
-# Explain recordings, with the curves of other kinds or alone; some sets are required among those tried.
-Explain = Callable[[CurveLikelihood | None, Sequence[frozenset[str]]], tuple[FittingProblem, Search]]
 
 
 @dataclass(frozen=True)
@@ -305,28 +277,31 @@ class OtherKinds:
         kinds = []
         for kind, campaign in self._campaigns.items():
             problem = free_modulus_problem(campaign, kind, self._table, self._without)
-            kinds.append(OtherKind(kind, problem, search(problem).explanations))
+            alone = search(problem)
+            kinds.append(OtherKind(kind, problem, alone.explanations, alone.unsupported))
         return kinds
 
-    def joined(self, explain: Explain) -> KindsTogether:
-        """The recordings that `explain` takes, together with these curves or alone, whichever is more probable."""
+    def joined(self, problem: FittingProblem, fitted: Sequence[Explanation] = ()) -> KindsTogether:
+        """The recordings of the `problem`, of which some sets may be `fitted` already, together with these curves or
+        alone, whichever is more probable: both under the same noise."""
+        apart = search(problem, fitted)
         if not self._campaigns:
-            return KindsTogether(*explain(None, ()))
-        problem_alone, apart = explain(None, ())
+            return KindsTogether(problem, apart)
         curves = CurveLikelihood(self._kinds, apart.explanations)
         best = [
             frozenset(answer.explanation.names)
             for answer in apart.answers[:_OF_THE_OTHERS]
             if answer.explanation is not None
         ]
-        problem, together = explain(curves, curves.required_sets(problem_alone.lines, best))
+        joint = FittingProblem(problem.lines, problem.table, curves)
+        together = search(joint, required_sets=curves.required_sets(problem.lines, best))
         log_apart = _log_apart(apart, curves) + np.log(_DIFFERENT_MATERIAL)
         log_together = together.log_total + np.log1p(-_DIFFERENT_MATERIAL)
         contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
-        alone = KindsTogether(problem_alone, apart, curves, apart, contradictory)
+        alone = KindsTogether(problem, apart, curves, apart, contradictory)
         if alone.apart_is_likelier:
             return alone
-        return KindsTogether(problem, replace(together, other_kinds=curves), curves, apart, contradictory)
+        return KindsTogether(joint, replace(together, other_kinds=curves), curves, apart, contradictory)
 
 
 def _log_apart(apart: Search, curves: CurveLikelihood) -> float:

@@ -346,10 +346,8 @@ _LEAST_OVER_SLOW_NOISE = 25.0  # gain on curves with slow noise in the air [nats
 
 def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     """Fitted explanations with a law that may matter; none where no law can be tested."""
-    null = next(explanation for explanation in search.explanations if not explanation.names)
-    ranked = sorted(
-        (explanation for explanation in search.explanations if search.is_supported(explanation)), key=search.log_weight
-    )[::-1]
+    null = search.null
+    ranked = [fitted for fitted, _ in sorted(search.weighed, key=lambda pair: -pair[1])]
     screening = _screening(problem, null, ranked[0])
     if screening is None:
         return []
@@ -374,28 +372,15 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
         fitted += _with_named_mechanisms(problem, search, fitted)
     fitted += _without_companions(problem, fitted)
     fitted.sort(key=search.log_weight, reverse=True)
-    return _beyond_slow_noise(problem, search, fitted) if problem.lines.curves else fitted
-
-
-def _beyond_slow_noise(problem: FittingProblem, search: Search, fitted: Sequence[Explanation]) -> list[Explanation]:
-    """The laws on curves that bring enough evidence.
-
-    Where the samples in the air show noise that neighbours share, a law must bring more, since it can fit that noise.
-    """
     smooth = problem.lines.smooth
-    if smooth is None or not smooth.slow.any():
-        return list(fitted)
-    named = problem.lines.mechanisms.named
-    log_evidences = {frozenset(explanation.names): explanation.log_evidence for explanation in search.explanations}
-    base_log_evidences = [
-        log_evidences.get(frozenset(name for name in explanation.names if name in named), -np.inf)
-        for explanation in fitted
-    ]
-    return [
-        explanation
-        for explanation, base_log_evidence in zip(fitted, base_log_evidences, strict=True)
-        if explanation.log_evidence > base_log_evidence + _LEAST_OVER_SLOW_NOISE
-    ]
+    return fitted if smooth is None or not smooth.slow.any() else _beyond_slow_noise(search, fitted)
+
+
+def _beyond_slow_noise(search: Search, fitted: Sequence[Explanation]) -> list[Explanation]:
+    """The laws on curves that bring more evidence than fitting the noise that neighbouring samples in the air share."""
+    named = {frozenset(fit.names): fit.log_evidence + _LEAST_OVER_SLOW_NOISE for fit in search.explanations}
+    mechanisms = frozenset[str]().union(*named)
+    return [fit for fit in fitted if fit.log_evidence > named.get(mechanisms.intersection(fit.names), -np.inf)]
 
 
 def _screening(problem: FittingProblem, null: Explanation, best: Explanation) -> Screening | CurveScreening | None:
@@ -434,8 +419,11 @@ def _fit_laws(problem: FittingProblem, chosen: Sequence[tuple[Explanation, Score
     for base, score in chosen:
         _add_to_mechanisms(problem, score)
         requests.append(Request((*base.names, score.law.name), base))
-    fits = problem.explain_all(requests)
-    return [explanation for explanation in fits if explanation is not None]
+    return _explained(problem, requests)
+
+
+def _explained(problem: FittingProblem, requests: Sequence[Request]) -> list[Explanation]:
+    return [explanation for explanation in problem.explain_all(requests) if explanation is not None]
 
 
 def _add_to_mechanisms(problem: FittingProblem, score: Score) -> None:
@@ -461,8 +449,7 @@ def _with_named_mechanisms(problem: FittingProblem, search: Search, fitted: Sequ
             for name in problem.lines.mechanisms.named
             if name not in search.unsupported and frozenset((name, *explanation.names)) not in fitted_sets
         ]
-    fits = problem.explain_all(requests)
-    return [explanation for explanation in fits if explanation is not None]
+    return _explained(problem, requests)
 
 
 def _without_companions(problem: FittingProblem, fitted: Sequence[Explanation]) -> list[Explanation]:
@@ -476,8 +463,7 @@ def _without_companions(problem: FittingProblem, fitted: Sequence[Explanation]) 
             if frozenset(rest) not in fitted_sets:
                 fitted_sets.add(frozenset(rest))
                 requests.append(Request(rest))
-    fits = problem.explain_all(requests)
-    return [explanation for explanation in fits if explanation is not None]
+    return _explained(problem, requests)
 
 
 @dataclass(frozen=True)
@@ -493,10 +479,7 @@ class NearestLaw:
 
 def nearest_law(problem: FittingProblem, search: Search) -> NearestLaw | None:
     """For recordings that no supported law describes; None where no law can be tested."""
-    null = next(explanation for explanation in search.explanations if not explanation.names)
-    best = max(
-        (explanation for explanation in search.explanations if search.is_supported(explanation)), key=search.log_weight
-    )
+    null, (best, _) = search.null, max(search.weighed, key=lambda pair: pair[1])
     screening = _screening(problem, null, best)
     if screening is None:
         return None

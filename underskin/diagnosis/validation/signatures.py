@@ -55,9 +55,8 @@ class Signatures:
         self._base = self._fitter.model.predict(point)
         self.mechanisms: list[str] = []
         self.percent: list[float] = []
-        self._values: list[tuple[Array, Lines]] = []  # of curves, whose smooth error depends on the explanation
-        rows = _Rows(problem, self._base.value, 0.0)
-        parts = [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
+        self._values: list[tuple[Array, Lines]] = []
+        self._products_by_smooth: dict[float, tuple[Floats, Floats]] = {}
         for name, mechanism in problem.lines.mechanisms.named.items():
             if problem.kind not in mechanism.kinds:
                 continue
@@ -73,13 +72,7 @@ class Signatures:
             for value in model.values(shapes) if isinstance(model, FrfModel) else model.forces(shapes):
                 self.mechanisms.append(name)
                 self.percent.append(self._size(value, hypothesis.lines))
-                if problem.lines.curves:
-                    self._values.append((value, hypothesis.lines))
-                else:
-                    parts.append(rows.split_change(value, hypothesis.lines))
-        self._products_by_smooth: dict[float, tuple[Floats, Floats]] = (
-            {} if problem.lines.curves else {0.0: rows.products(parts)}
-        )
+                self._values.append((value, hypothesis.lines))
 
     def _size(self, value: Array, lines: Lines) -> float:
         """The relative change on the rows of these lines: 100 · √(Σ|change|² / Σ|base|²)."""

@@ -88,12 +88,11 @@ class _Pressed:
     contacts: Contacts
     variables: _Variables
 
-    def response(self, *, lines: bool) -> Response:
-        """The response, with the derivatives by the contact's position separate from the others; without `lines` no
-        line factors."""
+    def response(self) -> Response:
+        """The response, with the derivatives by the contact's position separate from the others."""
         sigma, inside = self._sigma()
         level = self._level(sigma).spread(len(self.model.design.point))
-        factor = self._line_factor() if lines else None
+        factor = self._line_factor()
         variables, position_slopes = self.variables, None
         count = variables.count - len(variables.position)
         if variables.position:
@@ -321,17 +320,17 @@ class FrfModel:
         """A mechanism's parameters in their units."""
         return self._composition.values_of(mechanism.name, variables.of)
 
-    def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False, lines: bool = True) -> Response:
+    def respond(self, fit: Floats, *, slopes: bool = True, place: bool = False) -> Response:
         """The response at points (…, parameters); its derivatives by the parameters (`slopes`) and by the contact's
-        position (`place`) on request; without `lines`, no line factors."""
+        position (`place`) on request."""
         if fit.ndim == 1:
-            return self.respond(fit[None], slopes=slopes, place=place, lines=lines).part(0)
+            return self.respond(fit[None], slopes=slopes, place=place).part(0)
         log = np.array([parameter.scale == "log" for parameter in self.parameters])
         variables = _Variables(fit, log, slopes=slopes, further=_POSITION if place else 0)
         contacts = self._contacts(variables)
         if len(fit) > 1 and (contacts.layered or self.needs_stiffness) and not contacts.share_a_layer:
-            return joined([self.respond(point[None], slopes=slopes, place=place, lines=lines) for point in fit])
-        return _Pressed(self, contacts, variables).response(lines=lines)
+            return joined([self.respond(point[None], slopes=slopes, place=place) for point in fit])
+        return _Pressed(self, contacts, variables).response()
 
     def _contacts(self, variables: _Variables) -> Contacts:
         """The contacts at all force nodes, one node after another, as the mechanisms change what is declared."""
