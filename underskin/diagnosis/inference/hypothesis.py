@@ -47,7 +47,7 @@ from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
+from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask
 
@@ -223,7 +223,6 @@ def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, observed: Ma
 
 
 _STEP = 0.05  # of the finite difference, in h; σ varies over lengths of 0.3 h and more
-_DIGITS = 9  # of a position relative to its sensor [mm]
 _LEAST = 0.2  # of the largest σ: where σ is smaller, the first derivative describes the effect of scatter
 
 
@@ -233,21 +232,9 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
     assert campaign.skin.thickness_mm is not None
     step = _STEP * campaign.skin.thickness_mm
     sensors = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    contacts: dict[tuple[float, ...], tuple[int, FrfConditions]] = {}  # index of each distinct contact
-    contact_indices = []
-    for conditions in frf_of(campaign):
-        x, y = conditions.position_mm or sensors[conditions.sensor]
-        sensor_x, sensor_y = sensors[conditions.sensor]
-        key = (
-            conditions.preload_n,
-            conditions.indenter_radius_mm,
-            round(x - sensor_x, _DIGITS),
-            round(y - sensor_y, _DIGITS),
-        )
-        contact_indices.append(contacts.setdefault(key, (len(contacts), conditions))[0])
     moved = []
     for number, (x, y) in enumerate(((0.0, 0.0), (step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step))):
-        for _, conditions in contacts.values():
+        for conditions in frf_of(campaign):
             position = conditions.position_mm or sensors[conditions.sensor]
             moved_position = (position[0] + x, position[1] + y)
             moved.append(conditions.without_measurements(id=f"{number} {conditions.id}", position_mm=moved_position))
@@ -259,7 +246,7 @@ def curvature(lines: Lines, table: SigmaTable) -> Curvature:
     hessian_x, hessian_y = (right - left) / (2e-3 * step), (up - down) / (2e-3 * step)
     scale = np.where(np.abs(value) > _LEAST * np.abs(value).max(), value, np.inf)
     square = (hessian_x**2).sum(axis=0) + (hessian_y**2).sum(axis=0)
-    return Curvature(((hessian_x[0] + hessian_y[1]) / scale)[contact_indices], (square / scale**2)[contact_indices])
+    return Curvature((hessian_x[0] + hessian_y[1]) / scale, square / scale**2)
 
 
 @dataclass(frozen=True)
