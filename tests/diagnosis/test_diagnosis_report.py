@@ -140,3 +140,17 @@ def test_campaigns_of_another_rig(name: str, verdict: str, table: SigmaTable) ->
     report = whole_report(read_file(Path(SHARED) / "open" / f"{name}.json", name).campaign, table)
     assert report["verdict"] == verdict
     assert {entry["name"] for entry in report["mechanisms"]} <= set(CATALOGUE)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(SHARED is None, reason="UNDERSKIN_CAMPAIGNS is not set")
+def test_layer_unseen_beside_edge(table: SigmaTable) -> None:
+    """A layer that does not show beside the moving edge is integrated over: its weight is that of the edge, and no
+    rival of the edge gains by it."""
+    assert SHARED is not None
+    report = whole_report(read_file(Path(SHARED) / "solved-open" / "frf" / "fyqp7v6a9.json", "edge").campaign, table)
+    assert report["verdict"] == "explained"
+    assert [entry["name"] for entry in report["mechanisms"]] == ["moving_contact_edge"]
+    (layer,) = report["idealised"]
+    assert layer["name"] == "layered_contact"
+    assert layer["probability"] > 0.8
