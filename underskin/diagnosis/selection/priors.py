@@ -6,9 +6,12 @@ All sets of one size of the mechanisms that the campaign supports are equally pr
 import math
 from collections.abc import Collection
 
+import numpy as np
+
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
 
@@ -55,9 +58,19 @@ def guess_count(explanation: Explanation) -> int:
 
 
 def log_prior_of(explanation: Explanation, supported: int) -> float:
-    """Log prior of a set among the `supported` mechanisms of the campaign."""
+    """Log prior of a set among the `supported` mechanisms of the campaign.
+
+    An edge that moves freely is no guess in contact with the layer; that it is held in part is one. The evidence of a
+    set has the mobile fraction free, so that the prior of a free edge is times the density at 1.
+    """
     even, guesses = _even_and_guesses(explanation)
-    return log_prior(guesses, supported - even) + even * math.log(_EVEN_PRIOR)
+    prior = log_prior(guesses, supported - even) + even * math.log(_EVEN_PRIOR)
+    edge = MovingContactEdge.name
+    if edge not in even_laws(explanation.names, explanation.best.hypothesis.lines) & {*explanation.names}:
+        return prior
+    fraction = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[edge].start
+    held = log_prior(guesses + 1, supported - even + 1) + (even - 1) * math.log(_EVEN_PRIOR)
+    return float(np.logaddexp(prior + explanation.best.log_density_at_end(fraction), held))
 
 
 def log_prior_of_discrepancy(explanation: Explanation, supported: int, laws: int = 0) -> float:
