@@ -4,7 +4,7 @@ All sets of one size of the mechanisms that the campaign supports are equally pr
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -58,25 +58,31 @@ def guess_count(explanation: Explanation) -> int:
 
 
 def log_prior_of(explanation: Explanation, supported: int) -> float:
-    """Log prior of a set among the `supported` mechanisms of the campaign.
-
-    An edge that moves freely is no guess in contact with the layer; that it is held in part is one. The evidence of a
-    set has the mobile fraction free, so that the prior of a free edge is times the density at 1.
-    """
-    even, guesses = _even_and_guesses(explanation)
-    prior = log_prior(guesses, supported - even) + even * math.log(_EVEN_PRIOR)
-    edge = MovingContactEdge.name
-    if edge not in even_laws(explanation.names, explanation.best.hypothesis.lines) & {*explanation.names}:
-        return prior
-    fraction = parameter_slices(explanation.names, explanation.best.hypothesis.lines)[edge].start
-    held = log_prior(guesses + 1, supported - even + 1) + (even - 1) * math.log(_EVEN_PRIOR)
-    return float(np.logaddexp(prior + explanation.best.log_density_at_end(fraction), held))
+    """Log prior of a set among the `supported` mechanisms of the campaign."""
+    return _with_edge(explanation, supported, log_prior)
 
 
 def log_prior_of_discrepancy(explanation: Explanation, supported: int, laws: int = 0) -> float:
     """Log prior of an undescribed discrepancy on top of a set, which holds `laws` unlisted laws."""
+    return _with_edge(explanation, supported, log_prior_beneath, laws)
+
+
+def _with_edge(explanation: Explanation, supported: int, prior: Callable[[int, int], float], laws: int = 0) -> float:
+    """Log prior of a set by the `prior` of so many guesses among so many mechanisms.
+
+    An edge that moves freely is no guess in contact with the layer; that it is held in part is one. The evidence of a
+    set is that of all mobile fractions, the density at 1 times it that of a free edge.
+    """
     even, guesses = _even_and_guesses(explanation)
-    return log_prior_beneath(guesses - laws, supported - even) + even * math.log(_EVEN_PRIOR)
+    size, edge, lines = guesses - laws, MovingContactEdge.name, explanation.best.hypothesis.lines
+    free = prior(size, supported - even) + even * math.log(_EVEN_PRIOR)
+    if edge not in even_laws(explanation.names, lines) & {*explanation.names}:
+        return free
+    free += explanation.best.log_density_at_end(parameter_slices(explanation.names, lines)[edge].start)
+    if size == LARGEST:
+        return free
+    held = prior(size + 1, supported - even + 1) + (even - 1) * math.log(_EVEN_PRIOR)
+    return float(np.logaddexp(free, held))
 
 
 def must_gain(explanation: Explanation, name: str) -> float:
