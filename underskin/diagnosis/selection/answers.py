@@ -28,8 +28,10 @@ from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.noise import DISCREPANCY, USUAL
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.priors import (
+    edge_gain,
     even_laws,
     guess_count,
+    log_prior,
     log_prior_of,
     log_prior_of_discrepancy,
     must_gain,
@@ -165,8 +167,8 @@ class Search:
         return {size: _log_occam(fitted) for size, fitted in best.items()}
 
     @cached_property
-    def _log_evidence(self) -> dict[frozenset[str], float]:
-        return {frozenset(fitted.names): fitted.log_evidence for fitted in (*self.explanations, *self.laws)}
+    def _fits(self) -> dict[frozenset[str], Explanation]:
+        return {frozenset(fitted.names): fitted for fitted in (*self.explanations, *self.laws)}
 
     def is_supported(self, explanation: Explanation) -> bool:
         """Whether each mechanism of a set shows: without it, or all that are no guesses, evidence is lost."""
@@ -175,15 +177,23 @@ class Search:
     def _unsupported_parts(self, explanation: Explanation) -> list[frozenset[str]]:
         """The mechanisms of a set, and those that are no guesses together, without which no evidence is lost."""
         names = frozenset(explanation.names)
-        parts = [frozenset([name]) for name in names]
-        parts.append(names & even_laws(names, explanation.best.hypothesis.lines))  # any of these may need another
-        return [
-            part
-            for part in parts
-            if part
-            and not explanation.log_evidence
-            > self._log_evidence.get(names - part, -math.inf) + max(must_gain(explanation, name) for name in part)
-        ]
+        even = names & even_laws(names, explanation.best.hypothesis.lines)
+        parts = [frozenset([name]) for name in names] + [even] * bool(even)  # any of these may need another
+        unsupported = []
+        for part in parts:
+            smaller = self._fits.get(names - part)
+            if smaller is None:
+                continue
+            gain = explanation.log_evidence - smaller.log_evidence
+            if not part & even:  # the edge of both sets has the same prior
+                gain += self._edge_gain(explanation) - self._edge_gain(smaller)
+            if not gain > max(must_gain(explanation, name) for name in part):
+                unsupported.append(part)
+        return unsupported
+
+    def _edge_gain(self, explanation: Explanation) -> float:
+        one, nothing = (log_prior(size, self.supported) for size in (1, 0))
+        return edge_gain(explanation, one - nothing)
 
     def _standing(self, fits: Sequence[Explanation]) -> list[tuple[Explanation, float, float]]:
         """The sets that show, with the logarithms of prior times evidence, and of the sum of this over the sets that it
@@ -200,7 +210,7 @@ class Search:
                 continue
             smaller = [part for part in beside if part < names and names - part <= even]
             if smaller:
-                stands = max(smaller, key=lambda part: self._log_evidence[part])
+                stands = max(smaller, key=lambda part: self._fits[part].log_evidence)
                 beside[stands] = float(np.logaddexp(beside[stands], self.log_weight(fitted)))
         return [
             (fitted, self.log_weight(fitted), beside[names])

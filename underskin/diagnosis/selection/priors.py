@@ -68,21 +68,27 @@ def log_prior_of_discrepancy(explanation: Explanation, supported: int, laws: int
 
 
 def _with_edge(explanation: Explanation, supported: int, prior: Callable[[int, int], float], laws: int = 0) -> float:
-    """Log prior of a set by the `prior` of so many guesses among so many mechanisms.
-
-    An edge that moves freely is no guess in contact with the layer; that it is held in part is one. The evidence of a
-    set is that of all mobile fractions, the density at 1 times it that of a free edge.
-    """
+    """Log prior of a set by the `prior` of so many guesses among so many mechanisms."""
     even, guesses = _even_and_guesses(explanation)
-    size, edge, lines = guesses - laws, MovingContactEdge.name, explanation.best.hypothesis.lines
+    size = guesses - laws
     free = prior(size, supported - even) + even * math.log(_EVEN_PRIOR)
-    if edge not in even_laws(explanation.names, lines) & {*explanation.names}:
-        return free
-    free += explanation.best.log_density_at_end(parameter_slices(explanation.names, lines)[edge].start)
     if size == LARGEST:
         return free
     held = prior(size + 1, supported - even + 1) + (even - 1) * math.log(_EVEN_PRIOR)
-    return float(np.logaddexp(free, held))
+    return free + edge_gain(explanation, held - free)
+
+
+def edge_gain(explanation: Explanation, log_odds: float) -> float:
+    """What the prior of the edge adds to the log evidence of a set with contact with the layer; 0 of others.
+
+    An edge that moves freely is no guess there; that it is held in part is one, of these odds. The evidence is that of
+    all mobile fractions alike, the density at 1 times it that of a free edge.
+    """
+    edge, lines = MovingContactEdge.name, explanation.best.hypothesis.lines
+    if edge not in even_laws(explanation.names, lines) & {*explanation.names}:
+        return 0.0
+    fraction = parameter_slices(explanation.names, lines)[edge].start
+    return float(np.logaddexp(explanation.best.log_density_at_end(fraction), log_odds))
 
 
 def must_gain(explanation: Explanation, name: str) -> float:
