@@ -140,3 +140,28 @@ def test_campaigns_of_another_rig(name: str, verdict: str, table: SigmaTable) ->
     report = whole_report(read_file(Path(SHARED) / "open" / f"{name}.json", name).campaign, table)
     assert report["verdict"] == verdict
     assert {entry["name"] for entry in report["mechanisms"]} <= set(CATALOGUE)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(SHARED is None, reason="UNDERSKIN_CAMPAIGNS is not set")
+def test_layer_unseen_beside_edge(table: SigmaTable) -> None:
+    """A layer that does not show beside the moving edge is integrated over: its weight is that of the edge, and no
+    rival of the edge gains by it."""
+    assert SHARED is not None
+    report = whole_report(read_file(Path(SHARED) / "solved-open" / "frf" / "fyqp7v6a9.json", "edge").campaign, table)
+    assert report["verdict"] == "explained"
+    assert [entry["name"] for entry in report["mechanisms"]] == ["moving_contact_edge"]
+    (layer,) = report["idealised"]
+    assert layer["name"] == "layered_contact"
+    assert layer["probability"] > 0.8
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(SHARED is None, reason="UNDERSKIN_CAMPAIGNS is not set")
+def test_edge_held_in_part_is_a_guess(table: SigmaTable) -> None:
+    """A sphere that sticks is not taken, with confidence, for one whose contact edge moves by a third: contact with the
+    layer and a free edge is no guess, an edge held in part is one."""
+    assert SHARED is not None
+    report = whole_report(read_file(Path(SHARED) / "solved-open" / "frf" / "f3g5qfgzw.json", "stuck").campaign, table)
+    assert report["verdict"] == "ambiguous"
+    assert "sticking_contact" in [entry["name"] for entry in report["mechanisms"]]

@@ -47,6 +47,19 @@ class Evidence:
     point: FitPoint
     cost: float
     covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
+    mean: Floats  # (mean parameters,), of the quadratic, which may lie outside the bounds
+
+    def log_density_at_end(self, index: int) -> float:
+        """The logarithm of the posterior density of a parameter at its upper bound over that of its prior: the evidence
+        with the parameter held there over that with it free (Dickey, Ann. Math. Stat. 42 (1971) 204)."""
+        row = self.hypothesis.mean_indices.index(index)
+        parameter = self.hypothesis.model.parameters[index]
+        low, high = parameter.bounds
+        deviation = float(np.sqrt(self.covariance[row, row]))
+        at_low, at_high = ((end - float(self.mean[row])) / deviation for end in (low, high))
+        inside = _log_between(at_low, at_high) if at_low <= 0 else _log_between(-at_high, -at_low)
+        density = -0.5 * at_high**2 - 0.5 * np.log(2 * np.pi) - np.log(deviation) - inside
+        return float(density - parameter.log_prior(high))
 
     @cached_property
     def fitter(self) -> Fitter:
@@ -107,11 +120,11 @@ def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
         if polished is None:
             break
         at = polished
-    (value,), (covariance,) = mean_integrals(fitter, at)
+    (value,), (mean,), (covariance,) = _quadratics(fitter, at)
     (volume,) = level_integrals(fitter, at)
     point = FitPoint(at.points.fit[0], at.points.covariance[0], at.points.sensor_log_gain[0])
     log_evidence, cost = float(value + volume), float(at.cost[0])
-    return Evidence(log_evidence, fitter.hypothesis, point, cost, covariance)
+    return Evidence(log_evidence, fitter.hypothesis, point, cost, covariance, mean)
 
 
 def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:

@@ -28,8 +28,10 @@ from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.noise import DISCREPANCY, USUAL
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.priors import (
+    edge_gain,
     even_laws,
     guess_count,
+    log_prior,
     log_prior_of,
     log_prior_of_discrepancy,
     must_gain,
@@ -170,25 +172,66 @@ class Search:
         return {size: _log_occam(fitted) for size, fitted in best.items()}
 
     @cached_property
-    def _log_evidence(self) -> dict[frozenset[str], float]:
-        return {frozenset(fitted.names): fitted.log_evidence for fitted in (*self.explanations, *self.laws)}
+    def _fits(self) -> dict[frozenset[str], Explanation]:
+        return {frozenset(fitted.names): fitted for fitted in (*self.explanations, *self.laws)}
 
     def is_supported(self, explanation: Explanation) -> bool:
         """Whether each mechanism of a set shows: without it, or all that are no guesses, evidence is lost."""
+        return not self._unsupported_parts(explanation)
+
+    def _unsupported_parts(self, explanation: Explanation) -> list[frozenset[str]]:
+        """The mechanisms of a set, and those that are no guesses together, without which no evidence is lost."""
         names = frozenset(explanation.names)
-        parts = [frozenset([name]) for name in names]
-        parts.append(names & even_laws(names, explanation.best.hypothesis.lines))  # any of these may need another
-        return all(
-            explanation.log_evidence
-            > self._log_evidence.get(names - part, -math.inf) + max(must_gain(explanation, name) for name in part)
-            for part in parts
-            if part
-        )
+        even = names & even_laws(names, explanation.best.hypothesis.lines)
+        parts = [frozenset([name]) for name in names] + [even] * bool(even)  # any of these may need another
+        unsupported = []
+        for part in parts:
+            smaller = self._fits.get(names - part)
+            if smaller is None:
+                continue
+            gain = explanation.log_evidence - smaller.log_evidence
+            if not part & even:  # the edge of both sets has the same prior
+                gain += self._edge_gain(explanation) - self._edge_gain(smaller)
+            if not gain > max(must_gain(explanation, name) for name in part):
+                unsupported.append(part)
+        return unsupported
+
+    def _edge_gain(self, explanation: Explanation) -> float:
+        one, nothing = (log_prior(size, self.supported) for size in (1, 0))
+        return edge_gain(explanation, one - nothing)
+
+    def _standing(self, fits: Sequence[Explanation]) -> list[tuple[Explanation, float, float]]:
+        """The sets that show, with the logarithms of prior times evidence, and of the sum of this over the sets that it
+        stands for.
+
+        A law that is no guess is integrated over where it does not show: for a set that holds such a law beside what
+        shows, the likeliest set without it stands.
+        """
+        beside = {frozenset(fitted.names): -math.inf for fitted in fits if self.is_supported(fitted)}
+        for fitted in fits:
+            names = frozenset(fitted.names)
+            even = even_laws(names, fitted.best.hypothesis.lines)
+            if names in beside or not all(part <= even for part in self._unsupported_parts(fitted)):
+                continue
+            smaller = [part for part in beside if part < names and names - part <= even]
+            if smaller:
+                stands = max(smaller, key=lambda part: self._fits[part].log_evidence)
+                beside[stands] = float(np.logaddexp(beside[stands], self.log_weight(fitted)))
+        return [
+            (fitted, self.log_weight(fitted), beside[names])
+            for fitted in fits
+            if (names := frozenset(fitted.names)) in beside
+        ]
 
     @cached_property
+    def _named(self) -> list[tuple[Explanation, float, float]]:
+        return self._standing(self.explanations)
+
+    @property
     def weighed(self) -> list[tuple[Explanation, float]]:
-        """The sets of mechanisms that show, with the logarithm of prior times evidence."""
-        return [(fitted, self.log_weight(fitted)) for fitted in self.explanations if self.is_supported(fitted)]
+        """The sets of mechanisms that show, with the logarithm of prior times evidence, of those that each stands for
+        too."""
+        return [(fitted, float(np.logaddexp(weight, others))) for fitted, weight, others in self._named]
 
     @property
     def log_total(self) -> float:
@@ -198,7 +241,7 @@ class Search:
     @cached_property
     def weighed_laws(self) -> list[tuple[Explanation, float]]:
         """The sets with an unlisted law that show, the same way."""
-        return [(fitted, self.log_weight(fitted)) for fitted in self.laws if self.is_supported(fitted)]
+        return [(fitted, float(np.logaddexp(weight, others))) for fitted, weight, others in self._standing(self.laws)]
 
     @cached_property
     def law(self) -> Explanation | None:
@@ -232,7 +275,11 @@ class Search:
         unlisted += [(fitted, weight + self._log_odds_of_discrepancy(fitted)) for fitted, weight in self.weighed]
         log_unlisted = np.logaddexp.reduce([weight for _, weight in unlisted]) if unlisted else -np.inf
         if named:
-            named = [(fitted, weight) for (fitted, _), weight in zip(named, without_occam(named), strict=True)]
+            raised = without_occam([(fitted, weight) for fitted, weight, _ in self._named])
+            named = [
+                (fitted, float(np.logaddexp(weight, others)))
+                for (fitted, _, others), weight in zip(self._named, raised, strict=True)
+            ]
         weights = np.array([*(weight for _, weight in named), log_unlisted])
         probabilities = (1 - P_NOT_IN_MODEL_SPACE) * np.exp(weights - np.logaddexp.reduce(weights))
         probabilities[-1] += P_NOT_IN_MODEL_SPACE

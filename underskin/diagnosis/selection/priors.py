@@ -4,11 +4,14 @@ All sets of one size of the mechanisms that the campaign supports are equally pr
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+
+import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
 
@@ -56,14 +59,36 @@ def guess_count(explanation: Explanation) -> int:
 
 def log_prior_of(explanation: Explanation, supported: int) -> float:
     """Log prior of a set among the `supported` mechanisms of the campaign."""
-    even, guesses = _even_and_guesses(explanation)
-    return log_prior(guesses, supported - even) + even * math.log(_EVEN_PRIOR)
+    return _with_edge(explanation, supported, log_prior)
 
 
 def log_prior_of_discrepancy(explanation: Explanation, supported: int, laws: int = 0) -> float:
     """Log prior of an undescribed discrepancy on top of a set, which holds `laws` unlisted laws."""
+    return _with_edge(explanation, supported, log_prior_beneath, laws)
+
+
+def _with_edge(explanation: Explanation, supported: int, prior: Callable[[int, int], float], laws: int = 0) -> float:
+    """Log prior of a set by the `prior` of so many guesses among so many mechanisms."""
     even, guesses = _even_and_guesses(explanation)
-    return log_prior_beneath(guesses - laws, supported - even) + even * math.log(_EVEN_PRIOR)
+    size = guesses - laws
+    free = prior(size, supported - even) + even * math.log(_EVEN_PRIOR)
+    if size == LARGEST:
+        return free
+    held = prior(size + 1, supported - even + 1) + (even - 1) * math.log(_EVEN_PRIOR)
+    return free + edge_gain(explanation, held - free)
+
+
+def edge_gain(explanation: Explanation, log_odds: float) -> float:
+    """What the prior of the edge adds to the log evidence of a set with contact with the layer; 0 of others.
+
+    An edge that moves freely is no guess there; that it is held in part is one, of these odds. The evidence is that of
+    all mobile fractions alike, the density at 1 times it that of a free edge.
+    """
+    edge, lines = MovingContactEdge.name, explanation.best.hypothesis.lines
+    if edge not in even_laws(explanation.names, lines) & {*explanation.names}:
+        return 0.0
+    fraction = parameter_slices(explanation.names, lines)[edge].start
+    return float(np.logaddexp(explanation.best.log_density_at_end(fraction), log_odds))
 
 
 def must_gain(explanation: Explanation, name: str) -> float:
