@@ -247,7 +247,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.FORCE_SATURATES: force_saturates,
     Reason.FORCE_STEPS: "the force leaps from {from_n:.3g} to {to_n:.3g} N at {at_mm:.4g} mm while the travel goes on "
     "evenly: the sample tore or slipped, or the range or zero of the cell was changed; the {samples} samples after it "
-    "are not of the same contact and were left out",
+    "are not of the same contact or grip and were left out",
     Reason.CONTACT_EVENTS: contact_events,
     Reason.READING_STEPS: "the displacement jumps by {step_mm:.3g} mm at sample {sample}{further:, and {further} times "
     "more|}, and the force stays: its reading jumps, as between the segments of a file, and not the stage; taken out",
