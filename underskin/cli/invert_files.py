@@ -119,21 +119,22 @@ class InvertedFile:
 
     @property
     def _of_platens(self) -> str:
-        """What the E of pressed cylinders assumes of their ends; empty without any.
+        """What the E of pressed cylinders assumes of their ends; empty where that is below its uncertainty.
 
         Platens that hold them raise it by 2 S², S = D/4H (Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111).
         """
-        used = {modulus.recording for modulus in self.moduli if isinstance(modulus.result, CompressionModulus)}
-        shape_factors = [
-            0.25 * block.sample_diameter_mm / block.sample_height_mm
-            for block in self.reading.campaign.of(CompressionRecording)
-            if block.id in used and block.force_n.max() > -block.force_n.min()
-        ]
-        if not shape_factors:
+        raised = []
+        results = {modulus.recording: modulus.result for modulus in self.moduli}
+        for block in self.reading.campaign.of(CompressionRecording):
+            result, share = results[block.id], 0.125 * (block.sample_diameter_mm / block.sample_height_mm) ** 2
+            pressed = block.force_n.max() > -block.force_n.min()
+            if isinstance(result, CompressionModulus) and pressed and share > result.uncertainty / result.modulus:
+                raised.append(100 * share)
+        if not raised:
             return ""
         return (
             "before you quote E: it takes the platens for smooth, and ends that they hold, dry or bonded, raise it by "
-            f"up to {in_digits(200 * max(shape_factors) ** 2, 2)} % (1 + 2 S², S = diameter/4 heights): oil them, or "
+            f"up to {in_digits(max(raised), 2)} % (1 + 2 S², S = diameter/4 heights): oil them, or "
             "press samples of two heights, which diagnose tells apart"
         )
 
