@@ -220,8 +220,8 @@ class CompressionModel(CurveModel):
             residual = shortening + compliance * force - travel
             if (np.abs(residual) <= _FRAME_SETTLED * scale).all():
                 break
-            change = -residual / (1.0 + compliance * slope)
-            shortening = shortening + change
+            moved_to = np.clip(shortening - residual / (1.0 + compliance * slope), -scale, scale)
+            change, shortening = moved_to - shortening, moved_to
             after = self._sample_force(curve, shortening)
             moved = np.abs(change) > _FRAME_SETTLED * scale
             secant = np.divide(after - force, change, out=np.zeros_like(change), where=moved)
@@ -232,7 +232,8 @@ class CompressionModel(CurveModel):
     def _without_history(self, curve: Curve, travel: Floats, compliance: Floats) -> Floats:
         """The shortenings of a sample that remembers nothing, by interpolation over its strain."""
         largest = np.abs(travel).max(axis=-1, keepdims=True)
-        strain = np.linspace(-1.0, 1.0, _FRAME_GRID) * np.minimum(largest, (1.0 - _LEAST_STRETCH) * self._height)
+        pressed = np.minimum(largest, (1.0 - _LEAST_STRETCH) * self._height)
+        strain = -largest + (largest + pressed) * np.linspace(0.0, 1.0, _FRAME_GRID)
         ends = np.maximum.accumulate(strain + compliance * self._elastic_force(curve, strain), axis=-1)
         strain, ends = np.broadcast_arrays(strain, ends)
         found = np.empty_like(travel)
