@@ -101,8 +101,9 @@ class LiquidDrag(Mechanism):
 
 def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
     """What else reads like the drag where the sphere moves at one speed: a friction of the guide, which is constant."""
-    curves = [curve for curve in _indentations(conditions) if curve.time_s is not None]
-    speed = np.abs(np.concatenate([speeds(curve.displacement_mm[None], curve.time_s[None])[0] for curve in curves]))
+    curves = _indentations(conditions)
+    timed = [(curve.displacement_mm, curve.time_s) for curve in curves if curve.time_s is not None]
+    speed = np.abs(np.concatenate([speeds(travel[None], time[None])[0] for travel, time in timed]))
     usual = float(np.median(speed))
     other = np.mean((speed < _AS_FAST * usual) | (_AS_FAST * speed > usual))
     if other > 1 / _ENDS:
