@@ -109,7 +109,7 @@ EFFECTS: dict[str, Effect] = {
     ),
     "timing_delay": Effect("delay of the charge", (FRF,), {"delay_us": (-1e4, 1e4)}),
     "instrument_compliance": Effect(
-        "compliance of the stage, F/k", (INDENTATION,), {"stiffness_n_per_mm": (1e-3, 1e6)}
+        "compliance of the stage, F/k", (INDENTATION, COMPRESSION), {"stiffness_n_per_mm": (1e-3, 1e6)}
     ),
     "liquid_drag": Effect(
         "a liquid drags on the moving sphere, c dz/dt", (INDENTATION,), {"coefficient_n_s_per_mm": (0, 1e3)}

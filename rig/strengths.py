@@ -104,6 +104,7 @@ def of_compressions(description: Mapping[str, Any]) -> Ranges:
         "strain_stiffening": {"coefficient": (0.5, 5)},
         "contact_creep": {"fraction": (0.05, 0.6), "time_s": (0.1 * seconds, 3 * seconds)},
         "platen_friction": {"friction": (0.05, 1)},
+        "instrument_compliance": {"stiffness_n_per_mm": (1.5 * force / depth, 60 * force / depth)},
         "force_ripple": {"amplitude": (0.01, 0.15), "pitch_mm": (0.08 * depth, 0.4 * depth)},
         "force_drift": {"n_per_root_s": (0.02 * force / math.sqrt(seconds), 0.3 * force / math.sqrt(seconds))},
         "tilted_platen": {"wedge_mm": (0.05 * depth, 0.5 * depth)},

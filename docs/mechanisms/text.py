@@ -87,11 +87,13 @@ def _section(mechanism: Mechanism) -> str:
         f"**Source.** {mechanism.source}\n",
         f"{where} **Needs:** {mechanism.needs}.\n",
     ]
-    by_name = {
-        parameter.name: parameter for kind in mechanism.kinds for parameter in mechanism.parameters(_CAMPAIGN, kind)
+    distinct = {
+        (parameter.name, parameter.prior): parameter
+        for kind in mechanism.kinds
+        for parameter in mechanism.parameters(_CAMPAIGN, kind)
     }
-    if by_name:
-        lines.append(_parameters(tuple(by_name.values()), with_shown=True))
+    if distinct:
+        lines.append(_parameters(tuple(distinct.values()), with_shown=True))
     lines.append(f"![What {mechanism.name} does](figures/mechanism-{mechanism.name}.svg)\n")
     return "\n".join(lines)
 

@@ -1,21 +1,25 @@
 """Young's modulus of curves: its interval against integrals over what curves leave open."""
 
+from math import pi
+
 import numpy as np
 import pytest
 from scipy.stats import norm
 
+import underskin
 from rig.description import parse as experiment
 from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.lean_reports import beside, lean_report
 from underskin import SkinDescription
-from underskin.recordings.campaign import Campaign, IndentationRecording, parse
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, parse
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 pytestmark = pytest.mark.slow
 
+_FRAME = "instrument_compliance"
 SHARED_CELL = 0.01  # sd of the logarithm of the gain that all curves share
 
 
@@ -104,3 +108,42 @@ def test_no_modulus_where_nothing_describes_the_curve(table: SigmaTable) -> None
     report = lean_report(Campaign("one", skin, (curve,), units_checked=True), table, *beside("instrument_compliance"))
     assert report["verdict"] == "unexplained"
     assert "youngs_modulus" not in report["fit"]["after"]
+
+
+def on_frame(stiffness: float, noise: float, *heights: float) -> underskin.Report:
+    """The report on blocks of 3 MPa and 10 mm diameter on a frame of so many N/mm, whose E holds 3 MPa."""
+    strain, blocks = np.linspace(0.0, 0.4, 200), []
+    for number, height in enumerate(heights):
+        force = pi / 4 * 10.0**2 * ((1 - strain) ** -2 - (1 - strain))
+        force += noise * force.max() * np.random.default_rng(number).normal(size=len(force))
+        blocks.append(CompressionRecording(f"b{number}", height, 10.0, height * strain + force / stiffness, force))
+    report = underskin.diagnose(Campaign("frame", SkinDescription(poisson_ratio=0.5), tuple(blocks)))
+    assert report.fit is not None
+    modulus = report.fit.after.youngs_modulus
+    assert modulus is not None
+    assert modulus.low is not None
+    assert modulus.high is not None
+    assert modulus.low < 3.0 < modulus.high
+    return report
+
+
+@pytest.mark.parametrize("stiffness", [100.0, 1000.0])
+def test_a_frame_that_gives_is_a_rival_of_softening(stiffness: float) -> None:
+    """One block cannot tell the frame from a softer solid: neither is named alone, and steel is to be pressed."""
+    report = on_frame(stiffness, 5e-4, 10.0)
+    assert report.verdict == "ambiguous"
+    rivals = [list(answer.mechanisms) for answer in report.alternatives if answer.probability > 0.1]
+    assert [[mechanism.name for mechanism in report.mechanisms], *rivals] == [[_FRAME], ["strain_stiffening"]]
+    assert "a block of steel" in report.statement
+    assert report.next_experiment is not None
+    assert "A block of steel" in report.next_experiment.statement
+
+
+def test_blocks_of_two_heights_tell_a_frame_that_gives() -> None:
+    """The frame gives by the force, the solid by the strain: E and k are both told."""
+    report = on_frame(100.0, 5e-4, 5.0, 20.0)
+    assert (report.verdict, [mechanism.name for mechanism in report.mechanisms]) == ("explained", [_FRAME])
+    (stiffness,) = report.mechanisms[0].parameters
+    assert stiffness.low is not None
+    assert stiffness.high is not None
+    assert stiffness.low < 100.0 < stiffness.high

@@ -425,3 +425,16 @@ def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     assert modulus.low <= 0.015 <= modulus.high < 2.5 * modulus.low
     assert modulus.value == pytest.approx(0.015, rel=0.1)
     assert found.low <= drag <= found.high
+
+
+def test_a_friction_of_the_guide_reads_as_drag_at_one_speed() -> None:
+    """A constant force against the motion of a sphere that moves in and back at one speed: E is right, and the drag is
+    said to be a possible friction, with its size beside that of water."""
+    travel = np.concatenate([np.linspace(-0.3, 0.6, 300), np.linspace(0.6, -0.3, 301)[1:]])
+    force = 16 / 9 * np.sqrt(5.0) * np.maximum(travel, 0.0) ** 1.5 + 0.1 * np.sign(np.gradient(travel))
+    force += 4e-3 * np.random.default_rng(4).normal(size=len(travel))
+    recording = IndentationRecording("p", 5.0, travel, force, time_s=0.06 * np.arange(len(travel), dtype=np.float64))
+    report = underskin.diagnose(Campaign("p", SkinDescription(poisson_ratio=0.5), (recording,)))
+    assert [mechanism.name for mechanism in report.mechanisms] == ["liquid_drag"]
+    assert "a friction of the guide, constant against the motion, reads the same" in report.statement
+    assert "1e+06 times the drag of water" in report.statement

@@ -33,7 +33,7 @@ _RIVALS = {
         ("modulus_error", "thickness_error", "moving_contact_edge", "layered_contact"),
     ),
     "indentation": ("modulus_error", "layered_contact", "instrument_compliance", "strain_stiffening"),
-    "compression": ("modulus_error", "platen_friction", "strain_stiffening", "cell_collapse"),
+    "compression": ("modulus_error", "platen_friction", "strain_stiffening", "cell_collapse", "instrument_compliance"),
 }
 
 
@@ -93,6 +93,9 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
         {"fraction": 0.3, "time_s": 10.0}, {"relaxed_fraction": "fraction", "relaxation_time": "time_s"}
     ),
     ("compression", "platen_friction"): Hidden({"friction": 0.5}),  # solved here, a formula in the rig
+    ("compression", "instrument_compliance"): Hidden(
+        {"stiffness_n_per_mm": 200.0}, {"stiffness": "stiffness_n_per_mm"}
+    ),
     ("compression", "modulus_error"): Hidden({"factor": 1.5}, {"modulus_factor": "factor"}),
     ("compression", "cell_collapse"): Hidden(
         {"collapse": 0.08, "packed": 0.75}, {"collapse_strain": "collapse", "densification_strain": "packed"}

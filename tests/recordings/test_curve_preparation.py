@@ -155,6 +155,23 @@ def test_a_leap_of_the_force_ends_the_contact(factor: float, offset: float, corn
     assert modulus_mpa(campaign(depth, read)) == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.parametrize(("sign", "slipped_mm", "gain"), [(-1, 0.3, 1.0), (1, 0.0, 2.0), (1, 0.0, 0.85)])
+def test_a_leap_of_the_force_ends_the_curve_of_a_block_or_strip(sign: int, slipped_mm: float, gain: float) -> None:
+    """A strip of 10 mm slips in its clamp, or the cell that presses a block changes its range."""
+    travel = ways(0.0, 2.0, 0.0)
+    after = np.arange(len(travel)) >= int(np.argmax(travel > 0.8))
+    stretch = 1 - sign * (travel - slipped_mm * after) / 10
+    force = np.where(after, gain, 1.0) * np.pi / 4 * 10**2 * (stretch**-2 - stretch) / 3
+    force += 1e-3 * np.random.default_rng(7).normal(size=len(force)) * np.abs(force).max()
+    sample = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
+    sample |= {"displacement_mm": (sign * travel).tolist(), "force_n": force.tolist()}
+    read, _ = from_dict({"schema": "campaign/1", "name": "b", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
+    finding = only(read)
+    assert finding.code == "force_steps"
+    assert finding.arguments["at_mm"] == pytest.approx(sign * 0.8, abs=0.02)
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.03)
+
+
 def test_a_held_reading_of_the_force_is_no_leap() -> None:
     """A channel that is read at a tenth of the rate leaps everywhere by as much."""
     depth = ways(-0.1, 0.3, -0.1)

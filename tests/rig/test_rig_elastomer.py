@@ -37,6 +37,7 @@ COMPRESSION: dict[str, dict[str, Any]] = {
     "platen_friction": {"friction": 0.5},
     "strain_stiffening": {"coefficient": 3.0},
     "contact_creep": {"fraction": 0.4, "time_s": 5.0},
+    "instrument_compliance": {"stiffness_n_per_mm": 100.0},
     "tilted_platen": {"wedge_mm": 0.3},
     "force_ripple": {"amplitude": 0.05, "pitch_mm": 0.1},
     "force_drift": {"n_per_root_s": 0.3},

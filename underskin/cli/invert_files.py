@@ -90,7 +90,7 @@ class InvertedFile:
         if isinstance(self.inversion, Inversion):
             notes.append(_TO_QUOTE)
             notes += [f"left out: {omission.sentence}" for omission in self.inversion.left_out]
-        notes += [self._of_frame] if self._of_frame else []
+        notes += [words for words in (self._of_frame, self._of_platens) if words]
         return notes
 
     @property
@@ -115,6 +115,27 @@ class InvertedFile:
             "before you quote E: it takes the displacement for the sample's alone, and a machine softer than "
             f"{in_digits(max(softest_n_per_mm), 2)} N/mm lowers it by more than its ± (stiffness_n_per_mm of a rig "
             "description takes that off)"
+        )
+
+    @property
+    def _of_platens(self) -> str:
+        """What the E of pressed cylinders assumes of their ends; empty where that is below its uncertainty.
+
+        Platens that hold them raise it by 2 S², S = D/4H (Gent & Lindley, Proc. Inst. Mech. Eng. 173 (1959) 111).
+        """
+        raised = []
+        results = {modulus.recording: modulus.result for modulus in self.moduli}
+        for block in self.reading.campaign.of(CompressionRecording):
+            result, share = results[block.id], 0.125 * (block.sample_diameter_mm / block.sample_height_mm) ** 2
+            pressed = block.force_n.max() > -block.force_n.min()
+            if isinstance(result, CompressionModulus) and pressed and share > result.uncertainty / result.modulus:
+                raised.append(100 * share)
+        if not raised:
+            return ""
+        return (
+            "before you quote E: it takes the platens for smooth, and ends that they hold, dry or bonded, raise it by "
+            f"up to {in_digits(max(raised), 2)} % (1 + 2 S², S = diameter/4 heights): oil them, or "
+            "press samples of two heights, which diagnose tells apart"
         )
 
 

@@ -204,6 +204,7 @@ class Reason(StrEnum):
     NO_SIMPLE_LAW = "no_simple_law"
     UNUSUAL_SCATTER = "unusual_scatter"
     SCATTER_AT_LIMIT = "unusual_scatter.at_limit"
+    CURVE_STANDS_OFF = "unusual_scatter.curve"
     CURVES_DIFFER = "curves_differ"
     LOAD_NOT_LINEAR = "not_linear.load"
     PRESSURE_NOT_LINEAR = "not_linear.pressure"

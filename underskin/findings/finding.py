@@ -247,7 +247,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.FORCE_SATURATES: force_saturates,
     Reason.FORCE_STEPS: "the force leaps from {from_n:.3g} to {to_n:.3g} N at {at_mm:.4g} mm while the travel goes on "
     "evenly: the sample tore or slipped, or the range or zero of the cell was changed; the {samples} samples after it "
-    "are not of the same contact and were left out",
+    "are not of the same contact or grip and were left out",
     Reason.CONTACT_EVENTS: contact_events,
     Reason.READING_STEPS: "the displacement jumps by {step_mm:.3g} mm at sample {sample}{further:, and {further} times "
     "more|}, and the force stays: its reading jumps, as between the segments of a file, and not the stage; taken out",
@@ -363,6 +363,9 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.SCATTER_AT_LIMIT: "the gain of the recordings scatters by {percent:.2g} % or more, the most that is "
     "considered: something other than d33 decides what they read, and the array has no d33 to quote",
     Reason.CURVES_DIFFER: curves_differ,
+    Reason.CURVE_STANDS_OFF: "its modulus is {factor:.2f} times that of the others, which differ by {others:.2g} % "
+    "(sd): the gain of a rig scatters so once in {once:.0f}{radius_mm:, and a sphere of {radius_mm:.3g} mm would "
+    "agree|}; look at what is declared of it, and repeat it",
     Reason.LOAD_NOT_LINEAR: "L = F/(R²E) is {load_parameter:.2g}: the layer is linear here, and finite strain is left "
     "out; it "
     "adds up to 1.3 % at L = 0.01 and 3 % at L = 0.1 to the stress on a sensor beneath a sphere"

@@ -530,9 +530,9 @@ def _without_steps(curve: CurveRecording, _: Orientation) -> tuple[CurveRecordin
 
 
 def _until_force_step(curve: CurveRecording, _: Orientation) -> tuple[CurveRecording, list[Finding]]:
-    """The samples before a leap of the force alone: those after it are not of the same contact."""
+    """The samples before a leap of the force alone: those after it are not of the same contact or grip."""
     finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-    if not curve.has_sphere or len(finite) < _LEAST:
+    if len(finite) < _LEAST:
         return curve, []
     travel, force = curve.displacement_mm[finite], curve.force_n[finite]
     sample = force_step(travel, force)

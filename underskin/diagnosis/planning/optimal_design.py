@@ -10,7 +10,7 @@ prediction, then the posterior updated; it is the chance that the true explanati
 """
 
 import itertools
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from underskin.diagnosis.data.names import CERTAIN, EXPLAINED, NAMED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits, candidates, inferred, wider
 from underskin.diagnosis.selection.answers import Answer, Search
-from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.base import Kind, Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Conditions, FrfConditions
@@ -35,7 +35,12 @@ _OF_FRFS = (  # what can be varied
     *("preload_n", "indenter_radius_mm", "position_mm", "dwell_s", "sensor", "dynamic_force_n", "load_cycles"),
     "frequency_hz",
 )
-_OF_CURVES = ("indenter_radius_mm", "displacement_mm", "force_n", "time_s", "sample_height_mm", "sample_diameter_mm")
+_OF_CURVES = ("displacement_mm", "force_n", "time_s")
+_VARIED: Mapping[Kind, Collection[str]] = {
+    "frf": _OF_FRFS,
+    "indentation": ("indenter_radius_mm", *_OF_CURVES),
+    "compression": ("sample_height_mm", "sample_diameter_mm", *_OF_CURVES),
+}
 _MODULUS = ("youngs_modulus", "modulus_factor")  # their logarithms add up to that of E
 _OF_BLOCK = 0.03  # relative, of E by a block: 2 % from piece to piece, and its fit
 
@@ -71,7 +76,7 @@ def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextReco
             outside = planned is not None and planned.outside
     if surviving[0].probability >= EXPLAINED:
         return None
-    nothing = _nothing_to_plan(surviving, _OF_CURVES if problem.lines.curves else _OF_FRFS)
+    nothing = _nothing_to_plan(surviving, _VARIED[problem.kind])
     return replace(nothing, outside=outside, block=_by_block(problem, surviving))
 
 

@@ -18,7 +18,7 @@ from underskin.diagnosis.localisation import (
 )
 from underskin.diagnosis.planning.optimal_design import WRONG_MODULUS, NextRecordings
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Answer
-from underskin.findings.formatting import in_digits, in_percent, listed, times_in_words
+from underskin.findings.formatting import capital, in_digits, in_percent, listed, times_in_words
 
 _MOST_UNLISTED = P_NOT_IN_MODEL_SPACE + 1e-3  # largest probability of none_of_these where no unlisted law shows
 _IN_PERCENT = 90.0  # beyond it an effect is given as a factor
@@ -157,7 +157,7 @@ def _range(axis: str, ends: Sequence[float | str]) -> str:
     return f"{words} {text} {unit}".rstrip()
 
 
-_STIFFENING = "strain_stiffening"
+_STIFFENING, _STAGE = "strain_stiffening", "instrument_compliance"
 _VARIED = {  # axes of curves; others as in `WORDS`
     "displacement_mm": "depth",
     "force_n": "largest force",
@@ -222,7 +222,15 @@ def _why_none(plan: NextRecordings) -> str:
     if plan.differ_on:
         words = sorted(_VARIED[axis] if axis in _VARIED else WORDS[axis][0] for axis in plan.differ_on)
         statement += f" They differ in what they depend on: vary the {listed(words)} more widely than here."
-    return statement + _block(plan)
+    stage = stage_clause(plan.rivals)
+    return statement + _block(plan) + (f" {capital(stage)}." if stage else "")
+
+
+def stage_clause(rivals: Sequence[Sequence[str]]) -> str:
+    """What shows whether the stage gives, where only some of the rivals have it; otherwise empty."""
+    if len({_STAGE in names for names in rivals}) < 2:
+        return ""
+    return "a block of steel pressed in place of the sample would tell how far the instrument itself gives"
 
 
 def _rivals(plan: NextRecordings) -> str:

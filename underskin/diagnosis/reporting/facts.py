@@ -28,7 +28,7 @@ from underskin.findings.codes import FindingCode, Lacking, Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.base import Stage
-from underskin.mechanisms.laws import contact_creep, strain_stiffening
+from underskin.mechanisms.laws import contact_creep, liquid_drag, strain_stiffening
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.expressions import CurveLaw
 from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
@@ -461,5 +461,6 @@ class Facts:
 _FACTOR = "modulus_factor"  # of modulus_error
 _MEANINGS = {
     contact_creep.ContactCreep.name: contact_creep.meaning,
+    liquid_drag.LiquidDrag.name: liquid_drag.meaning,
     strain_stiffening.StrainStiffening.name: strain_stiffening.meaning,
 }

@@ -22,11 +22,12 @@ from underskin.diagnosis.data.names import (
     quantity_in_words,
 )
 from underskin.diagnosis.reporting import kinds, numbers
-from underskin.diagnosis.reporting.entries import shape_clause
+from underskin.diagnosis.reporting.entries import shape_clause, stage_clause
 from underskin.diagnosis.reporting.facts import Facts
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer, remainder
+from underskin.diagnosis.selection.other_kinds import may_hide
 from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
 from underskin.findings.codes import FindingCode, Lack, Lacking
@@ -103,7 +104,9 @@ def statement(facts: Facts) -> str:
         elif of_curves:
             settled = verdict != "ambiguous"
             how = "over all answers" if settled else _OVER_ANSWERS
-            last = [*quoted, _modulus_clause(fit["after"], how)]
+            plan = facts.diagnosis.plan
+            stage = "" if settled or plan is None else stage_clause(plan.rivals)
+            last = [*quoted, _modulus_clause(fit["after"], how), _platens_clause(facts), stage]
         second += facts.meanings
         if verdict == "no_mismatch":
             second, last = [*second, *last], [_power_clause(facts.power, facts.problem.kind)]
@@ -272,6 +275,19 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
         low, high = (f"{modulus[end]:.3g}" for end in ("low", "high"))
         return f"Young's modulus {how} is not known: {low} to {high} {modulus['unit']} (95 %)"
     return f"Young's modulus {how}: {numbers.in_sentence(modulus)}"
+
+
+def _platens_clause(facts: Facts) -> str:
+    """A clause on the ends of blocks of one shape, which raise E unseen where the platens hold them."""
+    shown = () if facts.shown is None else facts.shown.names
+    hidden = may_hide(facts.problem.lines.campaign, facts.problem.lines.mechanisms.named)
+    raised = [100 * np.expm1(max(values)) for name, values in hidden.items() if name not in shown]
+    if not raised or raised[0] < _SMALL:
+        return ""
+    return (
+        f"the interval allows for platens that hold the ends, which raise it by up to {in_digits(raised[0], 2)} % and "
+        "do not show on samples of one shape: press one of another height"
+    )
 
 
 def _misfit_clause(fit: Mapping[str, Any], model: str, *law: str) -> str:

@@ -1,10 +1,12 @@
-"""Curves that contradict each other: their moduli differ by more than noise and a poor rig scatter.
+"""Curves that contradict each other: their moduli differ by more than noise and a poor rig scatter; and one that stands
+off others which agree.
 
 b_i = ln(Σ f m/d² / Σ m²/d²) of curve i, its force f over the stated model m: its modulus over the common one. Its
 variance is s² + 1/(Σ m²/d² − (Σ m m′/d²)²/Σ m′²/d²), with s = 5 % of a poor rig, d the noise and m′ the slope over the
 displacement, since its contact point is fitted as well. Σ (b_i − b̄)²/variance, b̄ the weighted mean, is χ² of n − 1
 degrees of freedom. A sphere's modulus goes with 1/√R, so that exchanged radii, or a diameter for a radius, change b by
-half a logarithm of a ratio that is known.
+half a logarithm of a ratio that is known. One curve stands off the others where its b, predicted from theirs with the
+scatter that they leave probable, is that far off with a chance of a twentieth among all curves.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,13 +19,16 @@ from scipy.special import chdtrc
 from underskin.diagnosis.data.names import MOST_QUOTED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import row_prediction
+from underskin.diagnosis.noise import GAIN_PRIOR
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.inversion.mixed_model import GAIN_RANGE
-from underskin.recordings.campaign import IndentationRecording
+from underskin.recordings.campaign import CurveRecording, IndentationRecording
 from underskin.units import Floats
 
 _CHANCE = 1e-3  # of a poor rig whose curves would be said to contradict each other
+_CHANCE_OF_ONE = 0.05  # of a rig of which a curve would be said to stand off: stated with it, and no verdict
+_SCATTERS = np.exp(np.linspace(np.log(1e-3), np.log(0.5), 200))  # of gains, over which is integrated
 
 
 def curve_spread_findings(problem: FittingProblem, stated: Explanation) -> list[Finding]:
@@ -49,7 +54,7 @@ def curve_spread_findings(problem: FittingProblem, stated: Explanation) -> list[
         return []
     moduli = _Moduli(np.log(along / square), GAIN_RANGE[1] ** 2 + 1 / known)
     if moduli.agree():
-        return []
+        return _of_one(moduli, recordings)
     spheres = [recording for recording in recordings if isinstance(recording, IndentationRecording)]
     radii = [sphere.indenter_radius_mm for sphere in spheres] if len(spheres) == len(recordings) else []
     remedies = [words for words, changed in _other_radii(radii) if moduli.agree(np.log(changed) / 2)]
@@ -65,6 +70,25 @@ def _slope(displacement: Floats, model: Floats) -> Floats:
     """Of a model over the displacement (samples,); 0 where the sample does not move."""
     step = np.gradient(displacement)
     return np.asarray(np.divide(np.gradient(model), step, out=np.zeros_like(model), where=step != 0))
+
+
+def _of_one(moduli: "_Moduli", curves: Sequence[CurveRecording]) -> list[Finding]:
+    """The curve whose modulus stands off most of those of at least two others, where chance hardly does that."""
+    if len(curves) < 3:
+        return []
+    chances = [moduli.chance_of(number) for number in range(len(curves))]
+    number = int(np.argmin(chances))
+    if chances[number] > _CHANCE_OF_ONE:
+        return []
+    others, curve = np.delete(moduli.logarithm, number), curves[number]
+    off = float(moduli.logarithm[number] - others.mean())
+    arguments = {
+        "factor": float(np.exp(off)),
+        "others": 100 * float(np.std(others, ddof=1)),
+        "once": 1 / max(chances[number], 1e-3),
+        "radius_mm": curve.indenter_radius_mm * np.exp(2 * off) if isinstance(curve, IndentationRecording) else None,
+    }
+    return [Finding(Reason.CURVE_STANDS_OFF, curve.id, "force_n", arguments)]
 
 
 @dataclass(frozen=True)
@@ -83,6 +107,19 @@ class _Moduli:
         """Whether the logarithms less `moved` differ by no more than chance."""
         statistic = np.sum(self.about_mean(moved) ** 2 / self.variance)
         return bool(chdtrc(len(self.variance) - 1, statistic) > _CHANCE)
+
+    def chance_of(self, number: int) -> float:
+        """Of a curve, among all, to lie so far off the others under the scatter of gains that these leave probable."""
+        noise = self.variance - GAIN_RANGE[1] ** 2
+        others, variance = np.delete(self.logarithm, number), _SCATTERS[:, None] ** 2 + np.delete(noise, number)
+        weight = 1 / variance
+        total = weight.sum(axis=1)
+        mean = weight @ others / total
+        spread = (weight * (others - mean[:, None]) ** 2).sum(axis=1)
+        log_weight = GAIN_PRIOR.log_density(np.log(_SCATTERS)) - 0.5 * (np.log(variance).sum(axis=1) + spread)
+        posterior = np.exp(log_weight - 0.5 * np.log(total) - log_weight.max())
+        off = (self.logarithm[number] - mean) ** 2 / (_SCATTERS**2 + noise[number] + 1 / total)
+        return len(self.logarithm) * float(posterior @ chdtrc(1, off) / posterior.sum())
 
 
 def _other_radii(radii: Sequence[float]) -> Iterator[tuple[str, Floats]]:

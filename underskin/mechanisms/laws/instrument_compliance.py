@@ -12,26 +12,29 @@ from underskin.recordings.campaign import Conditions, IndentationConditions
 
 _REASON = (
     "an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm, those "
-    "of spheres of micrometres 0.1 to 1000 N/m; 30 N/mm for each mm of radius, within a factor of 20"
+    "of spheres of micrometres 0.1 to 1000 N/m; 30 N/mm for each mm of radius, within a factor of 20; under a block or "
+    "strip 70 N/mm, of a cell that gives 0.2 mm at 15 N, to 4000 of a machine with grips: 500, within a factor of 2.7"
 )
 _OF_RADIUS, _USUAL_RADIUS_MM = 30.0, 5.0  # N/mm for each mm
+_OF_FRAMES, _SD_OF_FRAMES = 500.0, 1.0  # N/mm
 _SD = 3.0
 
 
 class InstrumentCompliance(Mechanism):
-    """A stage that gives way under the force."""
+    """A stage or frame that gives way under the force."""
 
     name = "instrument_compliance"
-    plain = """The stage gives way under the force, so the displacement read off it is larger than the indentation and
-    the sample looks too soft, most of all at high force."""
-    law = "measured displacement = indentation + F/k, with the F that is measured: relaxed, and adhesive."
+    plain = """The stage or the frame gives way under the force, so the displacement read off it is larger than the
+    indentation, or the shortening of a block, and the sample looks too soft, most of all at high force."""
+    law = """measured displacement = indentation (of a block or strip: shortening or extension) + F/k, with the F that
+    is measured: relaxed, and adhesive."""
     assumptions = "a linear stage, the same in all recordings; without friction or backlash."
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance)."
     stage = Stage.CURVE
     order = 10
     of = "rig"
-    kinds = ("indentation",)
-    axes = ("force_n",)
+    kinds = ("indentation", "compression")
+    axes = ("force_n", "sample_height_mm", "sample_diameter_mm")
     parameters_stated = (
         Parameter(
             "stage_stiffness",
@@ -49,15 +52,18 @@ class InstrumentCompliance(Mechanism):
     def parameters(
         self, conditions: Conditions, kind: Kind = "indentation", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
-        """The stiffness, expected for the spheres of the recordings."""
+        """The stiffness, expected for the spheres of the recordings, or of the frames that press blocks."""
         radii = [
             recording.indenter_radius_mm
             for recording in conditions.recordings
             if isinstance(recording, IndentationConditions)
         ]
-        if not radii:
+        if kind == "compression":
+            usual = Normal(math.log(_OF_FRAMES), _SD_OF_FRAMES)
+        elif radii:
+            usual = Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)
+        else:
             return self.parameters_stated
-        usual = Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)
         return tuple(replace(parameter, prior=usual) for parameter in self.parameters_stated)
 
     def act(self, state: Curve, values: Values) -> None:

@@ -1,7 +1,7 @@
 """The mechanism `liquid_drag`."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ _REASON = (
 _OF_RADIUS, _USUAL_RADIUS_MM = 4e-7, 0.01  # N·s/mm for each mm
 _SD = 2.5
 _ENDS, _SMALL = 20, 0.02  # one in so many samples at either end; of the force, the drag of a guess
+_AS_FAST = 0.5  # of the usual speed: slower, or as much faster, is another speed
 
 
 class LiquidDrag(Mechanism):
@@ -96,6 +97,22 @@ class LiquidDrag(Mechanism):
         """Add the drag to the measured force."""
         coefficient = 1e3 * numbers(values["drag_coefficient"])  # N·s/m
         state.laws.append(SampleLaw("force", lambda samples, _: coefficient * samples.speed))
+
+
+def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
+    """What else reads like the drag where the sphere moves at one speed: a friction of the guide, which is constant."""
+    curves = _indentations(conditions)
+    timed = [(curve.displacement_mm, curve.time_s) for curve in curves if curve.time_s is not None]
+    speed = np.abs(np.concatenate([speeds(travel[None], time[None])[0] for travel, time in timed]))
+    usual = float(np.median(speed))
+    other = np.mean((speed < _AS_FAST * usual) | (_AS_FAST * speed > usual))
+    if other > 1 / _ENDS:
+        return ""
+    times = values["drag_coefficient"] / (_OF_RADIUS * float(np.median([curve.indenter_radius_mm for curve in curves])))
+    return (
+        "At one speed a friction of the guide, constant against the motion, reads the same, and this is "
+        f"{times:.1g} times the drag of water on the sphere: press at a second speed to tell them apart."
+    )
 
 
 def _indentations(conditions: Conditions) -> list[IndentationConditions]:

@@ -7,11 +7,13 @@ its contact. Contact points are shifted all at once, since each moves one curve 
 Compression, sample by sample: base model is one modulus E of an incompressible neo-Hookean solid between smooth
 platens, F = (E A/3)(λ⁻² − λ) with λ = 1 − (d − d0)/H, compression positive. A sample that is only compressed or only
 pulled is slack, F = 0, before d0, and again where it relaxed and its force would change sign on its way back. Stages:
-declared value → nominal stress of the material → friction at the platens → relaxation.
+declared value → nominal stress of the material → friction at the platens → relaxation → the frame that gives, on which
+d − d0 is the shortening and F/k.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -173,6 +175,8 @@ def declared_modulus(youngs_modulus_mpa: float | None) -> float:
 
 _CONTACT_SD, _CONTACT_BOUND = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
 _LEAST_STRETCH = 0.02  # of λ: curves that are pressed to 0.15 are left out
+_FRAME_GRID, _FRAME_STEP = 201, 1e-6  # strains of a first guess on a frame that gives; of its slope, of the height
+_FRAME_ITERATIONS, _FRAME_SETTLED = 40, 1e-10  # as of spheres on such a stage; of the largest travel
 
 
 class CompressionModel(CurveModel):
@@ -196,7 +200,54 @@ class CompressionModel(CurveModel):
         self._loaded, self._leaves = np.array([_sides(recording) for recording in recordings]).T[..., None]
 
     def _force(self, curve: Curve, contact: Floats, alike: bool) -> tuple[Floats, Mask]:
-        strain = (self.displacement - contact) / self._height
+        travel = self.displacement - contact
+        if curve.stage_stiffness is None:
+            force = self._sample_force(curve, travel)
+        else:
+            force = self._on_frame(curve, travel, 1.0 / numbers(curve.stage_stiffness))
+        return force, np.ones(force.shape, dtype=bool)
+
+    def _on_frame(self, curve: Curve, travel: Floats, compliance: Floats) -> Floats:
+        """F where travel = shortening + F/k: from the shortenings at which it is so without history, Newton steps of
+        all samples together, whose slope is learnt from step to step."""
+        shortening = self._without_history(curve, travel, compliance)
+        beside = shortening + _FRAME_STEP * self._height
+        elastic, further = (self._elastic_force(curve, depth) for depth in (shortening, beside))
+        slope = np.maximum(further - elastic, 0.0) / (_FRAME_STEP * self._height)
+        force = self._sample_force(curve, shortening)
+        scale = np.abs(travel).max(axis=-1, keepdims=True) + np.finfo(float).tiny
+        for _ in range(_FRAME_ITERATIONS):
+            residual = shortening + compliance * force - travel
+            if (np.abs(residual) <= _FRAME_SETTLED * scale).all():
+                break
+            moved_to = np.clip(shortening - residual / (1.0 + compliance * slope), -scale, scale)
+            change, shortening = moved_to - shortening, moved_to
+            after = self._sample_force(curve, shortening)
+            moved = np.abs(change) > _FRAME_SETTLED * scale
+            secant = np.divide(after - force, change, out=np.zeros_like(change), where=moved)
+            slope = np.where(moved & (secant > 0), 0.5 * (slope + np.minimum(secant, 4.0 * slope)), slope)
+            force = after
+        return force
+
+    def _without_history(self, curve: Curve, travel: Floats, compliance: Floats) -> Floats:
+        """The shortenings of a sample that remembers nothing, by interpolation over its strain."""
+        largest = np.abs(travel).max(axis=-1, keepdims=True)
+        pressed = np.minimum(largest, (1.0 - _LEAST_STRETCH) * self._height)
+        strain = -largest + (largest + pressed) * np.linspace(0.0, 1.0, _FRAME_GRID)
+        ends = np.maximum.accumulate(strain + compliance * self._elastic_force(curve, strain), axis=-1)
+        strain, ends = np.broadcast_arrays(strain, ends)
+        found = np.empty_like(travel)
+        for index in np.ndindex(travel.shape[:2]):
+            found[index] = np.interp(travel[index], ends[index], strain[index])
+        return found
+
+    def _elastic_force(self, curve: Curve, shortening: Floats) -> Floats:
+        """F of a sample that neither relaxes nor softens (points, curves, samples)."""
+        return self._sample_force(replace(curve, softening=None, relaxation=()), shortening)
+
+    def _sample_force(self, curve: Curve, shortening: Floats) -> Floats:
+        """F of the sample itself (points, curves, samples) [N] at shortenings in the order of time [m]."""
+        strain = shortening / self._height
         strain = np.where(self._loaded * strain < 0, 0.0, strain)  # slack
         force = numbers(curve.modulus) * self._area * self._relative_stress(curve, strain)
         relaxation = curve.relaxes
@@ -204,7 +255,7 @@ class CompressionModel(CurveModel):
             force = relaxation.at_rest * force
             force = relaxation.convolved(force, memories(force, self.time, relaxation))
             force = np.where(self._leaves * force < 0, 0.0, force)
-        return force, np.ones(force.shape, dtype=bool)
+        return np.asarray(force)
 
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
         """Nominal stress over E, compression positive: of the material, and as cycles soften it."""
