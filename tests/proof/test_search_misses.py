@@ -6,7 +6,6 @@ from proof.cases import DrawnCase
 from proof.search_misses import compared
 from proof.text_wide import is_miss
 from rig.wide_tails import WIDE
-from tests.support.cases import first
 
 STOPPED = DrawnCase(900004, 54, "single", WIDE)  # of a step whose fit without scatter begins worse than others end
 MISLED = DrawnCase(900002, 29, "pair", WIDE)  # of a wrong thickness and gains of sensors, which alone look like scatter
@@ -18,26 +17,23 @@ MOVED = DrawnCase(940001, 175)  # a resonance that adhesion moves far from where
 AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, which the evidence took 40 nats for
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize(
     "case",
-    first(
-        1,
-        [
-            FAINT,
-            pytest.param(
-                STUCK,
-                marks=pytest.mark.xfail(
-                    raises=AssertionError,
-                    strict=True,
-                    reason="a best fit 1.4 nats below that from the true values, since creep follows J(t)",
-                ),
+    [
+        FAINT,
+        pytest.param(
+            STUCK,
+            marks=pytest.mark.xfail(
+                raises=AssertionError,
+                strict=True,
+                reason="a best fit 1.4 nats below that from the true values, since creep follows J(t)",
             ),
-            MOVED,
-            SHARP,
-            AT_BOUNDS,
-        ],
-    ),
+        ),
+        MOVED,
+        SHARP,
+        AT_BOUNDS,
+    ],
     ids=lambda case: case.name,
 )
 def test_hidden_sets_found_weighed_well_true(case: DrawnCase) -> None:
