@@ -9,7 +9,6 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
 import pytest
 
 from tests.support.cases import first
@@ -19,8 +18,6 @@ from underskin import ExtensionError, InvalidInput, extensions
 from underskin.mechanisms import CATALOGUE, FrfState, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.base import AXES, READS, UNITS, ActsOn
 from underskin.mechanisms.contract import check
-from underskin.mechanisms.models.contact_state import Pickup, together
-from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
 from underskin.recordings.campaign import Conditions
 
@@ -126,12 +123,6 @@ def test_law_not_finite_bound_refused() -> None:
     assert refusal.value.field == "law (frf) at gap = 0 -"
 
 
-def test_two_parameters_of_one_name_are_refused() -> None:
-    twice = LowPass().parameters(reference_campaign("frf")) * 2
-    with pytest.raises(InvalidInput, match="one parameter"):
-        check(changed(parameters=lambda *_: twice), built_in())
-
-
 def test_second_spread_sensors_gains_refused() -> None:
     """A second spread of the sensors gains is refused."""
     attributes: dict[str, Any] = {
@@ -142,19 +133,6 @@ def test_second_spread_sensors_gains_refused() -> None:
     check(changed(**attributes))
     with pytest.raises(InvalidInput, match="is taken by sensor_spread"):
         check(changed(**attributes), built_in())
-
-
-def test_charges_several_mechanisms_add() -> None:
-    """Charges of several mechanisms add their variances."""
-    one = Pickup(np.array([0, 2]), lambda values: 3.0 * values["q"] * np.ones(2))
-    two = Pickup(np.array([2, 5]), lambda values: 4.0 * values["q"] * np.ones(2))
-    both = together([one, two])
-    assert both is not None
-    assert both.rows.tolist() == [0, 2, 5]
-    assert both.deviation({"q": np.array([1.0])}) == pytest.approx([3, 5, 4])
-    assert both.deviation({"q": np.array([[1.0], [2.0]])}) == pytest.approx(np.array([[3, 5, 4], [6, 10, 8]]))
-    assert together([one]) is one
-    assert together([]) is None
 
 
 def test_page_lists_mechanism_state() -> None:
@@ -267,16 +245,3 @@ def test_package_composed_drawn_adopted_found(tmp_path: Path) -> None:
     answer = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout == "used\n"
-
-
-@pytest.mark.soak
-def test_the_texts_are_there_without_docstrings() -> None:
-    """`python -OO` drops docstrings and asserts; a statement and a report need the mechanisms' texts."""
-    script = (
-        "from underskin.diagnosis.reporting.wording import readable\n"
-        "from underskin.mechanisms import CATALOGUE, Mechanism\n"
-        "texts = [getattr(entry, name) for entry in CATALOGUE.values() for name in ('plain', 'law', 'source')]\n"
-        "print(Mechanism.__doc__, len(texts), all(texts), readable('contact_creep'))"
-    )
-    answer = subprocess.run([sys.executable, "-OO", "-c", script], capture_output=True, text=True)
-    assert answer.stdout == "None 66 True contact creep\n", answer.stderr

@@ -79,6 +79,7 @@ def test_every_error_is_an_underskin_error() -> None:
     assert all(issubclass(error, underskin.UnderskinError) for error in raised)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "unneeded"),
     [

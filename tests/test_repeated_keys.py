@@ -1,12 +1,10 @@
 """A key that comes twice in one object of a JSON or YAML document is refused, wherever such a document comes in."""
 
 import json
-import time
 from pathlib import Path
 from typing import Any
 
 import httpx
-import orjson
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +13,7 @@ from bench.soak import SOAK
 from tests.support import preloaded
 from tests.support.repository import ROOT
 from underskin.errors import FileError
-from underskin.recordings import read_file, rig_description
+from underskin.recordings import rig_description
 from underskin.recordings.readers.json_file import repeated_key
 
 EXAMPLES = ROOT / "examples" / "formats"
@@ -81,20 +79,6 @@ def test_its_line_and_column_are_told(text: str, key: str, line: int, column: in
     assert repeated_key(text.encode()) == (key, f"line {line}, column {column}")
 
 
-def test_search_costs_less_parsing_numbers() -> None:
-    """The search costs less than parsing numbers does."""
-    numbers = [n / 7 for n in range(100_000)]
-    document = orjson.dumps([{"frequency_hz": numbers, "frf_re_pc_per_n": numbers, "frf_im_pc_per_n": numbers}])
-    assert len(document) > 5e6
-
-    def seconds(work: Any) -> float:
-        start = time.process_time()
-        assert work(document) is not KeyError
-        return time.process_time() - start
-
-    assert min(seconds(repeated_key) for _ in range(5)) < 0.5 * min(seconds(orjson.loads) for _ in range(5))
-
-
 def test_every_route_takes_json_refuses_repeated(http: httpx.Client) -> None:
     """Every route that takes json refuses a repeated key."""
     paths = http.get("/openapi.json").json()["paths"]
@@ -149,10 +133,6 @@ def test_command_line_names_file_line_column(tmp_path: Path) -> None:
     line = TWICE[: TWICE.rindex('"thickness_mm"')].count("\n") + 1
     expected = f"monday.json: line {line}, column 2: the key 'thickness_mm' must be given once in its object"
     assert expected in found.stderr
-
-
-def test_what_comes_once_is_read() -> None:
-    assert not read_file(CAMPAIGN.encode(), "monday.json").problems
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,11 @@
 """What the tests send to /v1/stress and its command."""
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import httpx
 
 Document = dict[str, Any]
 
-COMMAND = Path(sys.executable).with_name("underskin")
 
 SKIN: Document = {
     "thickness_mm": 2.5,

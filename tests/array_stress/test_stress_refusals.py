@@ -10,9 +10,15 @@ import httpx
 import numpy as np
 import pytest
 
-from service.routes.stress import EXAMPLE
 from tests.array_stress.stress_documents import PRESS, SKIN, Document, document, posted
 from tests.cli.commands import run
+
+
+def example() -> Document:
+    """That of the service, whose modules take long to load."""
+    from service.routes.stress import EXAMPLE
+
+    return deepcopy(EXAMPLE)
 
 
 def map_of(**changes: Any) -> Callable[[Document], None]:
@@ -88,7 +94,7 @@ REFUSED: list[tuple[Callable[[Document], Any], str, str]] = [
 def test_what_cannot_be_is_refused_by_name(
     http: httpx.Client, change: Callable[[Document], Any], field: str, allowed: str
 ) -> None:
-    request = deepcopy(EXAMPLE)
+    request = example()
     change(request)
     reply = http.post("/v1/stress", json=request)
     assert reply.status_code == 422, reply.text
@@ -99,7 +105,7 @@ def test_what_cannot_be_is_refused_by_name(
 
 def test_map_reach_skins_edge_cells_no_further(http: httpx.Client) -> None:
     """A map may reach the skins edge with its cells and no further."""
-    request = deepcopy(EXAMPLE)  # its sensors' middle is at x 4
+    request = example()  # its sensors' middle is at x 4
     map_of(x_mm=[-14.5, -11.5], y_mm=[-0.5, 0.5], pressure_mpa=[[0.1, 0.0], [0.0, 0.0]])(request)
     assert http.post("/v1/stress", json={**request, "length_mm": 40.0, "width_mm": 2.0}).status_code == 200
     for places, refused in (([-14.6, -11.6], [0, 0]), ([19.6, 22.6], [1, 1])):

@@ -6,7 +6,6 @@ command is not asked).
 
 from tests.cases.outcomes import Right
 
-NO_MISMATCH = Right(verdicts=("no_mismatch",), names=())
 REVERSE = "revers|counted negative|turned round|wrong sign"
 SPHERE = "no sphere|not a sphere|blunt|flat|cone|misses by"
 DEEP = "times the declared radius"

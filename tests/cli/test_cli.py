@@ -2,9 +2,7 @@
 
 import csv
 import io
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -200,13 +198,6 @@ def test_help_lists_commands_without_loading() -> None:
 
 
 @pytest.mark.slow
-def test_units_stand_in_the_help() -> None:
-    shown = run("frf", "--help").stdout
-    for unit in ("[mm]", "[MPa]", "[N]", "[pC/N]"):
-        assert unit in shown
-
-
-@pytest.mark.slow
 def test_commands_packages_get_arguments(tmp_path: Path) -> None:
     """Commands of other packages get their arguments."""
     made = run("key", "create", "bench-1", UNDERSKIN_DATA=str(tmp_path))
@@ -227,19 +218,6 @@ def test_reader_that_goes_away() -> None:
         process.stdout.readline()
         process.stdout.close()
         assert process.stderr.read() == b""
-
-
-@pytest.mark.slow
-def test_python_m_terminal_without_greek_letters() -> None:
-    """Python m on a terminal without greek letters."""
-    shown = subprocess.run(
-        [sys.executable, "-m", "underskin", "sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6"],
-        env=os.environ | {"PYTHONIOENCODING": "ascii"},
-        capture_output=True,
-        text=True,
-    )
-    assert (shown.returncode, shown.stderr) == (0, "")
-    assert "0.93651" in shown.stdout
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from tests.support.instrument_files import EXAMPLES
 from tests.support.simulated_campaign import Rig, simulate
 from underskin import load_table
 from underskin.inversion.invert import invert
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, SkinDescription
+from underskin.recordings.campaign import Campaign, CompressionRecording, SkinDescription
 from underskin.recordings.readers import json_file
 from underskin.units import to_lab
 
@@ -82,14 +82,6 @@ def test_table_shows_array_sensors_band_left(palm: Campaign, file: Path) -> None
     assert re.search(r"s5 .* weak: 2\d % of the array's median", shown)
     assert "left out: sensor s5: weak" in shown
     assert "look at" not in shown
-
-
-@pytest.mark.slow
-def test_a_band_of_ones_own(file: Path) -> None:
-    assert "20 to 80 Hz, as asked" in run("d33", str(file), "--band", "20,80").stdout
-    answer = run("d33", str(file), "--band", "500,600")
-    assert answer.returncode == 2
-    assert "no d33: band_hz" in answer.stdout
 
 
 @pytest.mark.slow
@@ -194,17 +186,6 @@ def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None
     assert "d33 of the array" in shown.stdout
     assert re.search(r"block +16 ", shown.stdout)
     assert "left out: recording idle: force_n" in shown.stdout
-
-
-@pytest.mark.slow
-def test_values_in_the_wrong_unit_are_a_finding(palm: Campaign, tmp_path: Path) -> None:
-    def in_coulombs(recording: FrfRecording) -> FrfRecording:
-        assert recording.frf_re_pc_per_n is not None
-        return replace(recording, frf_re_pc_per_n=1e-12 * recording.frf_re_pc_per_n)
-
-    small = tuple(in_coulombs(one) for one in palm.recordings if isinstance(one, FrfRecording))
-    (tmp_path / "small.json").write_bytes(json_file.write(replace(palm, recordings=small)))
-    assert "look at: FRF, median of the recordings: " in run("d33", str(tmp_path / "small.json")).stdout
 
 
 @pytest.mark.slow

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cli.commands import PRESSED, refused, run
-from tests.support.cases import first
-from tests.support.lean_reports import BESIDE_SKINS
+from tests.cli.commands import run
 from tests.support.store_server import campaign
 
 RATE = 2000.0
@@ -54,32 +52,3 @@ def test_command_says_counts_file_lines_left(tmp_path: Path) -> None:
     assert "makes H1 too small" not in chosen.stderr
     assert "look at: H2 is for time series, which 1 of 3 recordings are not" in chosen.stderr
     assert "H2 is for time series" not in by_file.stderr
-
-
-@pytest.mark.soak
-def test_a_diagnosis_takes_it_too(tmp_path: Path) -> None:
-    file = written(tmp_path)
-    fewer = [part for name in BESIDE_SKINS for part in ("--without", name)]
-    done = run("diagnose", str(file), *fewer, "--estimator", "Hv", "--output-dir", str(tmp_path / "reports"))
-    assert done.returncode == 0, done.stderr
-    assert "look at: Hv is for time series, which 1 of 3 recordings are not" in done.stderr
-    reports = {}
-    for name in first(1, ("H2", "H1")):
-        done = run("diagnose", str(written(tmp_path, name)), *fewer, "--output-dir", str(tmp_path / name))
-        given = run("diagnose", str(file), *fewer, "--estimator", name, "--output-dir", str(tmp_path / f"{name} given"))
-        assert (done.returncode, given.returncode) == (0, 0), given.stderr
-        reports[name] = [
-            json.loads((tmp_path / folder / f"{stem}.json").read_text())["fit"]
-            for folder, stem in ((name, name), (f"{name} given", "None"))
-        ]
-    by_hv = json.loads((tmp_path / "reports" / "None.json").read_text())["fit"]
-    for of_the_file, given_fit in reports.values():
-        assert of_the_file == given_fit != by_hv
-
-
-@pytest.mark.slow
-def test_columns_have_none(tmp_path: Path) -> None:
-    columns = [part for name, value in PRESSED.items() for part in ("--" + name.replace("_", "-"), str(value))]
-    line = refused("d33", *columns, "--preload-n", "1", "--frf-pc-per-n", "7", "--estimator", "Hv")
-    assert line == "underskin: --estimator goes with FILE, and none is given"
-    assert "'h1' is not one of" in refused("d33", str(written(tmp_path)), "--estimator", "h1")

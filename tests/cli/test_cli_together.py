@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -53,35 +52,6 @@ def test_files_together_tell_file(palm: Campaign, presses: list[str], tmp_path: 
     assert (shown.splitlines()[0], shown.count("d33 of the array")) == ("palm/3", 2)  # and by the solved contact
     assert "assumes the paper's model" in shown  # whether it can be quoted
     assert [page.name for page in (tmp_path / "pages").iterdir()] == ["palm-3.html"]
-
-
-@pytest.mark.slow
-def test_a_copy_of_a_file_counts_once(presses: list[str], tmp_path: Path) -> None:
-    copy = tmp_path / "copy.json"
-    copy.write_bytes(Path(presses[0]).read_bytes())
-    once = run("d33", *presses, "--together", "palm", "--csv")
-    twice = run("d33", *presses, str(copy), "--together", "palm", "--csv")
-    assert (twice.returncode, figures(twice.stdout)) == (0, figures(once.stdout))
-    assert "recordings with the very numbers of others count once: 'copy r' is 'press-0 r'" in twice.stderr
-
-
-@pytest.mark.slow
-def test_an_unreadable_file_costs_only_itself(presses: list[str], tmp_path: Path) -> None:
-    Path(presses[2]).write_text("{")
-    answer = run("d33", *presses, str(tmp_path / "nowhere.json"), "--together", "palm")
-    assert (answer.returncode, answer.stdout.count("d33 of the array")) == (2, 2)
-    assert [line.split(": ")[1] for line in answer.stderr.splitlines()] == [presses[2], str(tmp_path / "nowhere.json")]
-    none = run("d33", str(tmp_path / "nowhere.json"), "--together", "palm")
-    assert (none.returncode, none.stdout) == (2, "")
-
-
-@pytest.mark.slow
-def test_files_of_different_skins_are_refused(presses: list[str]) -> None:
-    document = json.loads(Path(presses[1]).read_text())
-    document["skin"]["thickness_mm"] = 3.0
-    Path(presses[1]).write_text(json.dumps(document))
-    said = refused("d33", *presses, "--together", "palm")
-    assert f"skin.thickness_mm = 3.0: in {presses[1]}; must be 2.5, as in {presses[0]}" in said
 
 
 @pytest.mark.slow

@@ -14,8 +14,6 @@ import underskin
 from tests.support import preloaded
 from tests.support.server import running
 from underskin import Client, Indenter, ServiceError, Skin, Unreachable
-from underskin.physics import half_space
-from underskin.surrogate.influence_table import load_influence
 from underskin.units import to_lab, to_si
 
 SKIN: dict[str, Any] = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5}
@@ -37,18 +35,6 @@ def test_sigma_is_the_tables(client: Client) -> None:
     assert answer.rel_error == pytest.approx(expected.rel_error, rel=1e-15)
     assert answer.status.tolist() == ["ok"] * 7
     assert (answer.model, answer.table_sha256) == ("layer", TABLE.sha256)
-
-
-def test_half_space_reads_no_table(client: Client) -> None:
-    answer = client.sigma([0.0, 0.3], 0.0, model="half_space")
-    assert answer.sigma == pytest.approx(half_space.delta([0.0, 0.3]), rel=1e-9)
-    assert answer.table_sha256 is None
-
-
-def test_single_numbers_give_single_numbers(client: Client) -> None:
-    answer = client.sigma(0.3, 0.6)
-    assert answer.sigma.shape == answer.rel_error.shape == answer.status.shape == ()
-    assert client.sigma([0.3], 0.6).sigma.shape == (1,)
 
 
 def test_rows_outside_table_nan_spoil(client: Client) -> None:
@@ -108,15 +94,6 @@ def test_a_column_of_100_000_rows(client: Client) -> None:
     assert answer.frf_pc_per_n[[0, -1]] == pytest.approx(
         client.frf(**PRESSED, preload_n=preload[[0, -1]], d33_pc_per_n=14.0).frf_pc_per_n, rel=1e-15
     )
-
-
-def test_tables_and_health(client: Client) -> None:
-    entry, influence, _ = client.tables()
-    assert (entry.name, entry.table_sha256) == ("sigma", TABLE.sha256)
-    assert {axis.name: (axis.low, axis.high) for axis in entry.axes} == TABLE.domain
-    assert (influence.name, influence.table_sha256) == ("influence", load_influence().sha256)
-    assert client.health() == "ok"
-    assert client.ready() == TABLE.sha256
 
 
 @pytest.mark.parametrize(

@@ -76,12 +76,15 @@ PRESSED = experiment(
         },
     }
 )  # fmt: skip
-FAST = parse(campaign_of_curves(PRESSED, record_curves(PRESSED)))
 
 
 def test_modulus_of_a_relaxation_at_the_foot(table: SigmaTable) -> None:
     """A weak relaxation much faster than the loading is found: what it changes at the foot is not the modulus."""
-    report = lean_report(FAST, table, *beside("contact_creep", "instrument_compliance"))
+    report = lean_report(
+        parse(campaign_of_curves(PRESSED, record_curves(PRESSED))),
+        table,
+        *beside("contact_creep", "instrument_compliance"),
+    )
     modulus = report["fit"]["after"]["youngs_modulus"]
     assert [entry["name"] for entry in report["mechanisms"]] == ["contact_creep"]
     assert modulus["low"] < MODULUS_MPA < modulus["high"]

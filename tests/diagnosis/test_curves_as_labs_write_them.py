@@ -9,13 +9,14 @@ import pytest
 
 import underskin
 from tests.cli.commands import run
-from underskin import SigmaTable
+from tests.support.lean_reports import COSTLY, quick_diagnosis
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
 from underskin.units import Floats
 
 pytestmark = pytest.mark.slow
 
 SKIN = SkinDescription(poisson_ratio=0.5, youngs_modulus_mpa=None)
+QUICKLY = [word for name in COSTLY for word in ("--without", name)]
 E_MPA, RADIUS_MM = 2.0, 4.0
 HERTZ = 4 / 3 * E_MPA / 0.75 * np.sqrt(RADIUS_MM)  # N/mm^1.5
 
@@ -59,45 +60,45 @@ def holds(report: underskin.Report, modulus_mpa: float) -> bool:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_pulled_strip_of_either_sign(sign: int, table: SigmaTable) -> None:
+def test_pulled_strip_of_either_sign(sign: int) -> None:
     """The curve tells that a strip was pulled, whatever its signs."""
     strain, stress = pulled(0.6, 0.8)
-    report = underskin.diagnose(uniaxial(sign * strain, sign * stress), table)
+    report = quick_diagnosis(uniaxial(sign * strain, sign * stress))
     assert report.verdict == "no_mismatch"
     assert holds(report, 0.6)
     turned = [finding for finding in report.findings if finding.code == "sign_flipped"]
     assert ["of one that is pulled" in finding.statement for finding in turned] == ([True] if sign > 0 else [])
 
 
-def test_pressed_block_counted_negative(table: SigmaTable) -> None:
+def test_pressed_block_counted_negative() -> None:
     """A block whose curve is that of one that is pressed is not taken as pulled for its signs."""
     strain, stress = pulled(0.6, -0.25)
-    report = underskin.diagnose(uniaxial(strain, stress), table)
+    report = quick_diagnosis(uniaxial(strain, stress))
     assert report.verdict == "no_mismatch"
     assert holds(report, 0.6)
 
 
-def test_plateau_of_either_load_stays_open(table: SigmaTable) -> None:
+def test_plateau_of_either_load_stays_open() -> None:
     """Where mechanisms bend the curve of a pulled sample and of a pressed one alike, nothing is explained."""
     strain = np.linspace(0, 0.3, 300)
-    report = underskin.diagnose(uniaxial(strain, 0.015 * np.tanh(20 * strain)), table)
+    report = quick_diagnosis(uniaxial(strain, 0.015 * np.tanh(20 * strain)))
     assert "pulled_or_pressed" in {finding.code for finding in report.findings}
     assert report.verdict == "ambiguous"
     assert modulus(report) is None
 
 
-def test_checked_signs_bind(table: SigmaTable) -> None:
+def test_checked_signs_bind() -> None:
     """Signs that the lab has checked are not turned round, whatever the curve looks like."""
     strain, stress = pulled(0.6, 0.8)
-    report = underskin.diagnose(uniaxial(strain, stress, signs_checked=True), table)
+    report = quick_diagnosis(uniaxial(strain, stress, signs_checked=True))
     assert "sign_flipped" not in {finding.code for finding in report.findings}
     assert report.verdict not in ("explained", "no_mismatch")
 
 
-def test_held_out_contradicts_explanation(table: SigmaTable) -> None:
+def test_held_out_contradicts_explanation() -> None:
     """No set explains curves whose held-out part it predicts worse than the base model, and far from the noise."""
     strain, stress = pulled(0.6, 0.8)
-    report = underskin.diagnose(uniaxial(strain, stress, signs_checked=True), table)
+    report = quick_diagnosis(uniaxial(strain, stress, signs_checked=True))
     assert report.fit is not None
     before, after = report.fit.before.heldout_rmse_percent, report.fit.after.heldout_rmse_percent
     assert before is not None
@@ -108,26 +109,26 @@ def test_held_out_contradicts_explanation(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize(("unit", "in_newtons"), [("gf", 9.80665e-3), ("mN", 1e-3)])
-def test_force_without_its_unit(unit: str, in_newtons: float, table: SigmaTable) -> None:
+def test_force_without_its_unit(unit: str, in_newtons: float) -> None:
     """A modulus that no elastomer has is a unit that is not the heading's, and no result."""
     depth, force = way_in()
-    report = underskin.diagnose(sphere(depth, force / in_newtons), table)
+    report = quick_diagnosis(sphere(depth, force / in_newtons))
     assert report.verdict == "insufficient_data"
     assert f"N for {unit}" in report.statement
-    declared = underskin.diagnose(sphere(depth, force / in_newtons, modulus_mpa=3.0), table)
+    declared = quick_diagnosis(sphere(depth, force / in_newtons, modulus_mpa=3.0))
     assert f"N for {unit}" in declared.statement
 
 
-def test_soft_rail_of_cell(table: SigmaTable) -> None:
+def test_soft_rail_of_cell() -> None:
     """Where the force that is read bends over with the depth, no law of it tells E."""
     depth, force = way_in()
-    report = underskin.diagnose(sphere(depth, 2.2 * np.tanh(force / 2.2)), table)
+    report = quick_diagnosis(sphere(depth, 2.2 * np.tanh(force / 2.2)))
     assert report.verdict not in ("explained", "no_mismatch")
     assert modulus(report) is None or holds(report, E_MPA)
 
 
 @pytest.mark.parametrize("lead_s", [0.0, 2.0])
-def test_creep_under_held_force(lead_s: float, table: SigmaTable) -> None:
+def test_creep_under_held_force(lead_s: float) -> None:
     """A sphere that sinks in under a held force shows creep: of a solid with one time, 40 % of it."""
     time = np.arange(0, 60, 0.1)
     force = np.clip((time - lead_s) / 2, 0, 1)
@@ -140,17 +141,17 @@ def test_creep_under_held_force(lead_s: float, table: SigmaTable) -> None:
     cubes = np.array([compliance(time[at] - time[: at + 1]) @ grown[: at + 1] for at in range(len(time))])
     depth = (3 / (4 * np.sqrt(RADIUS_MM)) * cubes) ** (2 / 3)
     depth = depth + 2e-4 * np.random.default_rng(8).standard_normal(len(depth))
-    report = underskin.diagnose(sphere(depth, force, time), table)
+    report = quick_diagnosis(sphere(depth, force, time), "contact_creep")
     assert [mechanism.name for mechanism in report.mechanisms] == ["contact_creep"]
     assert report.verdict == "explained"
     assert holds(report, E_MPA)
 
 
-def test_backlash_is_taken_out_whole(table: SigmaTable) -> None:
+def test_backlash_is_taken_out_whole() -> None:
     """Play at the turn is taken out as large as it is: nothing of it is left."""
     depth, force = way_in()
     back = np.concatenate([depth, depth[::-1] + 0.008])
-    report = underskin.diagnose(sphere(back, np.concatenate([force, force[::-1]]), np.linspace(0, 48, 960)), table)
+    report = quick_diagnosis(sphere(back, np.concatenate([force, force[::-1]]), np.linspace(0, 48, 960)))
     assert "reading_steps" in {finding.code for finding in report.findings}
     assert report.verdict == "no_mismatch"
     assert holds(report, E_MPA)
@@ -167,7 +168,7 @@ def test_curves_together_without_frfs(tmp_path: Path) -> None:
         head = f"# Sample height [mm]: {height}\n# Sample diameter [mm]: 20\nDisplacement (mm),Force (N)\n"
         (tmp_path / f"block-{height}.csv").write_text(head + rows + "\n")
     files = [str(tmp_path / f"block-{height}.csv") for height in (20, 10, 5)]
-    answer = run("diagnose", *files, "--together", "blocks", "--output-dir", str(tmp_path))
+    answer = run("diagnose", *files, *QUICKLY, "--together", "blocks", "--output-dir", str(tmp_path))
     assert answer.returncode == 0, answer.stderr
     report = json.loads((tmp_path / "blocks.json").read_text())
     assert report["campaign"] == "blocks"
@@ -185,8 +186,8 @@ def test_signs_of_rig_description_bind(tmp_path: Path) -> None:
     )
     for sign in (1, -1):
         (tmp_path / "rig.yaml").write_text(rig.replace("SIGN", str(sign)))
-        answer = run("diagnose", str(tmp_path / "curve.csv"), "--rig", str(tmp_path / "rig.yaml"), "--output-dir",
-                     str(tmp_path / str(sign)))  # fmt: skip
+        given = ("--rig", str(tmp_path / "rig.yaml"), "--output-dir", str(tmp_path / str(sign)))
+        answer = run("diagnose", str(tmp_path / "curve.csv"), *QUICKLY, *given)
         report = json.loads((tmp_path / str(sign) / "curve.json").read_text())
         assert "sign_flipped" not in {finding["code"] for finding in report["findings"]}, answer.stdout
         assert (report["verdict"] == "no_mismatch") == (sign == -1)

@@ -12,7 +12,6 @@ from scipy.signal import lfilter
 from bench.soak import SOAK
 from tests.support.cases import first
 from tests.support.lean_reports import beside, lean_report, whole_report
-from underskin import InvalidInput
 from underskin.mechanisms import CATALOGUE
 from underskin.mechanisms.declared.saving import document
 from underskin.recordings.campaign import parse
@@ -39,17 +38,14 @@ def force_on(travel: Floats) -> Floats:
 LARGEST = float(force_on(np.array(DEPTH_MM)))
 
 
-def campaign(
-    changes: Mapping[str, Change], seed: int = 6, *, held_s: float = 0.0, back: bool = True, air: float = PAUSE
-) -> dict[str, Any]:
-    """Three curves with air at three speeds, held and with a way back where asked for, from the laws themselves."""
+def campaign(changes: Mapping[str, Change], seed: int = 6, *, air: float = PAUSE) -> dict[str, Any]:
+    """Three curves with air at three speeds, with a way back, from the laws themselves."""
     moved, factor, added = (changes.get(name, none) for name in ("moved", "factor", "added"))
     random = np.random.default_rng(seed)
     recordings = []
     for number, seconds in enumerate((0.25 * SECONDS, 0.5 * SECONDS, SECONDS)):
         way_in = DEPTH_MM * np.linspace(-air, 1.0, 400)
-        rest = int(held_s / (seconds / 800))
-        travel: Floats = np.concatenate([way_in, np.full(rest, DEPTH_MM), *([way_in[-2::-1]] if back else [])])
+        travel: Floats = np.concatenate([way_in, way_in[-2::-1]])
         time: Floats = seconds / 800 * np.arange(float(len(travel)))
         force = force_on(travel + moved(travel, time))
         force = force * (1 + factor(travel, time)) + added(travel, time)
@@ -85,16 +81,12 @@ LAWS: Mapping[str, tuple[dict[str, Change], str, str, set[str], dict[str, float]
 }  # fmt: skip
 
 
-SOFTER: Mapping[str, Change] = {"factor": lambda travel, _: -0.04 * turned(travel)}  # on the way back
-
-
 @pytest.fixture(scope="module")
 def reports(table: SigmaTable) -> Callable[[str], dict[str, Any]]:
-    """The report on a campaign with a law of `LAWS`, or with `SOFTER` (by no name), made once for all tests here."""
+    """The report on a campaign with a law of `LAWS`, made once for all tests here."""
 
     def made(name: str) -> dict[str, Any]:
-        whole = campaign(LAWS[name][0]) if name else campaign(SOFTER, held_s=5.0)
-        return lean_report(parse(whole), table, *FEW)
+        return lean_report(parse(campaign(LAWS[name][0])), table, *FEW)
 
     return cache(made)
 
@@ -121,45 +113,6 @@ def test_law_found_numbers_predicts_held(name: str, reports: Callable[[str], dic
     low, high = law["range"][axis]
     assert low == 0
     assert high == pytest.approx({"force_n": LARGEST, "displacement_mm": DEPTH_MM, "time_s": SECONDS}[axis], rel=0.05)
-
-
-def turned(travel: Floats) -> Floats:
-    """1 on the way back."""
-    last = int(np.flatnonzero(travel >= travel.max())[-1])
-    return (np.arange(len(travel)) > last).astype(float)
-
-
-@pytest.mark.soak
-def test_changes_way_back_after_hold_told(
-    reports: Callable[[str], dict[str, Any]],
-) -> None:
-    """What changes on the way back after a hold is told from what changes in time."""
-    report = reports("")
-    law = report["unnamed"]
-    assert (law["acts_on"], law["axis"], law["form"]) == ("modulus", "time_s", "step")
-    assert law["expression"].startswith("F = F0·(1 − 0.0")
-    assert law["expression"].endswith("·[on the way back])")
-    (change,) = law["parameters"]
-    assert change["low"] < -0.04 < change["high"]
-    assert "on the way back" in report["statement"]
-    assert "friction that turns with the sphere" in report["statement"]
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize("back", first(1, [False, True]))
-def test_bump_third_force_keeps_size(back: bool, table: SigmaTable) -> None:
-    """A bump of a third of the force keeps its size.
-
-    Also where no way back tells it a second time.
-    """
-    bump: dict[str, Change] = {"added": lambda travel, _: 0.3 * LARGEST / (1 + ((travel - 0.15) / 0.02) ** 2)}
-    report = lean_report(parse(campaign(bump, back=back)), table, *FEW)
-    law = report["unnamed"]
-    assert (law["acts_on"], law["axis"], law["form"]) == ("force", "displacement_mm", "peak")
-    values = {entry["name"]: entry["value"] for entry in law["parameters"]}
-    assert values["change"] == pytest.approx(0.3 * LARGEST, rel=0.1)
-    assert values["centre"] == pytest.approx(0.15, abs=0.01)
-    assert law["heldout_rmse_percent"]["after"] < 0.3 * law["heldout_rmse_percent"]["before"]
 
 
 @pytest.mark.parametrize("seed", first(1, [6, 7, 8]))
@@ -223,11 +176,3 @@ def test_law_curves_kept_recognised_name(
     held_out, floor = later["fit"]["after"]["heldout_rmse_percent"], later["fit"]["noise_floor_percent"]
     assert held_out < 1.3 * floor
     assert fitted is None or fitted["verdict"] == "no_mismatch"
-
-
-def test_step_sphere_turns_back_cannot_kept(
-    reports: Callable[[str], dict[str, Any]],
-) -> None:
-    """A step where the sphere turns back cannot be kept."""
-    with pytest.raises(InvalidInput, match="turns back is no expression"):
-        document(reports(""), "softer_back")

@@ -1,6 +1,5 @@
 """Curves, the rig's, raw ones and real ones: what is told of them, and what no law describes."""
 
-import json
 import os
 import re
 from collections.abc import Sequence
@@ -20,7 +19,7 @@ from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.cases import first
-from tests.support.lean_reports import beside, lean_report, whole_report
+from tests.support.lean_reports import beside, lean_report
 from tests.support.pressed_curves import pressed
 from tests.support.slip_campaigns import looked_at
 from underskin import Conditions, SkinDescription, load_table, predict
@@ -30,7 +29,6 @@ from underskin.surrogate.hdf5_format import load_contact
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-CAMPAIGNS = os.environ.get("UNDERSKIN_CAMPAIGNS")
 STAGE = beside("instrument_compliance", "strain_stiffening")
 STICKY = beside("adhesion", "instrument_compliance", "strain_stiffening")
 
@@ -137,59 +135,6 @@ def test_physics_no_law_describes_unexplained(
         assert re.search(r"none of \d+ simple laws of one quantity over one axis", findings)
     plain = report["fit"]["before"]["least_squares_modulus_mpa"]
     assert f"Young's modulus {plain:.3g} MPa, leaves" in report["statement"]
-
-
-def nanoindentation(samples: int = 3100) -> tuple[Floats, Floats]:
-    """Depth [mm] and force [N] of a sphere that snaps in by JKR's law, is pressed, rests pinned, recedes and tears off,
-    on a stage that gives."""
-    radius, reduced, stage = 7.5e-6, 1e6 / 0.75, 3.0  # SI
-    travel = 1e-6 * np.concatenate([np.linspace(-3, 1.5, samples // 2), np.linspace(1.5, -6, samples // 2)])
-    stable = []
-    for work in (0.040, 0.075):  # of adhesion, and of separation
-        a = np.geomspace(1e-8, 6e-6, 100_001)
-        force = 4 * reduced * a**3 / (3 * radius) - np.sqrt(8 * np.pi * work * reduced * a**3)
-        total = a**2 / radius - np.sqrt(2 * np.pi * work * a / reduced) + force / stage
-        stable.append((total[total.argmin() :], a[total.argmin() :]))
-    depth, pressed_by, edge = travel.copy(), np.zeros(len(travel)), 0.0
-    for sample, at in enumerate(travel):
-        if edge == 0 and at >= 0 and sample < samples // 2:
-            edge = float(np.interp(at, *stable[0]))
-        edge = edge if at >= stable[1][0][0] else 0.0
-        if edge > 0:
-            edge = float(np.clip(edge, np.interp(at, *stable[0]), np.interp(at, *stable[1])))
-            hertzian, stiffness = 4 * reduced * edge**3 / (3 * radius), 2 * reduced * edge
-            stretch = (edge**2 / radius + hertzian / stage - at) / (1 + stiffness / stage)
-            depth[sample], pressed_by[sample] = edge**2 / radius - stretch, hertzian - stiffness * stretch
-    noise = 3e-10 * np.random.default_rng(3).normal(size=len(depth))
-    drift = 2e-13 * np.arange(len(depth))
-    return 1e3 * (depth + 1.2e-5), 1.01 * pressed_by + noise + 2e-9 + drift
-
-
-@pytest.mark.soak
-def test_remainder_small_beside_law_explains(table: SigmaTable) -> None:
-    """A remainder that is small beside what a law explains does not contradict it."""
-    depth, force = nanoindentation()
-    wave = 0.004 * force.max() * np.sin(2 * np.pi * (depth - depth.min()) / 0.5 / np.ptp(depth))
-    curve = of_curve(depth, force + wave, 7.5e-3, thickness=2.0, time_s=0.002 * np.arange(len(depth)))
-    report = lean_report(curve, table, *STICKY)
-    assert report["verdict"] == "explained"
-    assert names(report) == ["adhesion"]
-
-
-@pytest.mark.soak
-@pytest.mark.skipif(CAMPAIGNS is None, reason="UNDERSKIN_CAMPAIGNS names no folder of concealed campaigns")
-@pytest.mark.parametrize(
-    "name", first(1, ["v1x2sxf5n", "v48jbeq3p", "v4j8zegt1", "v7bb8mnv4", "vb2c4z9ma", "v0w0qva2y"])
-)
-def test_curves_independent_rig_named_modulus(table: SigmaTable, name: str) -> None:
-    """Curves of an independent rig are named with their modulus."""
-    assert CAMPAIGNS is not None
-    truth = json.loads((Path(CAMPAIGNS) / "curves-open-truth.json").read_text(encoding="utf-8"))[name]
-    document = json.loads((Path(CAMPAIGNS) / "curves-open" / f"{name}.json").read_text(encoding="utf-8"))
-    report = whole_report(parse(document), table)
-    assert report["verdict"] == ("explained" if truth["effects"] else "no_mismatch")
-    assert set(names(report)) == set(truth["effects"])
-    assert report["fit"]["after"]["youngs_modulus"]["value"] == pytest.approx(truth["youngs_modulus_mpa"], rel=0.05)
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])
@@ -372,30 +317,6 @@ def test_imitated_laws_take_probability(table: SigmaTable) -> None:
         assert weak["probability"] < reported(30.0, (2.0, 20.0))["probability"]
     other = [entry for entry in weak["alternatives"] if entry["mechanisms"] == ["none_of_these"]]
     assert other[0]["probability"] <= weak["probability"]
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize("work", [5e-6, 5e-5])
-def test_adhesion_gel_liquid_leaves_modulus(work: float, table: SigmaTable) -> None:
-    """Adhesion of a gel in a liquid leaves the modulus right.
-
-    Some µJ/m², a ten-thousandth of a silicone's in air; its forces of nanonewtons are meant.
-    """
-    gel = {
-        "seed": 5, "kind": "indentation",
-        "skin": {"thickness_mm": 5.0, "youngs_modulus_mpa": 0.01, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14.0},
-        "curves": {
-            "indenters_mm": [0.025], "largest_displacement_mm": 3e-3, "samples": 2000, "retract": True,
-            "approach_mm": 1e-3, "retreat_mm": 1.5e-3, "force_noise_n": 5e-10, "modulus_declared": False,
-            "stage_stiffness_n_per_mm": 5e-4, "stage_declared": True, "units_checked": True,
-        },
-        "effects": {"adhesion": {"work_j_per_m2": work}},
-    }  # fmt: skip
-    report = lean_report(made(gel), table, *STICKY)
-    assert report["fit"]["after"]["youngs_modulus"]["value"] == pytest.approx(0.01, rel=0.03)
-    assert names(report) == ["adhesion"]
-    stated = report["mechanisms"][0]["parameters"][0]
-    assert 0.8 * stated["low"] < work < 1.25 * stated["high"]
 
 
 @pytest.mark.slow

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, freqs
 
-from proof.cases import DrawnCase
 from rig.description import parse as experiment
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
-from rig.wide_tails import WIDE
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside, lean_report, whole_report
@@ -79,19 +77,6 @@ def test_charge_taken_peak_peak_shows_beside(times: float, said: str, table: Sig
     statement = lean_report(replace(made, skin=replace(made.skin, d33_pc_per_n=D33)), table, *DECLARED)["statement"]
     assert said in statement
     assert ("times the declared" in statement) == bool(said)
-
-
-@pytest.mark.soak
-def test_resonance_no_list_leave_either_end_band(table: SigmaTable) -> None:
-    """A resonance of no list may leave either end of the band.
-
-    A loose part takes 18 % from all that is below its frequency or adds it above: the lines do not tell which.
-    """
-    case = DrawnCase(900010, 72, None, WIDE)
-    assert list(case.description["effects"]) == ["rattle"]
-    report = whole_report(parse(case.document()), table)
-    assert report["verdict"] == "unexplained"
-    assert report["d33"]["low"] < case.description["skin"]["d33_pc_per_n"] < report["d33"]["high"]
 
 
 def reported(
@@ -176,7 +161,7 @@ def test_law_declared_facts_say_stands_among(table: SigmaTable) -> None:
     assert much["probability"] < 0.05  # the campaign is made by the base model, whose contact is a half space's
 
 
-@pytest.mark.parametrize("poles", [1, 2])
+@pytest.mark.parametrize("poles", first(1, [2, 1]))
 def test_a_chain_of_two_poles_is_explained(poles: int, table: SigmaTable) -> None:
     """Behind a Butterworth high-pass of one or two poles d33 is quoted, and its interval holds the true one."""
     made = campaign(Made(sensors=2, repeats=1), table)

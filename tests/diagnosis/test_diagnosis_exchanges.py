@@ -72,18 +72,6 @@ def test_rotated_connector_put_right_whole(since: int, good: Campaign, table: Si
     require_put_right(wrong, good, table, "s0", "s1", "s2")
 
 
-@pytest.mark.soak
-def test_rotation_put_right_not_every_sensor(table: SigmaTable) -> None:
-    """A rotation is put right where not every sensor would show it alone.
-
-    The rig's contacts lie between the sensors: those of s05, labelled s09, might be of its neighbours.
-    """
-    made, _ = from_dict(recorded_campaign(record(drawn(944001, 49, "single"))))
-    label = {"s05": "s09", "s09": "s04", "s04": "s05"}
-    wrong = changed(made, lambda entry, _: replace(entry, sensor=label.get(entry.sensor, entry.sensor)))
-    require_put_right(wrong, made, table, "s04", "s05", "s09", known="thickness_error")
-
-
 def test_labels_no_permutation_explains_left(table: SigmaTable) -> None:
     """Labels that no permutation explains are left out.
 
@@ -169,18 +157,6 @@ def test_failure_sensors_not_share_no_exchange(good: Campaign, table: SigmaTable
         return replace(times(entry, gain), position_mm=None)
 
     assert named(changed(good, stepped), table, "sensor_spread") == []
-
-
-@pytest.mark.soak
-def test_exchanged_labels_told_contacts_miss(table: SigmaTable) -> None:
-    """Exchanged labels are told where all contacts miss their places.
-
-    The rig's array of 2 × 2 sensors, pressed 0.7 mm beside every commanded place.
-    """
-    description = drawn(934567, 56, "single")
-    assert set(description["effects"]) == {"misalignment"}
-    made, _ = from_dict(recorded_campaign(record(description)))
-    require_put_right(changed(made, exchanged("s02", "s04")), made, table, "'s02' and 's04'", known="misalignment")
 
 
 def test_silent_recording_near_crossing_zero(table: SigmaTable) -> None:

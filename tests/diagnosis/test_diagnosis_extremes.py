@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bench.soak import SOAK
 from tests.support.lean_reports import beside, lean_report
 from tests.support.slip_campaigns import looked_at
 from underskin import InvalidInput
@@ -15,7 +16,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 FEW = beside("thickness_error", "layered_contact", "ageing", "strain_stiffening", "amplifier_high_pass")
 EDGE = settings(
-    max_examples=150,
+    max_examples=150 if SOAK else 50,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 WILD = (1e-300, 1e-9, 1e-3, 1e3, 1e6, 1e300)

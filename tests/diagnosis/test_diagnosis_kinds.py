@@ -78,21 +78,6 @@ def test_curves_tell_wrong_modulus_frfs_alone(
     assert "A compressed block" not in ((together["next_experiment"] or {}).get("statement") or "")
 
 
-@pytest.mark.soak
-def test_curves_agree_rule_out_frfs_alone_leave(table: SigmaTable) -> None:
-    """Curves that agree rule out what frfs alone leave open."""
-    measured = lines(effects={"thickness_error": {"factor": 1.2}})
-    open_before = {tuple(entry["mechanisms"]) for entry in report(measured, [], table, *DECLARED)["alternatives"]}
-    open_after = {
-        tuple(entry["mechanisms"])
-        for entry in report(measured, curves("compression", BLOCK), table, *DECLARED)["alternatives"]
-        if entry["probability"] > 0.01
-    }
-    assert ("modulus_error",) in open_before
-    assert ("modulus_error",) not in open_after
-    assert ("thickness_error",) in open_after
-
-
 def test_acts_block_alone_named_beside_frfs(table: SigmaTable) -> None:
     """What acts on the block alone is named beside the frfs."""
     blocks = {**BLOCK, "heights_mm": [4, 12], "diameters_mm": [20, 20]}
@@ -173,20 +158,6 @@ def test_block_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -
     assert modulus_of(document, "compression")["value"] == pytest.approx(48.0, rel=0.05)
 
 
-@pytest.mark.soak
-def test_kinds_contradict_tell_modulus_explains(exact: dict[str, Any], table: SigmaTable) -> None:
-    """Kinds that contradict each tell the modulus by what explains them alone.
-
-    Deep indentations of another skin: their E counts the base that they feel, which these FRFs do not show.
-    """
-    deep = {**SPHERE, "largest_displacement_mm": 0.8}
-    document = report(exact, curves("indentation", deep, 48.0, effects={"layered_contact": {}}), table, *LAYER)
-    assert len(document["contradictions"]) == 1
-    assert document["verdict"] == "no_mismatch"
-    told = modulus_of(document, "indentation")
-    assert told["low"] < 48.0 < told["high"]
-
-
 def test_indentations_block_data_set(table: SigmaTable) -> None:
     """Indentations and a block are one data set too.
 
@@ -253,20 +224,3 @@ def test_indentations_feel_base_tell_thickness(table: SigmaTable) -> None:
     assert told["low"] < 16.0 < told["high"]
     (factor,) = [entry for entry in document["by_kind"] if entry["parameter"] == "thickness_factor"]
     assert factor["low"] < 0.87 < factor["high"]
-
-
-@pytest.mark.soak
-def test_wrong_modulus_wrong_thickness_told(table: SigmaTable) -> None:
-    """A wrong modulus and a wrong thickness are both told beside a resonance."""
-    wrong: Effects = {"thickness_error": {"factor": 1.16}, "contact_resonance": {"tip_mass_g": 6.0, "damping": 0.04}}
-    described = {**LINES, "lines": {"low_hz": 10, "high_hz": 1000, "count": 30}, "noise": {"gain": 0.01, "line": 0.01}}
-    described |= {"design": {**LINES["design"], "offsets_mm": [[0, 0], [1.2, 0]]}}
-    described |= {"seed": 9, "effects": wrong, "skin": {**LINES["skin"], "youngs_modulus_mpa": 9.0}}
-    measured = campaign_of_lines(record_lines(experiment({**described, "schema": "experiment/1"})))
-    measured["skin"]["youngs_modulus_mpa"] = 16.0
-    known = beside("modulus_error", "thickness_error", "contact_resonance", "misalignment", "timing_delay")
-    document = report(measured, curves("compression", BLOCK, 9.0), table, *known)
-    assert {"modulus_error", "thickness_error", "contact_resonance"} <= set(named(document))
-    told = {mechanism["name"]: mechanism["parameters"][0] for mechanism in document["mechanisms"]}
-    assert told["modulus_error"]["low"] < 9 / 16 < told["modulus_error"]["high"]
-    assert told["thickness_error"]["low"] < 1.16 < told["thickness_error"]["high"]

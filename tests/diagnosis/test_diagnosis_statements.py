@@ -10,13 +10,11 @@ import pytest
 
 from proof.slip_kinds import SLIPS, Case
 from rig.draw import drawn, record
-from rig.drawn_campaign import documents_and_truth
-from rig.joint import drawn_joint
 from rig.recorded import campaign as rig_campaign
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
-from tests.support.lean_reports import beside, lean_fleet, lean_report, lean_together, sentences, whole_report
-from underskin.recordings.campaign import Campaign, frf_recordings, from_dict, parse
+from tests.support.lean_reports import beside, lean_report, sentences
+from underskin.recordings.campaign import frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable
 
 pytestmark = pytest.mark.slow
@@ -52,28 +50,6 @@ def test_slip_decides_comes_before_verdict(table: SigmaTable) -> None:
         before = sentences(report["statement"])[0].partition("; apart from that, ")[0].lower()
         told = [entry["statement"][:25].lower() for entry in report["findings"]]
         assert any(said in before for said in told), report["statement"]
-
-
-@pytest.mark.soak
-def test_statements_kinds_campaigns_short(table: SigmaTable) -> None:
-    """Statements of all kinds of campaigns are short.
-
-    Each of these reports is held to it where it is made.
-    """
-    for number in (2, 0, 1, 3):
-        for hidden in ("none", "single", "pair", "unknown"):
-            whole_report(parse(rig_campaign(record(drawn(SEED, number, hidden)))), table)
-    for kind in ("indentation", "compression"):
-        for number in range(3):
-            ((document,), _) = documents_and_truth(SEED, number, kind, None)
-            whole_report(parse(document), table)
-    for number in range(2):
-        lean_together([parse(one) for one in drawn_joint(SEED, number, "dates")[0]], table, "dates")
-        skins: dict[str, list[Campaign]] = {}
-        for one in map(parse, drawn_joint(SEED, number, "skins")[0]):
-            skins.setdefault(str(one.skin.id), []).append(one)
-        lean_fleet(skins, table, "Palm 2. Upper")
-        whole_report(parse(drawn_joint(SEED, number, "compression")[0][0]), table)
 
 
 def test_what_keeps_an_axis_undecidable_is_named(table: SigmaTable) -> None:

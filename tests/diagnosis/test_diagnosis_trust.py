@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from docs.tour.steps import VERDICT
 from rig.draw import drawn, record
 from rig.recorded import campaign as rig_campaign
 from tests.support.cases import first
@@ -70,31 +69,6 @@ def test_raw_curve_snap_pull_off_no_clear(table: SigmaTable) -> None:
     assert "agree within the noise" not in report["statement"]
 
 
-@pytest.mark.soak
-def test_resonance_many_recordings_brings(table: SigmaTable) -> None:
-    """A resonance in many recordings brings no mains.
-
-    The flank of a resonance counted as line noise, and mains were credited with the difference.
-    """
-    made = Made(
-        mechanisms=("contact_resonance",),
-        parameters=(6.0, 0.05),
-        sensors=24,
-        preloads_n=(0.5, 1, 2, 3),
-        spheres_mm=(4.0,),
-        lines=80,
-        highest_hz=500.0,
-        thickness_mm=2.5,
-        modulus_mpa=16.0,
-        sensor_radius_mm=1.5,
-        seed=2,
-    )
-    report = lean_report(campaign(made, table), table, *OF_LINES)
-    assert names(report) == ["contact_resonance"]
-    assert not any("mains_pickup" in entry["mechanisms"] for entry in report["alternatives"])
-    assert report["fit"]["noise"]["line_level"] == pytest.approx(1.0, abs=0.05)  # as large as the lines' roughness says
-
-
 def test_a_resonance_and_mains_are_both_named(table: SigmaTable) -> None:
     """Where mains are there, the noise beside the resonance hides none of them."""
     made = Made(
@@ -147,6 +121,8 @@ def test_example_explained_heavy_tip(table: SigmaTable) -> None:
 
     As docs/tour.md has it, and so it can be adopted.
     """
+    from docs.tour.steps import VERDICT
+
     report = whole_report(read_file(EXAMPLE, EXAMPLE.name).campaign, table)
     assert report["verdict"] == "explained"
     assert names(report) == ["contact_resonance"]

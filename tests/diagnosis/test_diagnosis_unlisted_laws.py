@@ -1,8 +1,7 @@
 """Laws that nobody listed: found with the right place, axis and form, predicted, adopted, and not seen elsewhere."""
 
-import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +15,7 @@ from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside, lean_report, whole_report
 from tests.support.rig_reports import rig_report
-from underskin import InvalidInput
 from underskin.mechanisms import CATALOGUE
-from underskin.mechanisms.declared.saving import document
 from underskin.prediction.adopted_model import adopted, not_adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_of, frf_recordings, parse
 from underskin.surrogate.sigma_table import SigmaTable
@@ -154,11 +151,6 @@ def test_followed_order_confirmed_repeating(quiet: Campaign, table: SigmaTable) 
     assert {"order", "recorded_at"}.isdisjoint(planned["recordings"][0])
 
 
-def test_recordings_give_report(warming: Campaign, warming_report: dict[str, Any], table: SigmaTable) -> None:
-    """The same recordings give the same report."""
-    assert json.dumps(reported(warming, table)) == json.dumps(warming_report)
-
-
 def test_resonance_frame_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
     """A resonance of the frame is a peak over frequency."""
 
@@ -251,69 +243,6 @@ def test_high_pass_order_said(quiet: Campaign, table: SigmaTable) -> None:
     assert holds(order, 0.4)
     assert f"this is a high pass of order {order['value']:.2f} (" in report["statement"]
     assert "Hz/(i·f))^(-" in law["expression"]
-
-
-PLACES = Made(sensors=3, offsets_mm=(-0.9, 0.8), preloads_n=(0.2, 0.5, 1.0, 2.2, 5.0), lines=20, highest_hz=1000.0)
-
-
-def left_out(
-    mechanism: str, parameters: tuple[float, ...], table: SigmaTable, made: Made = PLACES, without: Sequence[str] = ()
-) -> dict[str, Any]:
-    """The report on a campaign that holds the mechanism, of a catalogue that does not."""
-    whole = campaign(replace(made, mechanisms=(mechanism,), parameters=parameters), table)
-    found = whole_report(whole, table, mechanism, *without)
-    assert (found["verdict"], found["mechanisms"]) == ("unexplained", [])
-    assert found["unnamed"]["heldout_rmse_percent"]["after"] < 1.5 * found["fit"]["noise_floor_percent"]
-    assert mechanism in found["provenance"]["without"]
-    return found
-
-
-@pytest.mark.soak
-def test_thickness_off_everywhere_found(table: SigmaTable) -> None:
-    """A thickness that is off everywhere is found without its mechanism."""
-    found = left_out("thickness_error", (1.2,), table)
-    law = found["unnamed"]
-    assert law_of(found) == ("thickness", "preload_n", "linear")
-    assert law["expression"] == f"h = h0·(1 + {law['parameters'][0]['value']:.3g})"
-    assert holds(law["parameters"][0], 0.2)
-    assert "changes the thickness, the same in all recordings: +" in found["statement"]
-
-
-@pytest.mark.soak
-def test_place_off_everywhere_adopted(table: SigmaTable) -> None:
-    """A place that is off everywhere can be adopted."""
-    found = left_out("misalignment", (0.5, -0.3), table, without=[name for name in FEW if name != "misalignment"])
-    assert law_of(found) == ("position", "x_mm", "linear")
-    along_x, along_y = found["unnamed"]["parameters"]
-    assert holds(along_x, 0.5)
-    assert holds(along_y, -0.3)
-    with pytest.raises(InvalidInput, match="is a mechanism of the catalogue already"):
-        document(found, "stage_off")
-    made = campaign(replace(PLACES, mechanisms=("misalignment",), parameters=(0.5, -0.3)), table)
-    assert adopted(found, made, table) is not None
-
-
-@pytest.mark.soak
-def test_gain_sensor_found_without_mechanism(table: SigmaTable) -> None:
-    """A gain of each sensor is found without its mechanism."""
-    made = replace(PLACES, sensors=9, sensor_radius_mm=0.5, offsets_mm=(0.0,), preloads_n=(0.2, 1.0, 5.0))
-    found = left_out("sensor_spread", (0.25,), table, made)
-    assert law_of(found)[:2] == ("gain", "sensor")
-    course = found["unnamed"]["course"]
-    assert [entry["at"] for entry in course] == [f"s{number}" for number in range(9)]
-    assert all(entry["low"] < entry["change"] < entry["high"] for entry in course)
-
-
-@pytest.mark.soak
-def test_mechanisms_found_without_names(table: SigmaTable) -> None:
-    """Other mechanisms are found without their names.
-
-    A delay of half a turn is so large that others together follow it better than the tangent of any law.
-    """
-    assert law_of(left_out("timing_delay", (350.0,), table)) == ("frequency_response", "frequency_hz", "linear")
-    found = left_out("ageing", (0.5, 300.0, 0.0), table, Made(sensors=3, repeats=2))
-    assert found["unnamed"]["acts_on"] == "gain"
-    assert found["unnamed"]["axis"] in ("load_cycles", "order", "recorded_at")  # one and the same here
 
 
 @pytest.mark.soak

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.draw import drawn, record
-from rig.recorded import campaign as recorded
 from tests.support.cases import first
-from tests.support.lean_reports import beside, lean_report, whole_report
-from underskin.recordings.campaign import from_dict, parse
+from tests.support.lean_reports import beside, lean_report
+from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 pytestmark = pytest.mark.slow
@@ -52,28 +50,3 @@ def test_laws_independent_rig_found_predict_held(table: SigmaTable) -> None:
             shares.append((before**2 - after**2) / (before**2 - report["fit"]["noise_floor_percent"] ** 2))
     assert right >= 0.8 * len(tried)
     assert np.median(shares) > 0.8
-
-
-@needs_campaigns
-@pytest.mark.soak
-def test_delay_disperses_delay_exponent(table: SigmaTable) -> None:
-    """A delay that disperses is a delay with another exponent.
-
-    A phase that grows with the square of frequency.
-    """
-    report = report_on("c6h8e3rgx", table)
-    assert "this is a delay with another exponent: its phase grows with frequency to the power" in report["statement"]
-    exponent = next(entry for entry in report["unnamed"]["parameters"] if entry["name"] == "exponent")
-    assert exponent["value"] == pytest.approx(2.0, abs=0.05)
-
-
-@pytest.mark.soak
-def test_law_leads_fit_absurd_responses(table: SigmaTable) -> None:
-    """A law that leads a fit to absurd responses is no better for it.
-
-    A high pass whose corner rises with the preload, of which this diagnosis once failed.
-    """
-    content, _ = from_dict(recorded(record(drawn(61496, 231, None))))
-    report = whole_report(content, table)
-    assert report["verdict"] == "unexplained"
-    assert (report["unnamed"]["acts_on"], report["unnamed"]["axis"]) == ("frequency_response", "preload_n")

@@ -13,6 +13,8 @@ from underskin.physics.hankel_transform import hertz_transform
 
 A = 0.289
 RHO = np.array([0.0, 0.2, 0.6])
+pytestmark = pytest.mark.soak  # as all that the paper needs
+
 PAPER_LENGTH, PAPER_WIDTH = 16.0, 8.0  # 40 mm and 20 mm in units of 2.5 mm
 
 
@@ -38,7 +40,6 @@ def test_half_spaces_error_falls_depth_base() -> None:
     np.testing.assert_allclose(percent, [-34.7, -7.8, -0.7, -0.01], atol=0.05)
 
 
-@pytest.mark.soak
 @pytest.mark.parametrize(("depth", "bonded"), [(1.0, False), (4.0, True)])
 def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> None:
     wide = 16 * max(1.0, depth)
@@ -46,7 +47,6 @@ def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> N
     np.testing.assert_allclose(block.sigma, deep_layer.sigma(depth, A, RHO, bonded=bonded), rtol=1e-5)
 
 
-@pytest.mark.soak
 def test_error_falls_order_elements() -> None:
     """The error falls with the order of the elements.
 
@@ -59,7 +59,6 @@ def test_error_falls_order_elements() -> None:
     assert errors[1] < min(1e-5, errors[0] / 10)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("depth", first(1, [1.0, 12.0]))
 def test_papers_block_converges_carries_whole(depth: float) -> None:
     """The papers block converges and carries the whole force."""
@@ -70,7 +69,6 @@ def test_papers_block_converges_carries_whole(depth: float) -> None:
     np.testing.assert_allclose(coarse.sigma, fine.sigma, rtol=2e-4)
 
 
-@pytest.mark.soak
 def test_length_and_width_can_be_exchanged() -> None:
     along = solve(FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, 4.0), A, RHO, order=3)
     across = solve(FiniteBlock(PAPER_WIDTH, PAPER_LENGTH, 4.0), A, RHO, order=3)
@@ -87,7 +85,6 @@ def test_narrow_column_carries_mean_pressure() -> None:
     np.testing.assert_allclose(column.sigma, 2 * np.pi / 3 / side**2, rtol=1e-6)
 
 
-@pytest.mark.slow
 def test_displacement_under_load_endless_layers() -> None:
     """The displacement under the load is the endless layers.
 

@@ -5,7 +5,7 @@ import pytest
 
 from docs.paper.cylinder import gent_lindley, stiffness_ratio
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.soak  # as all that the paper needs
 
 
 def test_a_slender_cylinder_shows_its_modulus() -> None:

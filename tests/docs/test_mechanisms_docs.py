@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.mechanisms.figures import draw
 from docs.mechanisms.signatures import panels
 from docs.mechanisms.silicones import LAWS, RESULTS, Sample, fit, main, yeoh
 from docs.mechanisms.text import document
@@ -36,6 +35,8 @@ def test_mechanism_figure_effect() -> None:
 
 @pytest.mark.soak
 def test_figures_come_out_the_same_every_time(tmp_path: Path) -> None:
+    from docs.mechanisms.figures import draw
+
     first, second = (
         [path.read_bytes() for path in draw(load_table(), tmp_path, ["ageing", "contact_resonance"])] for _ in range(2)
     )

@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from underskin.figures.array_map import D33, Quantity, array_map, disc_size, significance_note
+from underskin.figures.array_map import Quantity, array_map, significance_note
 from underskin.figures.loads import loaded_array
 from underskin.inversion.array_history import differ_from_others
 from underskin.units import Floats
@@ -46,24 +46,6 @@ def test_differs_coloured_scale_reaches_far() -> None:
     assert (high - middle, middle - low) == pytest.approx((14.2 - middle, 14.2 - middle))
     assert high - low > 6 * 0.12
     assert "1 of 64 differ" in significance_note(values, np.full(64, 0.12))
-
-
-def test_far_beyond_many_differ_not_pale() -> None:
-    """One far beyond many that differ does not pale them."""
-    values = np.concatenate([-0.4 - 0.5 * np.random.default_rng(5).uniform(size=63), [-5.4]])
-    quantity = Quantity("difference", "pC/N", "zero")
-    (differs,) = [trace for trace in drawn(values, quantity=quantity).data if trace.name == "difference"]
-    assert -differs.marker.cmin == differs.marker.cmax == pytest.approx(3 * np.quantile(-values, 0.9), rel=0.01)
-    told = significance_note(values, np.full(64, 0.12), quantity)
-    assert told.endswith(". 1 beyond the scale has the colour of its end.")
-
-
-def test_sensor_far_off_not_colour() -> None:
-    """A sensor far off does not colour the others."""
-    values = np.array([14.0, 14.05, 13.95, 2.0])
-    assert differ_from_others(values, np.full(4, 0.1)).tolist() == [False, False, False, True]
-    assert differ_from_others(np.array([14.0, 12.0]), np.full(2, 0.1)).all()
-    assert not differ_from_others(np.array([14.0, np.nan]), np.full(2, 0.1)).any()
 
 
 @pytest.mark.parametrize("pitch", [0.5, 4.0, 40.0])
@@ -120,62 +102,6 @@ def test_charges_sign_coloured_0_grey() -> None:
     assert (drawn_in.cmin, drawn_in.cmax) == (-5.0, 0.0)
 
 
-def test_uncertainty_coloured_0_unknown_value() -> None:
-    """An uncertainty is coloured from 0 and an unknown value is white."""
-    values = np.full(64, 0.2)
-    values[5] = np.nan
-    figure = drawn(values, quantity=Quantity("uncertainty of d33", "pC/N", "nothing"))
-    (known,) = [trace for trace in figure.data if trace.name == "uncertainty of d33"]
-    assert (known.marker.cmin, known.marker.cmax) == (0.0, 0.2)
-    assert fills(figure)[5] == "#ffffff"
-
-
-def test_chosen_sensor_ring_ground_touches() -> None:
-    """The chosen sensor has a ring on the ground that touches no other."""
-    values = np.full(64, 13.1)
-    figure = array_map(SENSORS, X, Y, values, 0.01 * values, [""] * 64, chosen="s09")
-    *discs, ring = figure.layout.shapes
-    assert len(discs) == 64
-    own, beside = discs[9], discs[10]
-    assert ring.fillcolor is None
-    assert (ring.x0 + ring.x1, ring.y0 + ring.y1) == pytest.approx((own.x0 + own.x1, own.y0 + own.y1))
-    assert own.x1 < ring.x1 < beside.x0
-
-
-def test_discs_sensors_size_seen() -> None:
-    """Discs have the sensors size where it can be seen."""
-
-    def widths(radius: float | None, pitch: float) -> set[float]:
-        x, y = (pitch / 4.0 * part for part in (X, Y))
-        figure = array_map(SENSORS, x, y, np.full(64, 13.0), np.full(64, 0.1), [""] * 64, sensor_radius_mm=radius)
-        return {round(shape.x1 - shape.x0, 6) for shape in figure.layout.shapes}
-
-    assert widths(1.5, 8.0) == {3.0}
-    assert disc_size(X * 2, Y * 2, 1.5) == "Discs have the sensors' size."
-    assert widths(0.1, 40.0) == {33.6}  # too small to be seen
-    assert disc_size(X * 10, Y * 10, 0.1) == "Discs are 168 times as wide as the sensors."
-    assert widths(3.0, 4.0) == {4.0}  # they would overlap
-    assert widths(None, 4.0) == {3.36}
-    assert "not declared" in disc_size(X, Y, None)
-
-
-def test_ids_stand_below_discs_no_room() -> None:
-    """Ids stand below discs that have no room for them."""
-    figure = array_map(SENSORS, 2 * X, 2 * Y, np.full(64, 13.0), np.full(64, 0.1), [""] * 64, sensor_radius_mm=1.5)
-    (ids,) = [trace for trace in figure.data if trace.hoverinfo == "skip"]
-    assert list(ids.text) == SENSORS
-    assert list(ids.y) == pytest.approx((2 * Y - 1.5).tolist())
-    assert not figure.layout.showlegend
-
-
-def test_a_map_holds_all_loads() -> None:
-    loads = [(10.0, 8.0), (14.0, 66.0), (-30.0, 2.0)]
-    figure = loaded_array(SENSORS, X, Y, np.linspace(-1, 1, 64), np.full(64, 0.01), loads, 1.0)
-    assert figure.layout.xaxis.range[0] < -30.0
-    assert figure.layout.yaxis.range[1] > 66.0
-    assert figure.layout.xaxis.range[1] > X.max()
-
-
 def test_sensor_not_measured_hollow_compared() -> None:
     """A sensor that was not measured with the others is hollow and compared with none."""
     values = np.array([14.0, 14.05, 13.95, 2.0])
@@ -187,11 +113,3 @@ def test_sensor_not_measured_hollow_compared() -> None:
     (hover,) = [text for one in sensors for name, text in zip(one.ids, one.customdata, strict=True) if name == "s03"]
     assert hover.startswith("s03: last measured on 03 May 2026<br>d33 2 pC/N<br>95 %: 1.804 to 2.196")
     assert "not in this campaign" in {trace.name for trace in figure.data if trace.showlegend is not False}
-
-
-def test_id_below_disc_below_ring_around() -> None:
-    """An id below a disc is below the ring around it."""
-    figure = array_map(SENSORS[:4], 8 * X[:4], Y[:4], [14.0] * 4, [0.1] * 4, [""] * 4, D33, "s01", 1.5)
-    (ids,) = [trace for trace in figure.data if trace.hoverinfo == "skip"]
-    *discs, ring = figure.layout.shapes
-    assert list(ids.y) == pytest.approx([discs[0].y0, ring.y0, discs[2].y0, discs[3].y0])

@@ -1,18 +1,17 @@
 """Figures: every sensor and recording is in them, in lab units, told apart by more than colour."""
 
 import numpy as np
-import plotly.graph_objects as go
 import pytest
 
 from underskin.diagnosis.reporting.page_styles import PAPER
 from underskin.errors import InvalidInput
 from underskin.figures.array import frf_versus_preload, response_per_sensor
 from underskin.figures.curves import ForceCurve, force_curves
-from underskin.figures.frf import frf_overview, frf_recordings
+from underskin.figures.frf import frf_recordings
 from underskin.figures.history import SensorPoints, d33_history
 from underskin.figures.traces import raw_traces
 from underskin.recordings.channels import Channel
-from underskin.recordings.frf.thinned_lines import FrfLines, FrfSpread
+from underskin.recordings.frf.thinned_lines import FrfLines
 
 SDS_OF_95 = 1.959963984540054  # half the width of a 95 % interval of a normal distribution
 
@@ -73,64 +72,6 @@ def test_raw_trace_many_samples_keeps_extremes() -> None:
     assert " V<extra>" in long.hovertemplate
 
 
-def test_a_unit_that_a_name_has_stands_once() -> None:
-    figure = raw_traces([Channel(name, "s", np.arange(5.0)) for name in ("Time [s]", "Time", "[s]", "t (s)")], None)
-    titles = [figure.layout[f"yaxis{number}"].title.text for number in ("", 2, 3, 4)]
-    assert titles == ["Time<br>[s]", "Time<br>[s]", "[s]<br>[s]", "t<br>[s]"]
-
-
-def test_ticks_no_prefixes_small_force_unit() -> None:
-    """Ticks have no prefixes and a small force its own unit."""
-    figure = force_curves([ForceCurve("c", np.array([0.0, 2e-3]), np.array([0.0, 3e-5]))])
-    assert figure.layout.yaxis.title.text == "force [µN]"
-    assert figure.layout.xaxis.title.text == "displacement [µm]"
-    assert figure.data[0].y.tolist() == pytest.approx([0, 30])
-    assert figure.layout.template.layout.yaxis.exponentformat == "none"
-
-
-def test_history_date_days_under_axis() -> None:
-    """A history of one date has days under its axis."""
-    points = SensorPoints("s", ["2026-11-27T09:00:00+00:00"], [14.0], [0.1], "no trend")
-    axis = d33_history([points]).layout.xaxis
-    assert (axis.dtick, axis.tickformat) == (86_400_000, "%d %b %Y")
-
-
-def test_value_under_pointer_unit() -> None:
-    """The value under the pointer has its unit."""
-    frequency = np.array([1.0, 10.0])
-    entry = FrfLines("a", frequency, np.array([7.0, 7.1]), np.array([0.0, -1.0]), np.array([1.0, 0.99]))
-    magnitude, phase, coherence = (trace.hovertemplate for trace in frf_recordings([entry], None).data)
-    assert " pC/N<extra>" in magnitude
-    assert "°<extra>" in phase
-    assert "}<extra>" in coherence
-
-
-def test_axis_single_campaign_spans_days() -> None:
-    """The axis of a single campaign spans days."""
-
-    def history(*times: str) -> go.Figure:
-        return d33_history([SensorPoints("s01", times, [14.0] * len(times), [0.1] * len(times), "")])
-
-    low, high = history("2026-05-03T09:00:00.000000Z").layout.xaxis.range
-    assert (high - low).days == 2
-    assert history("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z").layout.xaxis.range is None
-    assert history().layout.xaxis.range is None
-
-
-def test_intervals_long_history_faint_keep() -> None:
-    """Intervals of a long history are faint and keep their length."""
-
-    def line(days: int) -> go.Scatter:
-        times = [f"2026-{1 + day // 28:02d}-{1 + day % 28:02d}T09:00:00Z" for day in range(days)]
-        (trace,) = d33_history([SensorPoints("s01", times, [14.0] * days, [0.1] * days, "")]).data
-        np.testing.assert_allclose(trace.error_y.array, 0.1 * SDS_OF_95)
-        return trace
-
-    few, many = line(60), line(61)
-    assert (few.error_y.color, few.error_y.width, few.marker.size) == (None, 3, 8)
-    assert (many.error_y.color, many.error_y.width, many.marker.size) == ("rgba(0,114,178,0.25)", 0, 4)
-
-
 def test_many_sensors_over_time_median_spread() -> None:
     """Many sensors over time are their median their spread and those that stand apart."""
     random, times = np.random.default_rng(3), ("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z")
@@ -175,63 +116,3 @@ def test_measured_lines_solid_differ_however() -> None:
         drawn = [trace for trace in figure.data if trace.showlegend is not False]
         assert {trace.line.dash for trace in drawn} <= {None, "solid"}
         assert len({(trace.line.color, trace.mode, trace.marker.symbol) for trace in drawn}) == count
-
-
-def test_lines_recordings_look_condition() -> None:
-    """Lines of recordings look as those of their condition do.
-
-    Colour by preload, marks by sphere, whether they are shown alone or as the median of many.
-    """
-    conditions, lines = [(4.0, 0.5), (4.0, 3.0), (10.0, 0.5), (10.0, 3.0)], np.array([1.0, 10.0])
-    alone = frf_recordings([FrfLines("r", lines, lines, 0 * lines, lines)] * 4, None, conditions)
-    three = (lines, lines, lines)
-    together = frf_overview([FrfSpread(*one, 5, lines, three, three, three) for one in conditions], None)
-
-    def looks(figure: go.Figure) -> list[tuple[str, str]]:
-        shown = [trace for trace in figure.data if trace.showlegend]
-        return [(trace.line.color, trace.mode) for trace in shown]
-
-    assert looks(alone) == looks(together)
-    (small, small_mode), (large, _), (also_small, marked_mode), (also_large, _) = looks(alone)
-    assert (small, large) == (also_small, also_large)
-    assert small != large
-    assert (small_mode, marked_mode) == ("lines", "lines+markers")
-
-
-def test_frfs_of_many_recordings_have_no_legend() -> None:
-    one, frequency = np.ones(2), np.array([1.0, 10.0])
-    entries = [FrfLines(f"r{number}", frequency, 7 * one, 0 * one, one) for number in range(40)]
-    assert frf_recordings(entries, None).layout.showlegend is False
-    assert frf_recordings(entries[:5], None).layout.showlegend is True
-
-
-@pytest.mark.parametrize(("coherence", "lowest"), [(0.99, "xaxis3"), (np.nan, "xaxis2")])
-def test_lowest_panel_drawn_frequency(coherence: float, lowest: str) -> None:
-    """The lowest panel that is drawn has the frequency."""
-    entry = FrfLines("a", np.array([1.0, 10.0]), np.array([7.0, 7.1]), np.array([0.0, -1.0]), np.full(2, coherence))
-    layout = frf_recordings([entry], None).layout
-    assert layout[lowest].title.text == "frequency [Hz]"
-    assert layout[lowest].showticklabels
-
-
-def test_ten_sensors_history_colours_differ() -> None:
-    """Ten sensors of a history have colours that differ."""
-    sensors = [SensorPoints(f"s{n}", ["2024-05-01T09:00:00Z"], [14.0], [0.1], "") for n in range(10)]
-    colours = [trace.line.color for trace in d33_history(sensors).data]
-    channels = np.array([[int(one[at : at + 2], 16) for at in (1, 3, 5)] for one in colours])
-    apart = np.abs(channels[:, None] - channels).sum(axis=2)
-    assert apart[~np.eye(10, dtype=bool)].min() > 60
-
-
-@pytest.mark.parametrize(
-    ("peak", "expected"), [(50.0, (None, None)), (90.0, ("log", "D2")), (5000.0, ("log", 1)), (7e11, ("log", 2))]
-)
-def test_logarithmic_axis_labelled_full_spans(peak: float, expected: tuple[str | None, object]) -> None:
-    """A logarithmic axis is labelled in full and spans a decade."""
-    frequency = np.geomspace(5, 800, 30)
-    magnitude = np.where(frequency > 200, peak, 7.0)
-    line = FrfLines("r1", frequency, magnitude, np.zeros(30), np.full(30, np.nan))
-    layout = frf_recordings([line], None).layout
-    assert (layout.yaxis.type, layout.yaxis.dtick) == expected
-    assert layout.yaxis.tickformat == (None if peak == 50 else "~g")
-    assert (layout.xaxis.dtick, layout.xaxis.tickformat) == ("D2", "~g")

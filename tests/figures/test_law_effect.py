@@ -88,16 +88,6 @@ def test_scatter_deviation_drawn() -> None:
     assert change[np.abs(pickup.x - 30).argmin()] == pytest.approx(0, abs=1e-6)
 
 
-def test_change_words_curve() -> None:
-    """The change in words is that of the curve."""
-    ageing = effect("ageing")
-    for words, curve in zip(ageing.changes, ageing.panels[0].curves, strict=True):
-        percent = 100 * (curve[0] / ageing.panels[0].base[0] - 1)
-        assert float(words.split(" %")[0].replace("−", "-")) == pytest.approx(percent, rel=0.06)
-        assert words.endswith("0° at 30 Hz")
-    assert effect("timing_delay").changes[0].startswith("0 %, −")
-
-
 @cache
 def twins() -> dict[str, dict[str, Twin]]:
     return {name: {twin.name: twin for twin in rivals} for name, rivals in law_twins(table()).items()}
@@ -119,8 +109,3 @@ def test_laws_axes_no_twins_alike_ways() -> None:
         for other, twin in rivals.items():
             assert 0 <= twin.alike <= 1 + 1e-9
             assert twins()[other][name].alike == pytest.approx(twin.alike)
-
-
-def test_laws_act_scatter_curves_alone_no_twins() -> None:
-    """Laws that act on the scatter or on curves alone have no twins."""
-    assert not {"sensor_spread", "mains_pickup", "platen_friction", "instrument_compliance"} & set(twins())

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.inversion.inverted_campaigns import covered, moved, scaled
+from tests.support.cases import first
 from tests.support.shaken_series import D33, shaken
 from tests.support.simulated_campaign import Rig, simulate
 from underskin.diagnosis.slips.inspection import inspect
@@ -102,7 +103,7 @@ def test_slip_whole_array_shows_finding(table: SigmaTable, factor: float, asks: 
     assert f"{14 * factor:.2g}"[:3] in finding.statement
 
 
-@pytest.mark.parametrize("x_mm", [19.0, 250.0, 1e9, 1e308])
+@pytest.mark.parametrize("x_mm", [19.0, 1e308])
 def test_recording_far_off_sensor_costs_itself(table: SigmaTable, x_mm: float) -> None:
     """A recording far off its sensor costs only itself."""
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(11))
@@ -115,9 +116,8 @@ def test_recording_far_off_sensor_costs_itself(table: SigmaTable, x_mm: float) -
     assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
 
 
-@pytest.mark.parametrize("factor", [1000.0, 10.0, -1.0, 1e-3])
-@pytest.mark.parametrize("sensors", [1, 5])
-def test_recording_grossly_off_set_aside_named(table: SigmaTable, factor: float, sensors: int) -> None:
+@pytest.mark.parametrize(("sensors", "factor"), [(1, 10.0), (5, 1000.0), (1, -1.0), (5, 1e-3)])
+def test_recording_grossly_off_set_aside_named(table: SigmaTable, sensors: int, factor: float) -> None:
     """A recording grossly off is set aside and named."""
     rig = Rig(d33=np.full(sensors, 14.0), preloads_n=(0.5, 2.0))
     campaign = simulate(table, rig, np.random.default_rng(13))
@@ -127,13 +127,6 @@ def test_recording_grossly_off_set_aside_named(table: SigmaTable, factor: float,
     assert covered(found.sensors, rig.d33).all()
     assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
     assert found.flags == ()
-
-
-def test_sensor_few_recordings_flagged_whole(table: SigmaTable) -> None:
-    """A sensor of few recordings is flagged as a whole."""
-    rig = Rig(d33=np.array([14.0] * 8 + [3.0, 60.0]), preloads_n=(1.0,))
-    found = invert(simulate(table, rig, np.random.default_rng(15)), table)
-    assert codes(found) == {"s8": ["weak"], "s9": ["strong"]}
 
 
 @pytest.mark.parametrize(("percent", "scatter", "marked"), [(-15, 0.02, True), (-3, 0.002, False), (-15, 0.3, False)])
@@ -239,8 +232,9 @@ def test_gel_under_light_spheres_is_no_slip(table: SigmaTable) -> None:
         invert(softer, table)
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("pC/gf", 9.80665e-3), ("pC/kgf", 9.80665), ("nC/N", 1e-3)])
-@pytest.mark.parametrize("d33", [12.0, 33.0])
+@pytest.mark.parametrize(
+    ("unit", "factor", "d33"), [("pC/gf", 9.80665e-3, 12.0), ("pC/kgf", 9.80665, 33.0), ("nC/N", 1e-3, 33.0)]
+)
 def test_response_in_another_unit_is_named(table: SigmaTable, unit: str, factor: float, d33: float) -> None:
     """Where no PVDF has the array's d33, the unit that explains it is named and d33 is not to be quoted, until the
     units are checked."""
@@ -256,7 +250,7 @@ def test_response_in_another_unit_is_named(table: SigmaTable, unit: str, factor:
         assert FindingCode.IMPLAUSIBLE_D33 not in {one.code for one in checked}
 
 
-@pytest.mark.parametrize("lowest_hz", [0.005, 0.02, 0.1])
+@pytest.mark.parametrize("lowest_hz", [0.005, 0.1])
 def test_frequencies_in_khz_are_named(table: SigmaTable, lowest_hz: float) -> None:
     """Several lines below what a shaker drives look like kHz; a single slow tone is no slip."""
     for lines, is_said in ((np.geomspace(lowest_hz, 1.0, 30), True), (np.array([1.0]), False)):
@@ -404,7 +398,7 @@ def turned(campaign: Campaign, factor: Callable[[Floats], Complexes]) -> Campaig
     return replace(campaign, recordings=tuple(recordings))
 
 
-@pytest.mark.parametrize("degrees", [20.0, -60.0, 85.0])
+@pytest.mark.parametrize("degrees", first(2, [20.0, -60.0, 85.0]))
 def test_constant_phase_leaves_d33(table: SigmaTable, degrees: float) -> None:
     """A phase that is the same over frequency is stated, and d33 is that of the magnitude; a delay, a pole and a small
     phase are none."""
@@ -470,7 +464,7 @@ def test_gain_changes_within_series(table: SigmaTable, factor: float) -> None:
         assert FindingCode.GAIN_STEPS not in [finding.code for finding in steady.findings]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.003, 0.03, 0.1])
+@pytest.mark.parametrize("share", first(2, [0.0, 0.03, 0.003, 0.1]))
 def test_an_array_read_whole_under_each_contact(share: float, table: SigmaTable) -> None:
     """Sensors that feel next to nothing of a contact read cross-talk, which is no d33: they are not used."""
     rig = Rig(d33=20 * np.array([0.98, 1.0, 1.0, 1.02]), gain=0.01, indenters_mm=(4.0,), preloads_n=(0.5, 1.0, 1.5))
@@ -497,7 +491,7 @@ def test_an_array_read_whole_under_each_contact(share: float, table: SigmaTable)
     assert FindingCode.FAR_CONTACTS in {finding.code for finding in inspected.findings}
 
 
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.03])
+@pytest.mark.parametrize("share", first(1, [0.03, 0.01, 0.0]))
 def test_near_a_sensor_cross_talk_counts_for_less(share: float, table: SigmaTable) -> None:
     """A sensor that feels some percent of a contact is less sure by usual cross-talk, and keeps d33 where it is."""
     rig = Rig(d33=np.full(4, 20.0), gain=0.01, indenters_mm=(4.0,), preloads_n=(0.5, 1.0, 1.5))
@@ -561,13 +555,3 @@ def test_a_label_of_the_sensors_leaves_them_as_certain(table: SigmaTable) -> Non
         np.testing.assert_allclose(found.sensors.uncertainty, plain.sensors.uncertainty)
         assert len(found.findings) == said
         assert all("20 to 23, and hardly within them" in finding.statement for finding in found.findings)
-
-
-def test_a_condition_is_stated_in_digits_that_differ(table: SigmaTable) -> None:
-    """The range of a large number that varies little over the sensors is no single number."""
-    random = np.random.default_rng(7)
-    campaign = simulate(table, Rig(d33=np.full(4, 14.0), gain=0.005), random)
-    count = len(campaign.recordings)
-    pressure = 1.7e6 + 7 * np.arange(count) / count + 0.3 * random.standard_normal(count)
-    (finding,) = invert(at_temperatures(campaign, pressure, 0.008), table).findings
-    assert "1700000.85 to 1700005.97" in finding.statement

@@ -70,13 +70,6 @@ def test_factors_act_force_additions_add(campaign: Campaign) -> None:
     assert drift == pytest.approx(plain + BEND * np.sqrt(time), rel=1e-9)
 
 
-def test_a_law_of_place_moves_the_travel(campaign: Campaign) -> None:
-    """By the same amount everywhere it is another contact point."""
-    moved = forces(campaign, mechanism("position", "displacement_mm", "bend + 0 * displacement_mm"))
-    assert moved == pytest.approx(forces(campaign, nearer_mm=BEND), rel=1e-9)
-    assert not np.allclose(moved, forces(campaign))
-
-
 def test_times_needed_law_reads(campaign: Campaign) -> None:
     """Times are needed where the law reads them."""
     own = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
@@ -84,12 +77,6 @@ def test_times_needed_law_reads(campaign: Campaign) -> None:
     creeping = mechanism("modulus", "time_s", "1 - bend * time_s")
     assert creeping.unsupported(untimed, "indentation") == "not every recording has time_s"
     assert creeping.kinds == ("indentation",)
-
-
-def test_law_far_usual_parameters_gives_force(campaign: Campaign) -> None:
-    """A law far from its usual parameters gives a force all the same."""
-    steep = mechanism("gain", "force_n", "1 + bend * (exp(500 * force_n) - 1)")
-    assert np.isfinite(forces(campaign, steep)).all()
 
 
 def test_bound_law_counts_time_recording_began(campaign: Campaign) -> None:

@@ -33,6 +33,7 @@ def solved_force(material: Material, radius: float, depths: Floats) -> Floats:
     return np.array([pressed.press(depth) for depth in depths]) * E_MPA * H_MM**2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("radius", "depths"), [(1.5, [0.03, 0.08, 0.15]), (4.0, [0.04, 0.15, 0.25])], ids=["deep", "wide"]
 )

@@ -13,8 +13,8 @@ from underskin.mechanisms.declared.mechanism import value_of
 from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
-from underskin.mechanisms.unlisted.expressions import change_along, expression
-from underskin.mechanisms.unlisted.forms import Axis, axes_of, recording_order, shapes
+from underskin.mechanisms.unlisted.expressions import change_along
+from underskin.mechanisms.unlisted.forms import Axis, axes_of, shapes
 from underskin.mechanisms.unlisted.grammar import Grammar, combination
 from underskin.mechanisms.unlisted.laws import LevelTables, RecordingLaw, UnlistedLaw
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, frf_of
@@ -165,15 +165,6 @@ def test_place_wanders_press_elsewhere(campaign: Campaign, table: SigmaTable) ->
         assert found[model.recording == number] == pytest.approx(expected, rel=3e-3), number
 
 
-def test_part_campaign_order_range_whole(campaign: Campaign, table: SigmaTable) -> None:
-    """A part of a campaign has the order and the range of the whole."""
-    law, model = one_law("gain", along(campaign, "previous_preload_n"), campaign, table)
-    part = replace(campaign, recordings=campaign.recordings[3:9])
-    of_part = FrfModel([law], part, table)
-    kept = (model.recording >= 3) & (model.recording < 9)
-    assert predicted(of_part, [0.3]) == pytest.approx(predicted(model, [0.3])[kept])
-
-
 @pytest.mark.slow
 def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
     """What is kept of a law over recordings is that law."""
@@ -194,57 +185,3 @@ def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
             told = np.broadcast_to(np.asarray(value_of(place, {**short, **axes})), x.shape)
             change = told if law.description.acts_on in ("force", "position") else told - 1
             assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
-
-
-def test_order_times_cycles_list(campaign: Campaign) -> None:
-    """The order is that of times of cycles or of the list."""
-    entries = frf_of(campaign)
-    turned = [replace(entry, load_cycles=7) for entry in entries[::-1]]
-    assert recording_order(turned).tolist() == list(range(len(turned)))[::-1]
-    untimed = [replace(entry, recorded_at=None, load_cycles=100 - number) for number, entry in enumerate(entries)]
-    assert recording_order(untimed).tolist() == list(range(len(untimed)))[::-1]
-    listed = [replace(entry, recorded_at=None, load_cycles=None) for entry in entries]
-    assert recording_order(listed).tolist() == list(range(len(listed)))
-
-
-def test_the_time_of_day_is_local(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = frf_of(campaign)[0].id
-    assert along(campaign, "time_of_day").values[first] == 9.0
-    monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Asia/Tokyo")
-    assert along(campaign, "time_of_day").values[first] == 18.0
-
-
-def test_columns_lab_adds_axes_recordings(campaign: Campaign) -> None:
-    """Columns that a lab adds are axes where most recordings have them."""
-    temperature = along(campaign, "temperature_c")
-    assert temperature.high - temperature.low == pytest.approx(0.7 * (len(campaign.recordings) - 1))
-    assert along(campaign, "operator").words == ("a", "b")
-    few = tuple(
-        replace(entry, conditions={"seldom": 1.0 * number} if number < 4 else None)
-        for number, entry in enumerate(frf_of(campaign))
-    )
-    assert "seldom" not in [axis.name for axis in axes_of(Conditions("few", campaign.skin, few))]
-
-
-def test_many_columns_share_half_axes(campaign: Campaign, table: SigmaTable) -> None:
-    """Many columns share what one and a half axes have."""
-    random = np.random.default_rng(3)
-    entries = tuple(
-        replace(entry, conditions={f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
-        for entry in frf_of(campaign)
-    )
-    many = Grammar.of(Conditions("many", campaign.skin, entries), lines_of(campaign), table, CATALOGUE)
-    shares = np.exp(many.log_shares)
-    added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.description.axis)
-    one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.description.axis == "order")
-    assert added < 2 * one
-
-
-def test_every_law_expression_without_powers_ten(grammar: Grammar) -> None:
-    """Every law has an expression without powers of ten."""
-    for law in grammar.laws:
-        own = zip(law.parameters_stated, coordinates(law, 0.3), strict=True)
-        text = expression(law, {entry.name: entry.from_fit(at) for entry, at in own})
-        assert "=" in text
-        assert "e-" not in text
-        assert "nan" not in text

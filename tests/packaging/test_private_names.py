@@ -42,24 +42,3 @@ def test_no_private_name_is_used(folder: str) -> None:
         for source in (ROOT / folder).rglob("*.py")
     }
     assert {source: names for source, names in uses.items() if names} == {}
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "from underskin.units import _FACTORS",
-        "import underskin._units",
-        "table._errors",
-        "table.reader()._errors",
-        "getattr(table, '_errors')",
-        "monkeypatch.setattr(newton, '_AUGMENTATION', 1)",
-        "monkeypatch.setattr('tablegen.newton._AUGMENTATION', 1)",
-    ],
-)
-def test_each_way_to_a_private_name_is_seen(text: str) -> None:
-    assert len(list(private_names(ast.parse(text)))) == 1
-
-
-def test_own_names_are_free() -> None:
-    text = "from __future__ import annotations\n_OWN = 1\nclass A:\n    def b(self):\n        return self._c + _OWN\n"
-    assert list(private_names(ast.parse(text))) == []

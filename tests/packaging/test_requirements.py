@@ -4,6 +4,8 @@ import ast
 import re
 import sys
 import tomllib
+from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import packages_distributions
 from typing import Any
 
@@ -18,7 +20,13 @@ DOCUMENT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(enc
 PROJECT: dict[str, Any] = DOCUMENT["project"]
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
 OURS = {"underskin", "service", "tablegen", "rig", "proof"}
-DISTRIBUTIONS = packages_distributions()
+
+
+@cache
+def distributions() -> Mapping[str, list[str]]:
+    """By the modules that they hold."""
+    return packages_distributions()
+
 
 # Drivers that SQLAlchemy and Uvicorn load by name.
 BY_NAME = {"psycopg", "uvloop", "httptools"}
@@ -34,7 +42,7 @@ def imported(package: str) -> set[str]:
             elif isinstance(node, ast.ImportFrom) and node.module:
                 modules.add(node.module.partition(".")[0])
     others = modules - OURS - sys.stdlib_module_names
-    return {canonicalize_name(name) for module in others for name in DISTRIBUTIONS[module]}
+    return {canonicalize_name(name) for module in others for name in distributions()[module]}
 
 
 def named(requirements: list[str]) -> set[str]:

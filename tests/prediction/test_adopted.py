@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.support.mechanism_campaigns import SKIN, frf_campaign, indentation_campaign, table
+from tests.support.mechanism_campaigns import SKIN, frf_campaign, table
 from underskin import InvalidInput
 from underskin.mechanisms import CATALOGUE, compose
-from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.prediction.adopted_model import AdoptedModel, adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 
@@ -166,32 +165,6 @@ def test_skin_declared_otherwise_not_translated() -> None:
 def test_what_cannot_serve_is_refused(changes: dict[str, Any]) -> None:
     with pytest.raises(InvalidInput, match="diagnosis_id"):
         adopted(report({}, **changes), frf_campaign())
-
-
-def test_pick_up_parameters_older_report_serves() -> None:
-    """A pick up with the parameters of an older report serves.
-
-    None of them moves a prediction.
-    """
-    older = {"name": "mains_pickup", "parameters": [{"name": "pickup_charge", "value": 0.05}]}
-    delay = {"name": "timing_delay", "parameters": [{"name": "delay", "value": 200.0}]}
-    model = adopted(report({}, mechanisms=[older, delay]), frf_campaign())
-    assert model.of_lines == [mechanism.name for mechanism in model.mechanisms] == ["timing_delay"]
-
-
-def test_the_edge_under_its_older_name_serves() -> None:
-    """A finite amplitude was a mechanism of its own: the same law, with the mobile fraction as `edge_mobility`."""
-    campaign = recorded({"moving_contact_edge": (0.6,)})
-    older = report({"moving_contact_edge": (0.6,)})
-    older["mechanisms"] = [{"name": "amplitude_nonlinearity", "parameters": [{"name": "edge_mobility", "value": 0.6}]}]
-    found = adopted(older, campaign).response(campaign, table())
-    np.testing.assert_allclose(D33 * found.value, lines(campaign), rtol=1e-12)
-    assert ActiveCatalogue(["amplitude_nonlinearity"]).without == ("moving_contact_edge",)
-
-
-def test_curves_make_no_model_of_charge() -> None:
-    with pytest.raises(InvalidInput, match="kind frf"):
-        adopted(report({}), indentation_campaign())
 
 
 def test_uncertainty_diagnosed_d33() -> None:

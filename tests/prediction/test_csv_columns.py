@@ -1,13 +1,9 @@
 """Decimal marks of columns: one for all numbers, and no number a thousand times too small."""
 
-import io
-
-import openpyxl
 import pytest
 
 from underskin.errors import InvalidInput
 from underskin.prediction.columns import CsvError, from_csv
-from underskin.recordings.reading import sheet_text
 
 FIELDS = ("preload_n", "frf_pc_per_n")
 
@@ -53,17 +49,6 @@ def test_number_thousands_apart_refused(text: str, says: str) -> None:
         numbers(text)
 
 
-def test_text_workbook_thousands_apart_refused() -> None:
-    """A text in a workbook that may have its thousands apart is refused."""
-    book, content = openpyxl.Workbook(), io.BytesIO()
-    assert book.active is not None
-    for row in (FIELDS, (0.5, "7,5"), (1, "1,000")):
-        book.active.append(row)
-    book.save(content)
-    with pytest.raises(InvalidInput, match=r"frf_pc_per_n\[1\] = '1,000': .*1,000 can be 1000 or 1.000"):
-        numbers(sheet_text(content.getvalue(), "measured.xlsx"))
-
-
 @pytest.mark.parametrize(
     ("headings", "phase"),
     [
@@ -101,31 +86,6 @@ def test_magnitude_phase_not_clear_refused(text: str, says: str) -> None:
     """Magnitude and phase that are not clear are refused."""
     with pytest.raises(CsvError, match=says):
         from_csv(text.encode(), FIELDS)
-
-
-def test_cell_phase_no_number_told_heading() -> None:
-    """A cell of a phase that is no number is told by its heading."""
-    text = b"preload_n,frf_magnitude_pc_per_n,frf_phase_deg\n1,7,x\n"
-    with pytest.raises(InvalidInput, match=r"frf_phase_deg\[0\] = 'x': must be a number \(line 2\)"):
-        from_csv(text, FIELDS).fields["frf_pc_per_n"].numbers("frf_pc_per_n")
-
-
-@pytest.mark.parametrize("note", ["measured by mb", "in the cold room, air conditioning off", "a,b,c,d", "mb,,"])
-def test_words_below_blank_line_under_table_note(note: str) -> None:
-    """Words below a blank line under the table are a note."""
-    text = "preload_n,frf_pc_per_n\n0.5,1200\n1,7.5\n"
-    assert numbers(f"{text}\n{note}\n") == [[0.5, 1.0], [1200.0, 7.5]]
-    (told,) = from_csv(f"{text}\n{note}\n".encode(), FIELDS).notes
-    assert told.startswith("line 5 under the table, ")
-    for other in (f"{text}{note}\n", f"{text}\n{note}\n2,7\n", f"{text}\n3\n"):
-        with pytest.raises((CsvError, InvalidInput)):
-            numbers(other)
-
-
-def test_a_diameter_is_halved_and_that_is_told() -> None:
-    found = from_csv(b"Indenter diameter [mm]\n8\n", ("indenter_radius_mm",))
-    assert found.fields["indenter_radius_mm"].numbers("indenter_radius_mm") == [4.0]
-    assert found.notes == ["'Indenter diameter [mm]' is halved"]
 
 
 @pytest.mark.parametrize("row", ['"0,5"', '"a,b"'])

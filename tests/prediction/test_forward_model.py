@@ -172,36 +172,6 @@ def test_what_cannot_be_predicted_is_refused(
     assert refused.value.field == field
 
 
-def test_a_curve_needs_a_declared_modulus() -> None:
-    undeclared = replace(SKIN, youngs_modulus_mpa=None)
-    for conditions in (
-        curve(undeclared),
-        Conditions("block", undeclared, (CompressionConditions("c", 10.0, 20.0, DEPTH_MM),)),
-    ):
-        with pytest.raises(InvalidInput, match="youngs_modulus_mpa"):
-            predict(conditions, table())
-
-
-def test_lines_time_series_estimated() -> None:
-    """Lines of a time series must be estimated before they are predicted."""
-    entry = FrfConditions("r", "s1", 4.0, 1.0, 0.1)
-    with pytest.raises(InvalidInput, match=r"recordings\[r\].frequency_hz"):
-        predict(Conditions("series", SKIN, (entry,)), table(), {"d33": 14.0})
-
-
-def test_columns_that_make_no_rows_are_refused() -> None:
-    with pytest.raises(InvalidInput, match="colour"):
-        rows(colour=1.0)
-    with pytest.raises(InvalidInput, match="must have one length"):
-        rows(dwell_s=[1.0, 2.0])
-
-
-def test_sensor_skin_not_refused() -> None:
-    """A sensor that the skin does not have is refused."""
-    with pytest.raises(InvalidInput, match="sensor"):
-        rows(sensor="s9")
-
-
 @pytest.mark.parametrize(
     ("column", "values"),
     [
@@ -243,8 +213,3 @@ def test_skin_cannot_refused_field(field: str, value: float) -> None:
     with pytest.raises(InvalidInput) as refused:
         frf_conditions(skin, indenter_radius_mm=4.0, preload_n=1.0, frequency_hz=30.0)
     assert refused.value.field == field
-
-
-def test_mechanisms_are_named_in_a_list() -> None:
-    with pytest.raises(InvalidInput, match="mechanisms = 'ageing': must be a list of names"):
-        predict(rows(), table(), {"d33": 14.0}, mechanisms="ageing")

@@ -1,8 +1,6 @@
 """The proof's own tools: judging, statistics, stored results, the ideal diagnoser, and the page from a small run."""
 
-import json
 import os
-from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,25 +10,22 @@ import typer
 from typer.testing import CliRunner
 
 from bench.soak import SOAK
-from proof import figures, own_rig, paper_array
-from proof.cases import DrawnCase, FileCase, MadeCase
+from proof import own_rig, paper_array
+from proof.cases import DrawnCase, MadeCase
 from proof.commands import prove
 from proof.ideal import diagnosed
 from proof.ideal_laws import suppositions
-from proof.judge import QUIET, Judged, judge
+from proof.judge import QUIET, judge
 from proof.real import recorded
-from proof.results import PARTS
-from proof.stored import Work, of_each, reports, sources, stored
-from proof.text import document
+from proof.stored import Work, reports
 from rig.description import parse as parse_experiment
 from rig.draw import CATALOGUED, UNKNOWN, drawn
 from rig.strengths import of_frf
 from tests.support.cases import first
 from underskin import diagnose
-from underskin.recordings.campaign import FrfRecording, parse
+from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import load_table
 
-ROOT = Path(__file__).parents[2]
 RECORDINGS = os.environ.get("UNDERSKIN_RECORDINGS")
 
 
@@ -84,34 +79,6 @@ def test_twin_left_open_under_ambiguous() -> None:
         found = judge("c", report(verdict, "a"), truth)
         assert not found.right
         assert found.left_open is (verdict == "ambiguous")
-
-
-def test_tool_always_right_drawn(tmp_path: Path) -> None:
-    """A tool that is always right can be drawn."""
-    alike = Judged("c", ("a",), ("a",), False, "explained", 0.7, True, True, 9.0, None)
-    judged = [replace(alike, probability=0.7 + 0.01 * number) for number in range(30)]
-    assert figures.calibration_and_size(judged, tmp_path / "all.svg").stat().st_size > 1000
-
-
-def test_work_is_kept_and_found_again(tmp_path: Path) -> None:
-    made: list[int] = []
-
-    def make(item: int) -> dict[str, Any]:
-        def count() -> dict[str, Any]:
-            made.append(item)
-            return {"twice": 2 * item}
-
-        return stored(tmp_path, str(item), count)
-
-    for _ in range(2):
-        assert of_each(Work(tmp_path), [1, 2], make, lambda _, __: None) == [{"twice": 2}, {"twice": 4}]
-    assert made == [1, 2]
-    assert not list(tmp_path.glob(".*"))
-
-
-def test_the_digest_follows_the_sources() -> None:
-    assert sources("proof/ideal*.py") == sources("proof/ideal*.py")
-    assert len({sources("proof/ideal*.py"), sources("proof/ideal.py"), sources("rig/joint.py")}) == 3
 
 
 def test_drawn_cases_tell_nothing_of_the_truth() -> None:
@@ -178,24 +145,6 @@ def test_small_run_writes_page_goes_kept(tmp_path: Path, monkeypatch: pytest.Mon
     assert (tmp_path / "docs/proof.md").read_text(encoding="utf-8") == page
 
 
-def test_identifiable_stands_out_every_rival() -> None:
-    """Identifiable is what stands out from every rival.
-
-    Of two that are visible the twin is nobody's to name; what is wrong beside it counts.
-    """
-    plain = Judged("plain", ("a",), ("a",), False, "explained", 0.9, True, True, 9.0, None)
-    judged = [plain, replace(plain, name="twin", answer=("b",)), replace(plain, name="quiet", truth=(), answer=())]
-    gains = {"plain": 31.0, "twin": -0.4, "quiet": None}
-    answers = {name: {"answer": ["a"], "chi2_over_rivals": gain} for name, gain in gains.items()}
-    page = document({
-        "mixture": {"judged": [asdict(entry) for entry in judged], "sources": "x"},
-        "ceiling": {"answers": answers, "sources": "x"},
-    })  # fmt: skip
-    row = next(line for line in page.splitlines() if line.startswith("| single |")).split("|")
-    assert row[3].strip().startswith("1 of 2")
-    assert row[5].strip().startswith("1 of 1")
-
-
 @pytest.mark.soak
 def test_ideal_diagnoser_finds_twin_no_better() -> None:
     """The ideal diagnoser finds a twin no better than the truth."""
@@ -212,44 +161,6 @@ def test_diagnosis_fails_wrong_answer(tmp_path: Path) -> None:
     found = judge("broken", made, {"effects": [], "identifiable": True, "chi2_gain_of_truth": 0.0})
     assert not found.right
     assert found.verdict not in QUIET
-
-
-def test_an_unknown_part_is_named() -> None:
-    command = typer.Typer()
-    command.command()(prove)
-    result = CliRunner().invoke(command, ["sealing"])
-    assert result.exit_code == 2
-    for name in PARTS:
-        assert name in result.output
-
-
-def test_figures_need_named_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the figures need is named where it is not installed."""
-    monkeypatch.setattr("proof.commands.find_spec", lambda _: None)
-    command = typer.Typer()
-    command.command()(prove)
-    result = CliRunner().invoke(command, ["sealed"])
-    assert result.exit_code == 1
-    assert "matplotlib" in result.output
-    assert "make proof" in result.output
-
-
-def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
-    from proof.concealed import judged_of
-
-    entry = Judged("c", ("a",), (), False, "no_mismatch", 0.5, True, True, 3.0, (1.0, 2.0))
-    text = json.dumps({"judged": [asdict(entry)]})
-    assert judged_of(json.loads(text)) == [entry]
-    path = tmp_path / "x.json"
-    path.write_text(text, encoding="utf-8")
-    assert FileCase(path).name == "x"
-
-
-def test_paper_s_campaigns_say_paper_says() -> None:
-    """The paper s campaigns say what the paper says."""
-    array = parse(paper_array.worlds()["array"])
-    preloads = [entry.preload_n for entry in array.recordings if isinstance(entry, FrfRecording)]
-    assert (preloads.count(3.0), preloads.count(1.0)) == (paper_array.AT_HIGHER, paper_array.AT_LOWER)
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ import pytest
 from proof.cases import DrawnCase
 from proof.coverage import held
 from proof.other_priors import Priors, other_priors
-from proof.text_wide import by_priors, by_subset
 from rig import strengths, wide_tails
 from rig.draw import drawn
 from rig.wide_tails import WIDE
@@ -28,13 +27,6 @@ def test_wide_tails_go_beyond_usual_ones_arrays() -> None:
         for parameter, (low, high) in ranges.items():
             lowest, highest = wide_tails.of_frf(usual[0])[name][parameter]
             assert lowest <= low < high <= highest
-
-
-def test_case_wide_tails_name() -> None:
-    """A case of wide tails has a name of its own."""
-    usual, wide = DrawnCase(11, 3, "none"), DrawnCase(11, 3, "none", WIDE)
-    assert usual.name != wide.name
-    assert usual.document() != wide.document()
 
 
 @pytest.mark.parametrize(("low", "high", "expected"), [(9.0, 11.0, True), (10.5, 11.0, False)])
@@ -62,25 +54,3 @@ def test_priors_last_long_context() -> None:
         assert narrow.quantile(0.75) == pytest.approx(before[2][0].quantile(0.75) / 2, rel=0.05)
         raise KeyError
     assert before == (GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters(campaign, "frf"))
-
-
-def test_tables_count_what_they_say() -> None:
-    entry = {"hidden": [], "verdict": "explained", "quotable": True, "sensors": 2, "held": True, "shows": False}
-    unseen = {**entry, "held": False, "hidden": ["rattle"]}
-    shown = by_subset([entry, unseen, {**unseen, "shows": True}, {**entry, "held": None}])
-    assert "| all | 1 of 3" in shown
-    assert "| physics outside the catalogue hidden | 0 of 2" in shown
-    assert "| the same, where it does not | 0 of 1" in shown
-    assert "| all but these | 1 of 2" in shown
-    assert "| two sensors, nothing or effects of the catalogue hidden | 1 of 1" in shown
-    assert "| two sensors, all but what does not show outside the catalogue | 1 of 2" in shown
-    agreeing = [{**entry, "verdict": "no_mismatch", "hidden": hidden} for hidden in ([], ["ageing"], ["rattle"])]
-    shown = by_subset([*agreeing, {**agreeing[1], "held": False}, {**entry, "hidden": ["ageing"]}])
-    assert "| `no_mismatch` | 3 of 4" in shown
-    assert "| `no_mismatch`, nothing hidden | 1 of 1" in shown
-    assert "| `no_mismatch`, effects of the catalogue hidden | 1 of 2" in shown
-    assert "| `no_mismatch`, physics outside the catalogue hidden | 1 of 1" in shown
-    one = {"hidden": ["ageing"], "visible": True, "right": True, "alarm": True, "held": False}
-    quiet = {"hidden": [], "visible": True, "right": False, "alarm": True, "held": True}
-    row = by_priors({"own": [one, quiet]}).splitlines()[2]
-    assert [cell.split(":")[0].strip() for cell in row.split("|")[2:5]] == ["1 of 1", "1 of 1", "1 of 2"]

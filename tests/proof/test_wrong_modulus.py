@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 
-from proof.text_wrong_modulus import wrong_modulus
 from proof.wrong_modulus import compared
 
 TRUTH: dict[str, Any] = {
@@ -53,37 +52,3 @@ def test_cannot_told_apart_counts_grouped_sure() -> None:
     assert not compared(report(None, twins, 0.7), TRUTH)["grouped"]
     assert not compared(report(None, twins[1:]), TRUTH)["grouped"]
     assert not compared(report(None, twins), TRUTH)["named"]
-
-
-def test_contacts_beyond_tables_left_out_counted() -> None:
-    """Contacts beyond the tables and those left out are counted."""
-    none_kept = compared(report(None), TRUTH)
-    assert (none_kept["beyond"], none_kept["left_out"], none_kept["recordings"]) == (2, 2, 3)
-    some = report(None)
-    some["findings"].append({"code": "contacts_kept", "statement": "1 of 3 contacts lie beyond the tables: kept"})
-    assert compared(some, TRUTH)["left_out"] == 1
-
-
-def test_design_determines_modulus_information() -> None:
-    """A design determines the modulus by its information or by curves."""
-    assert not compared(report(None), TRUTH)["determined"]
-    assert compared(report(None), {**TRUTH, "what": "compression"})["determined"]
-    sure = [{**TRUTH["documents"][0], "sd_ln_modulus_frf": 0.04}]
-    assert compared(report(None), {**TRUTH, "documents": sure})["determined"]
-
-
-def test_the_page_counts_the_visible_alone() -> None:
-    unseen = {**TRUTH, "hidden": [{"effect": "modulus_error", "chi2_gain_joint": 3.0}]}
-    judged = [
-        {"name": "named", **compared(report((2.2, 2.4, 2.6)), TRUTH)},
-        {"name": "missed", **compared(report(None), TRUTH)},
-        {"name": "unseen", **compared(report(None), unseen)},
-    ]
-    page = wrong_modulus({"seed": 5, "judged": judged})
-    rows = {line.split("|")[1].strip(): line for line in page.splitlines() if line.startswith("| ")}
-    assert "1 of 2" in rows["FRFs alone"]
-    assert "1 of 1" in rows["all"]
-    assert "none there" in rows["beside a block"]
-    assert "4 contacts of 2 campaigns lie beyond the tables; 0 of them were kept" in page.replace("\n", " ")
-    assert "missed" in rows
-    assert "unseen" not in rows

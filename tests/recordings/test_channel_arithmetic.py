@@ -124,20 +124,6 @@ def test_values_units_textbook(case: tuple[str, Measured]) -> None:
     assert powers_of(channel.unit) == expected.powers
 
 
-@given(st.sampled_from(["pm", "nm", "um", "mm", "cm", "m", "inch"]), st.sampled_from(["nm", "um", "mm"]))
-def test_difference_whatever_units_terms_came(first: str, second: str) -> None:
-    """A difference is the same in whatever units its terms came."""
-    piezo, deflection = 1e-6 * np.array([0.0, 1, 2, 3]), 1e-7 * np.array([0.0, 0, 2, 5])
-    factors = [one.to_si for one in (unit(first), unit(second)) if one is not None]
-    channel = derived(
-        "Piezo - Deflection",
-        Channel("Piezo", first, piezo / factors[0]),
-        Channel("Deflection", second, deflection / factors[1]),
-    )
-    assert channel.unit == first
-    np.testing.assert_allclose(in_si(channel), piezo - deflection, rtol=1e-12, atol=1e-18)
-
-
 @pytest.mark.slow
 @given(st.text(max_size=60) | st.text(alphabet="ab0.'[]()+-*/ _,:=@!{}", max_size=40))
 def test_any_text_is_a_formula_or_is_refused(text: str) -> None:
@@ -175,14 +161,6 @@ def test_no_arithmetic_refused_term(formula: str, term: str) -> None:
     assert refused.value.allowed.startswith(f"{term}: ")
 
 
-@pytest.mark.parametrize("formula", ["Cell #2 - b", "(a) # b", "a#b", "'Cell #1' - Cell #2"])
-def test_sign_begins_comment_python_cuts_nothing(formula: str) -> None:
-    """A sign that begins a comment in python cuts nothing off."""
-    with pytest.raises(InvalidInput, match="a name with # in quotes"):
-        parse("derived.d", formula)
-    assert parse("derived.d", "'Cell #1' - \"Cell #2\"").names == ("Cell #1", "Cell #2")
-
-
 @pytest.mark.parametrize("formula", ["", "a -", "0.05 N/m * a", "(" * 150 + "a", "-" * 201, "a\\", "import os"])
 def test_cannot_parsed_refused_example(formula: str) -> None:
     """What cannot be parsed is refused with an example."""
@@ -211,19 +189,3 @@ def test_a_term_that_does_not_fit_is_named(formula: str, said: str) -> None:
         derived(formula, *channels, Channel("Short", "nm", SAMPLES[:2]), properties={"k": "soft"})
     assert refused.value.place == "derived.new"
     assert said in refused.value.reason
-
-
-def test_unit_brackets_stands_file_lacks() -> None:
-    """A unit in brackets stands for one that the file lacks."""
-    channel = derived("2.5 [N/V] * Raw [mV]", Channel("Raw", "", SAMPLES))
-    assert channel.unit == "N"
-    np.testing.assert_allclose(channel.values, 2.5e-3 * SAMPLES)
-    counts = derived("Counts [1] * 0.01 [mN]", Channel("Counts", "", SAMPLES))
-    assert (counts.unit, counts.values[2]) == ("mN", pytest.approx(0.035))
-
-
-@pytest.mark.parametrize("stated", [{"k (N/m)": "0,05"}, {"k (N/m)": 0.05}])
-def test_property_file_number_unit(stated: dict[str, str | float]) -> None:
-    """A property of the file is a number with a unit."""
-    channel = derived("'k (N/m)' * Deflection", Channel("Deflection", "nm", SAMPLES), properties=stated)
-    np.testing.assert_allclose(in_si(channel), 0.05e-9 * SAMPLES)

@@ -10,7 +10,7 @@ from tests.support.blocks import block
 from underskin import InvalidInput
 from underskin.inversion import elastomer
 from underskin.recordings import curve_preparation, plausibility
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, from_dict, samples_of
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, from_dict
 from underskin.recordings.modulus import CompressionModulus
 
 SIGNS = list(product((1, -1), (1, -1)))
@@ -60,15 +60,6 @@ def test_pulls_sphere_way_out_tells_no_sign(start_mm: float, end_mm: float, forc
     """What pulls a sphere on its way out tells no sign."""
     expected = tuple(name for name, sign in zip(NAMES, (force, travel), strict=True) if sign < 0)
     assert curve_preparation.counted_negative(adhesive(start_mm, end_mm, force, travel)) == expected
-
-
-def test_sphere_still_pulled_deepest_not_turned() -> None:
-    """A sphere that is still pulled where it is deepest is not turned."""
-    curve = adhesive(-0.05, -0.6, 1, 1)
-    rows = np.flatnonzero((np.arange(160) < 80) & (curve.displacement_mm < 0.06))
-    pressed_lightly = samples_of(curve, rows)
-    assert pressed_lightly.force_n[-1] < 0
-    assert curve_preparation.counted_negative(pressed_lightly) == ()
 
 
 @pytest.mark.parametrize(("force", "travel"), SIGNS)

@@ -9,7 +9,6 @@ from tests.support.raw_curves import DEPTH_MM, FORCE_N, OFFSET_NM, rig_of_raw_cu
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording, IndentationRecording
-from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.reading import Reading
 
 
@@ -165,16 +164,3 @@ def test_what_a_file_contradicts_is_refused(changes: dict[str, Any], place: str,
         read(text_of_raw_curve(), **changes)
     assert refused.value.place == place
     assert said in refused.value.reason
-
-
-def test_formula_leave_out_unit_heading() -> None:
-    """A formula may leave out the unit of a heading."""
-    derived = {"depth": "-Height - Deflection", "load": "k * Deflection"}
-    reading = read(text_of_raw_curve(), derived={"k": "3 [N/m]", **derived})
-    np.testing.assert_allclose(curve_of(reading).force_n, FORCE_N, atol=1e-11)
-
-
-def test_message_says_unit_heading_once() -> None:
-    """A message says the unit of a heading once."""
-    contents = Contents((Block("", (Channel("Load [N]", "N", np.zeros(1)), Channel("Stroke", "mm", np.zeros(1)))),))
-    assert contents.described() == "Load [N], Stroke [mm]"

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import CompressionRecording, IndentationRecording
-from underskin.recordings.modulus import compression_modulus, indentation_modulus, of_compression, of_indentation
+from underskin.recordings.modulus import compression_modulus, indentation_modulus
 from underskin.units import Floats
 
 HEIGHT, DIAMETER = 10e-3, 10e-3
@@ -85,35 +84,6 @@ def test_recording_starts_contact_contact_point() -> None:
     found = indentation_modulus(depth, hertz(depth, offset=0.0), RADIUS, 0.5)
     assert found.contact_point == pytest.approx(0.1e-3, abs=1e-6)
     assert found.modulus == pytest.approx(16e6, rel=1e-3)
-
-
-@pytest.mark.parametrize(("height_mm", "diameter_mm"), [(10.0, 10.0), (12.5, 29.0), (30.0, 50.0)])
-def test_papers_reading_stated_geometry(height_mm: float, diameter_mm: float) -> None:
-    """The papers reading on the stated geometry."""
-    strain = np.linspace(0, 0.3, 600)
-    pressed = CompressionRecording(
-        id="c", sample_height_mm=height_mm, sample_diameter_mm=diameter_mm, displacement_mm=strain * height_mm,
-        force_n=paper_curve(strain) * np.pi / 4 * (diameter_mm * 1e-3) ** 2,
-    )  # fmt: skip
-    found = of_compression(pressed)
-    assert found.modulus == pytest.approx(16e6, rel=0.01)
-    assert found.leaves_at_stress == pytest.approx(2e6, rel=0.1)
-    assert "leaves the line at 2.09 MPa" in found.statement
-
-
-def test_indentation_lab_units_gives() -> None:
-    """An indentation in lab units gives the same."""
-    depth = np.linspace(0, 0.4e-3, 200)
-    indented = IndentationRecording(id="i", indenter_radius_mm=4.0, displacement_mm=depth * 1e3, force_n=hertz(depth))
-    found = of_indentation(indented, 0.5)
-    assert found.modulus == pytest.approx(16e6, rel=1e-4)
-    assert "contact from 0.1 mm" in found.statement
-
-
-def test_recording_not_load_refused() -> None:
-    """A recording that does not load is refused."""
-    with pytest.raises(InvalidInput, match="force_n"):
-        indentation_modulus(np.linspace(0, 1, 50), -hertz(np.linspace(0.4e-3, 0, 50)) * 0, RADIUS, 0.5)
 
 
 def test_modulus_sample_contact_leaves_open() -> None:

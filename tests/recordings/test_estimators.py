@@ -45,12 +45,6 @@ def factor(in_force: float, in_charge: float, estimator: Estimator) -> Floats:
     return np.abs(frf.values[low] / known_frf(frf.frequency[low]))
 
 
-def test_noise_force_makes_h1_too_small_share() -> None:
-    """Noise in the force makes h1 too small by its share of the power and h2 not."""
-    assert np.mean(factor(NOISE, 0, "H1")) == pytest.approx(1 / (1 + NOISE**2), abs=0.005)
-    assert np.mean(factor(NOISE, 0, "H2")) == pytest.approx(1, abs=0.005)
-
-
 def test_noise_charge_makes_h2_too_large_h1() -> None:
     """Noise in the charge makes h2 too large and h1 not."""
     assert np.mean(factor(0, NOISE, "H1")) == pytest.approx(1, abs=0.005)
@@ -58,15 +52,6 @@ def test_noise_charge_makes_h2_too_large_h1() -> None:
     power = np.abs(known_frf(frequency)) ** 2
     share = NOISE**2 * power.mean() / power[frequency < 100]  # white noise beside a charge that is strong here
     assert np.mean(factor(0, NOISE, "H2")) == pytest.approx(np.mean(1 + share), abs=0.005)
-
-
-def test_noise_hv_lies_every_line() -> None:
-    """With noise in both hv lies between at every line."""
-    h1, h2, hv = (factor(NOISE, NOISE, name) for name in ("H1", "H2", "Hv"))
-    assert np.all(h1 < hv)
-    assert np.all(hv < h2)
-    assert np.mean(h1) < 0.95
-    assert np.mean(h2) > 1.01
 
 
 def test_noise_equal_relative_power_hv_alone() -> None:
@@ -132,14 +117,6 @@ def test_stated_uncertainty_scatter_repeats(estimator: Estimator) -> None:
     assert np.sqrt(np.mean(scatter)) == pytest.approx(1, abs=0.08)
 
 
-def test_without_noise_three_agree_keep_sign() -> None:
-    """Without noise all three agree and keep the sign of the phase."""
-    values = [broadband(*noisy(0, 0), RATE, block_samples=1000, estimator=name).values for name in ESTIMATORS]
-    for other in values[1:]:
-        np.testing.assert_allclose(other, values[0], rtol=2e-2)
-    assert all(np.all(np.angle(one[:100]) < 0) for one in values)
-
-
 SERIES = {
     "sample_rate_hz": RATE,
     "force_n": noisy(NOISE, NOISE)[0][:6000].tolist(),
@@ -153,24 +130,8 @@ LINES: dict[str, Any] = {name: RECORDING[name] for name in RECORDING if name not
 }  # fmt: skip
 
 
-def recording_of(entry: dict[str, Any]) -> FrfRecording:
-    campaign, problems = from_dict(document(entry))
-    assert problems == []
-    (recording,) = campaign.recordings
-    assert isinstance(recording, FrfRecording)
-    return recording
-
-
 def estimated(recording: FrfRecording) -> Floats:
     return np.abs(lines_of(recording).values)
-
-
-def test_recording_says_estimator_h1() -> None:
-    """A recording says its estimator and h1 is what it has without one."""
-    h1, h2, hv = (estimated(recording_of({**RECORDING, "estimator": name})) for name in ESTIMATORS)
-    np.testing.assert_array_equal(estimated(recording_of(RECORDING)), h1)
-    assert np.all(h1 < hv)
-    assert np.all(hv < h2)
 
 
 def test_estimator_stays_recording_json_hdf5() -> None:
@@ -246,19 +207,3 @@ def test_rig_description_refused_estimator(changes: dict[str, Any], field: str) 
     """A rig description is refused where its estimator cannot be used."""
     with pytest.raises(InvalidInput, match=f"^{field} = "):
         rig(**changes)
-
-
-def test_whoever_reads_file_say_estimator_told() -> None:
-    """Whoever reads a file may say another estimator and is told of what it is not for."""
-    both = document({**RECORDING, "estimator": "H2"}, {**LINES, "id": "r2"})
-    campaign, _ = from_dict(both)
-    buffer = io.BytesIO()
-    hdf5_file.write(campaign, buffer)
-    reading = read_file(buffer.getvalue(), "a.h5")
-    assert reading.with_estimator(None) is reading
-    chosen = reading.with_estimator("Hv")
-    series, lines = chosen.campaign.recordings
-    assert isinstance(series, FrfRecording)
-    assert isinstance(lines, FrfRecording)
-    assert (series.estimator, lines.estimator) == ("Hv", None)
-    assert chosen.warnings == ["Hv is for time series, which 1 of 2 recordings are not"]

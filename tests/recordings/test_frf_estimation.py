@@ -11,8 +11,7 @@ from scipy.signal import lfilter
 from bench.soak import SOAK
 from tests.recordings.known_signals import GAIN, RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import broadband, estimate, lines_of, periodic, resonance, stepped_sine
+from underskin.recordings.frf.estimation import broadband, estimate, periodic, resonance, stepped_sine
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.frf.spectra import Frf, period_of
 from underskin.recordings.frf.stepped_sine import find_steps
@@ -104,12 +103,6 @@ def test_periods_found() -> None:
         assert period_of(force) == 0
     with pytest.raises(InvalidInput, match="repeat itself"):
         periodic(noise, noise, RATE)
-
-
-def test_the_kind_of_excitation_is_recognised() -> None:
-    force = dwelling([5.0, 20.0, 60.0])
-    assert len(estimate(force, answer_to(force), RATE).frequency) == 3
-    assert len(estimate(*shaken(3, 8000), RATE).frequency) > 100
 
 
 @pytest.mark.slow
@@ -216,16 +209,6 @@ def test_a_hammer_blow_on_a_structure(channel: int, peaks: dict[float, float | N
     assert np.median(size[low]) == pytest.approx(median, rel=0.02)
 
 
-def test_recording_time_series_gives_lines_si() -> None:
-    """A recording with time series gives lines in si."""
-    force, charge = shaken(9)
-    recording = FrfRecording(
-        id="r", sensor="s", indenter_radius_mm=4.0, preload_n=2.0, dynamic_force_n=0.09,
-        sample_rate_hz=RATE, force_n=force, charge_pc=charge * 1e12,
-    )  # fmt: skip
-    assert abs(lines_of(recording).values[0]) == pytest.approx(GAIN, rel=1e-2)
-
-
 @pytest.mark.parametrize(
     ("force", "charge", "field"),
     [
@@ -238,15 +221,3 @@ def test_unusable_series_are_refused_by_name(force: Floats, charge: Floats, fiel
     with pytest.raises(InvalidInput) as refusal:
         estimate(force, charge, RATE)
     assert refusal.value.field == field
-
-
-def test_resonance_read_finite_lines() -> None:
-    """A resonance is read from the finite lines."""
-    frequency = np.linspace(100.0, 1000.0, 200)
-    ratio = frequency / 500.0
-    values = np.asarray(1 / (1 - ratio**2 + 0.1j * ratio), dtype=np.complex128)
-    values[[3, 85, 95]] = np.nan, np.inf, complex(np.nan, 1.0)
-    found = resonance(Frf(frequency, values, None))
-    assert found is not None
-    assert found == pytest.approx((500.0, 0.05), rel=1e-6)
-    assert resonance(Frf(frequency, np.full(200, np.nan, dtype=np.complex128), None)) is None

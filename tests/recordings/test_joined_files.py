@@ -1,7 +1,6 @@
 """Force and charge of one recording in two files, which the rig description joins by their names."""
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -155,16 +154,6 @@ def test_a_name_without_the_part_and_bytes_are_refused(tmp_path: Path) -> None:
         read_file(tmp_path / "a.csv", "a.csv", rig())
     with pytest.raises(FileError, match="is no file with others in its folder"):
         read_file((tmp_path / "a.csv").read_bytes(), "a_force.csv", rig())
-
-
-@pytest.mark.parametrize("other", [".", ".."])
-def test_a_name_of_no_file_is_refused(other: str, tmp_path: Path) -> None:
-    """Where the description replaces all of a name, what is left must be one of a file."""
-    write(tmp_path, "a_force.csv", "Force [N]", FORCE, 0)
-    with pytest.raises(
-        FileError, match=rf"would be joined with '{re.escape(other)}', which must be the name of a file"
-    ):
-        read(tmp_path, join={"a_force.csv": [other]})
 
 
 @pytest.mark.parametrize("join", ["_charge", {}, {"a": "b", "c": "d"}, {"_force": "../secret"}, {"a": 5}, {"a": "a"}])

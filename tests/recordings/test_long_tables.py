@@ -108,13 +108,6 @@ def test_rows_with_the_same_conditions_are_a_recording(
     assert_are(read(written(rows, *style)), conditions)
 
 
-def test_a_sensor_that_is_written_once_is_that_of_the_rows_below() -> None:
-    conditions: list[Condition] = [(sensor, "2026-05-04T09:00:00Z", 8.0, 250.0, 21.5) for sensor in SENSORS]
-    rows = [[*condition, *line] for condition in conditions for line in LINES]
-    blanks = [["" if number % len(LINES) else row[0], *row[1:]] for number, row in enumerate(rows)]
-    assert_are(read(written(blanks, ";", ",")), conditions)
-
-
 def test_a_sensor_that_is_written_once_is_that_of_each_preload_below() -> None:
     conditions: list[Condition] = [
         (sensor, "2026-05-04T09:00:00Z", 8.0, preload, 21.5) for sensor in SENSORS for preload in (250.0, 500.0)

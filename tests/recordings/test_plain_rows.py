@@ -1,18 +1,13 @@
 """Rows read by the bytes of a block are those that are read line by line, and the others are left to that."""
 
-import io
-import time
-
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tests.recordings.contents_of_files import contents
 from tests.recordings.test_recordings_cells import ABOVE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.readers import csv_file
 from underskin.recordings.readers.table import Table, plain_numbers
 
 NUMBERS = ("1", "-2.5", "+.5", "7.", "1e-3", "1E5", "nan", "-inf", "Infinity", "−4", "0.1234567890123456789", "1e999")
@@ -67,42 +62,6 @@ def test_plain_numbers_are_taken_at_once(separator: str, decimal: str) -> None:
     numbers = ["1", "-2.5", "+.5", "7.", "1e-3", "1E5", "0.1234567890123456789", "1e999"]
     lines = [f"{one}{separator}{other}".replace(".", decimal) for one in numbers for other in numbers]
     assert plain_numbers(lines, separator, decimal, 2) is not None
-
-
-def seconds(lines: list[str]) -> float:
-    start = time.process_time()
-    csv_file.read(io.BytesIO("\n".join(["Time [s],Force [N]", *lines]).encode()), "a.csv")
-    return time.process_time() - start
-
-
-@pytest.mark.slow
-def test_lines_rows_hardly_cost_rows() -> None:
-    """Lines between the rows hardly cost more than rows.
-
-    Blank lines, which part groups, cost eight times as much while blocks were halved to find them.
-    """
-    rows = [f"{number * 1e-4:.4f},{number % 97 / 7:.6f}" for number in range(200_000)]
-    parted = [line for number, row in enumerate(rows) for line in ((row, "") if number % 500 == 499 else (row,))]
-    assert seconds(parted) < 3 * seconds(rows)
-
-
-@pytest.mark.slow
-def test_words_hardly_cost_numbers() -> None:
-    """A column of words, cells in quotes and overloads cost little more than numbers: five times as much, line by
-    line."""
-    rows = [(f"{number * 1e-4:.4f}", f"{number % 97 / 7:.6f}") for number in range(100_000)]
-    plain = seconds([",".join(row) for row in rows])
-    assert seconds([f"{time},{force},{'hold' if force < '5' else 'back'}" for time, force in rows]) < 4 * plain
-    assert seconds([f'"{time}","{force}"' for time, force in rows]) < 4 * plain
-    assert seconds([f"{time},{'OL' if force[0] == '3' else force}" for time, force in rows]) < 4 * plain
-
-
-def test_cells_end_lines_without_holding() -> None:
-    """Cells that end lines without holding anything change nothing."""
-    rows = [f"{number},{number / 8}" for number in range(100)]
-    lines = ["Time [s],Force [N]", *rows[:50], *(f"{row},,," for row in rows[50:])]
-    (block,) = contents("\n".join(lines).encode(), "a.csv").blocks
-    assert block.channels[1].values.tolist() == [number / 8 for number in range(100)]
 
 
 def test_index_trailing_separators_long_template() -> None:

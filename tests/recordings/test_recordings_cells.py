@@ -2,15 +2,11 @@
 
 import pytest
 
-from tests.support.instrument_files import COMMON, rig
-from tests.support.repository import ROOT
-from underskin.array_stress.pressure_map import parse as pressure_map
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import FileError
 from underskin.recordings import Reading, read_contents, read_file
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.channels import Contents
 
-TEMPLATE = (ROOT / "examples" / "formats" / "template.csv").read_text()
 HEADINGS = "id,sensor,indenter_radius_mm,preload_n,dynamic_force_n,frequency_hz,frf_re_pc_per_n,frf_im_pc_per_n\n"
 ABOVE = """schema,campaign/1
 name,palm 3
@@ -66,22 +62,11 @@ def test_lost_refused_line_column(old: str, new: str, place: str, reason: str) -
     assert reason in found.reason
 
 
-def test_a_sensor_that_comes_twice_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="must differ from every other sensor's"):
-        read(changed("sensor,s01,0,0\n", "sensor,s01,0,0\nsensor,s01,8,0\n"))
-
-
 def test_cells_quotes_hold_separators_quotes() -> None:
     """Cells in quotes hold separators and quotes."""
     quoted = changed("name,palm 3", 'name,"palm 3, ""May"""')
     assert read(quoted).campaign.name == 'palm 3, "May"'
     assert read(quoted.replace("preload_n", '"preload_n"')).campaign.recordings[0].id == "r1"
-
-
-def test_empty_cells_end_lines_no_cells() -> None:
-    """Empty cells at the end of lines are no cells."""
-    padded = "".join(f"{line},,,\n" if line else ",,,,,,\n" for line in TEMPLATE.splitlines())
-    assert read(padded).campaign.skin == read(TEMPLATE).campaign.skin
 
 
 @pytest.mark.parametrize(
@@ -131,13 +116,6 @@ def test_recording_begins_twice_refused() -> None:
     assert at_once.place == "line 12, column 1"
 
 
-def test_an_id_in_every_row_is_one_recording() -> None:
-    (recording,) = read(changed("\n,,,,,20", "\nr1,,,,,20")).campaign.recordings
-    assert isinstance(recording, FrfRecording)
-    assert recording.frequency_hz is not None
-    assert recording.frequency_hz.tolist() == [10, 20]
-
-
 @pytest.mark.parametrize("heading", ["preload_n", "position_x_mm"])
 def test_value_changes_within_recording_refused(heading: str) -> None:
     """A value that changes within a recording is refused."""
@@ -158,17 +136,6 @@ def channels(text: str) -> Contents:
     return found
 
 
-def test_headings_instruments_quotes_hold() -> None:
-    """Headings of instruments in quotes hold separators."""
-    found = channels('Operator,"Smith, J."\n"Force, static [N]","Charge [pC]","Time [s]"\n"1","2","3"\n"3","4","5"\n')
-    assert [(one.name, one.unit) for one in found.blocks[0].channels] == [
-        ("Force, static [N]", "N"),
-        ("Charge [pC]", "pC"),
-        ("Time [s]", "s"),
-    ]
-    assert found.properties == {"Operator": "Smith, J."}
-
-
 @pytest.mark.parametrize(
     ("text", "place"),
     [
@@ -183,32 +150,3 @@ def test_quoted_numbers_instruments_never_split(text: str, place: str) -> None:
     with pytest.raises(FileError) as refused:
         read_contents(text.encode(), "run.csv")
     assert refused.value.place == place
-
-
-def test_property_header_gives_twice_not_used() -> None:
-    """A property that a header gives twice is not used."""
-    text = "preload;1\npreload;2\n\nforce;amplifier\nmN;V\n" + "\n".join(f"{n};{n}" for n in range(1, 6))
-    assert channels(text).warnings == ("'preload' is given as '1' and as '2': neither is used",)
-    described = rig(recording={**COMMON, "sample_rate_hz": 10, "preload_n": {"property": "preload"}})
-    with pytest.raises(FileError, match="property 'preload': is not in the file"):
-        read_file(text.encode(), "run.csv", described)
-    assert channels(text.replace("preload;2", "preload;1")).properties["preload"] == "1"
-
-
-@pytest.mark.parametrize(
-    ("text", "allowed"),
-    [
-        ("y\\x\t0\t1\n0\t1,000\t2\n1\t3\t4\n", "can be 1000 or 1.000.*line 2, cell 2 of map.csv"),
-        ('y,0,1\n0,"1,5",2.5\n1,3,4\n', "must be a number"),
-        ('y,0,1\n0,"1,2\n1,3,4\n', "in quotes must end on its line.*line 2 of map.csv"),
-    ],
-)
-def test_pressure_map_never_split_within_quotes(text: str, allowed: str) -> None:
-    """A pressure map is never split within quotes."""
-    with pytest.raises(InvalidInput, match=allowed):
-        pressure_map(text.encode(), "map.csv")
-
-
-def test_pressure_map_decimal_commas_quotes() -> None:
-    """A pressure map may have decimal commas in quotes."""
-    assert pressure_map(b'y,0,1\n0,"1,5",2\n1,3,4\n', "map.csv")["pressure_mpa"] == [[1.5, 2], [3, 4]]

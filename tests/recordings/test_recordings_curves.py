@@ -103,18 +103,6 @@ def test_heading_s_wrong_unit_overridden_rig() -> None:
     assert read(odd, {**SIMPLE, "displacement_mm": {"channel": "Depth (measured)", "unit": "um"}}).warnings == []
 
 
-def test_what_was_taken_for_what_is_said() -> None:
-    reading = read(table(RAW), SPRING)
-    assert reading.taken == {
-        "displacement_mm": "'Piezo (um)' in um, less the deflection 'Deflection (nm)' in nm: -0.5 to 1.5 µm",
-        "force_n": "'Deflection (nm)' in nm, a deflection, times 50 N/m: 0 to 36.74 µN",
-        "": "rows of 2 numbers from line 2 to 18, separated by semicolons, with decimal points; names from line 1",
-    }
-    turned = {"displacement_mm": {"channel": "Z (um)", "sign": -1}, "force_n": {"channel": "Force (uN)"}}
-    reading = read(table({"Z (um)": -DEPTH_UM, "Force (uN)": FORCE_UN}), turned)
-    assert reading.taken["displacement_mm"] == "'Z (um)' in um, turned round: -0.5 to 1.5 µm"
-
-
 ONE = {"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}
 LINES = table(ONE).splitlines()
 

@@ -1,7 +1,6 @@
 """Every format on a small file written here, by the format's own writer where there is one."""
 
 import re
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from tests.support.instrument_files import (
     COMMON,
     EXAMPLES,
     FORCE,
-    SKIN,
     hdf5,
     lvm,
     matlab_5,
@@ -24,7 +22,7 @@ from tests.support.instrument_files import (
     rig,
     tdms,
 )
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.campaign import parse, to_dict
 from underskin.recordings.readers import json_file
@@ -81,14 +79,6 @@ def test_template_filled_wrongly_refused_line(old: str, new: str, place: str, re
     assert refusal.value.place.startswith(place)
 
 
-def test_cell_no_number_refuses_recording_alone() -> None:
-    """A cell that is no number refuses its recording alone."""
-    wrong = (EXAMPLES / "template.csv").read_text().replace("\nr2,s02", "\nr2,s02").replace("7.3,", "seven,")
-    reading = read_file(wrong.encode(), "wrong.csv")
-    assert [kept.id for kept in reading.campaign.recordings] == ["r1"]
-    assert [(problem.recording, problem.value) for problem in reading.problems] == [("r2", "seven")]
-
-
 @pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ",")])
 def test_an_instruments_table(separator: str, decimal: str) -> None:
     rows = [["Time (ms)", "force", "amplifier [V]"]]
@@ -102,16 +92,6 @@ def test_an_instruments_table(separator: str, decimal: str) -> None:
     for text in ("\n".join(lines), "\ufeff" + "\r\n".join(lines)):
         the_time_series(text.encode(), "a.csv", rig(channels=channels))
         assert contents(text.encode(), "a.csv").properties == {"Operator": "somebody", "Sample": "palm 3"}
-
-
-def test_table_row_not_fit_refused_line() -> None:
-    """A table with a row that does not fit is refused by line."""
-    with pytest.raises(FileError, match=r"a\.csv: line 4: must be a row of 2 numbers.*'3;x'"):
-        read_contents(b"a;b\n1;2\n2;3\n3;x\n4;5\n5;6", "a.csv")
-    with pytest.raises(FileError, match=r"a\.csv: line 3: must be a row of 2 numbers.*'x;3'"):
-        read_contents(b"a;b\n1;2\nx;3\n3;4\n4;5\n5;6", "a.csv")
-    with pytest.raises(FileError, match=r"a\.csv: line 4: must be a row of 2 numbers"):
-        read_contents(b"a;b\n1;2\n2;3\n3", "a.csv")
 
 
 def test_tdms() -> None:
@@ -152,13 +132,6 @@ def test_a_tdms_file_says_when_it_was_recorded(stamps: dict[str, Any], says: str
     assert recording.recorded_at == says
 
 
-def test_the_rigs_time_goes_before_the_files() -> None:
-    described = rig()
-    told = replace(described, recording={**described.recording, "recorded_at": "2020-01-01"})
-    (recording,) = read_file(tdms(1, root={"DateTime": MAY}), "run.tdms", told).campaign.recordings
-    assert recording.recorded_at == "2020-01-01"
-
-
 @pytest.mark.parametrize(
     ("of_file", "of_segment", "says"),
     [
@@ -187,11 +160,6 @@ def test_lvm() -> None:
     assert len(contents(lvm().encode(), "run.lvm").blocks) == 2
 
 
-def test_an_lvm_file_with_an_x_column() -> None:
-    text = lvm(repeats=1).replace("X_Columns\tNo", "X_Columns\tOne").replace("\n\t", "\n0.5\t")
-    the_time_series(text.encode(), "run.lvm", rig())
-
-
 def test_an_interrupted_lvm_acquisition_is_said() -> None:
     cut = "\n".join(lvm().splitlines()[:-1])
     assert "interrupted after 3 of 4 samples" in contents(cut.encode(), "run.lvm").warnings[0]
@@ -204,17 +172,6 @@ def test_matlab(write: Any) -> None:
     recording = {**COMMON, "sample_rate_hz": {"property": "fs"}}
     assert the_time_series(write(matlab_variables()), "run.mat", rig(recording=recording)) == []
     assert contents(write(matlab_variables()), "run.mat").properties == {"fs": 1000.0, "operator": "me"}
-
-
-def test_matlab_structures_and_matrices() -> None:
-    data = matlab_5(
-        {"run": {"force": FORCE, "fs": 2.0}, "both": np.column_stack([FORCE, CHARGE]), "cell": [{"a": 1}, "x"]}
-    )
-    blocks = {block.name: block for block in contents(data, "run.mat").blocks}
-    assert [channel.name for channel in blocks[""].channels] == ["both(:,1)", "both(:,2)"]
-    assert blocks[""].channels[1].values == pytest.approx(CHARGE)
-    assert [channel.name for channel in blocks["run"].channels] == ["force"]
-    assert contents(data, "run.mat").properties == {"run.fs": 2.0}
 
 
 @pytest.mark.parametrize(
@@ -237,20 +194,3 @@ def test_no_recording_refused_content(data: bytes, reason: str) -> None:
     with pytest.raises(FileError, match=reason) as refusal:
         read_file(data, "run.csv")
     assert refusal.value.file == "run.csv"
-
-
-def test_files_name_says_nothing_about_format() -> None:
-    """A files name says nothing about its format."""
-    the_time_series(tdms(1), "run.csv", rig())
-
-
-def test_channels_without_rig_description_listed() -> None:
-    """Channels without a rig description are listed."""
-    with pytest.raises(FileError, match=r"rig description must say.*force \[mN\], amplifier \[\?\]"):
-        read_file(tdms(1), "run.tdms")
-
-
-def test_faulty_skin_file_refused_field() -> None:
-    """A faulty skin in a file is refused by field."""
-    with pytest.raises(InvalidInput, match=r"skin\.thickness_mm"):
-        read_file(tdms(1), "run.tdms", rig(skin={**SKIN, "thickness_mm": -1}))

@@ -8,9 +8,8 @@ import pytest
 
 from tests.recordings.real_files import read, real
 from tests.support.cases import first
-from tests.support.instrument_files import rig, tdms
 from underskin.errors import InvalidInput
-from underskin.recordings import Reading, join, read_file
+from underskin.recordings import Reading, join
 from underskin.recordings.campaign import (
     Campaign,
     CompressionRecording,
@@ -82,20 +81,6 @@ def test_files_of_different_skins_are_not_joined(skin: dict[str, Any], says: str
         join("both", [("a.csv", reading(press("a"), id="palm-3")), ("b.csv", reading(press("b"), **skin))])
 
 
-def test_an_id_of_the_skin_can_be_said_for_all() -> None:
-    files = [("a.csv", reading(press("a"), id="one")), ("b.csv", reading(press("b"), id="two"))]
-    assert join("both", files, skin_id="palm").campaign.skin.id == "palm"
-
-
-def test_single_precision_number_no_difference() -> None:
-    """What single precision does to a number is no difference."""
-    files = [
-        ("a.csv", reading(press("a"))),
-        ("b.csv", reading(press("b"), youngs_modulus_mpa=float(np.float32(16.0000004)))),
-    ]
-    assert join("both", files).campaign.skin.youngs_modulus_mpa == 16.0
-
-
 def test_ids_several_files_use_led_files_name() -> None:
     """Ids that several files use are led by the files name."""
     refused = RecordingProblem("r1", "preload_n", -1.0, "must be greater than 0")
@@ -128,14 +113,6 @@ def test_files_of_one_name_are_told_apart() -> None:
         ("b.csv", reading(press("r", level=7.3), press("a r", level=7.4))),
     ]
     assert sorted(ids(join("all", taken))) == ["a r", "a r (2)", "b r", "x"]
-
-
-def test_warnings_are_told_once() -> None:
-    files = [
-        (f"{name}.csv", reading(press(name, level=level), warnings=("cut short",)))
-        for name, level in (("a", 7.1), ("b", 7.2), ("c", 7.3))
-    ]
-    assert join("all", files).warnings == ["a.csv and 2 more: cut short"]
 
 
 def test_copies_of_a_recording_count_once() -> None:
@@ -179,29 +156,6 @@ def test_few_numbers_without_time_no_copies() -> None:
     """Few numbers without a time are no copies."""
     found = join("all", [(f"{name}.csv", reading(press(name))) for name in "abc"])
     assert (ids(found), found.warnings) == (["a", "b", "c"], [])
-
-
-@pytest.mark.slow
-def test_press_file_instrument_writes() -> None:
-    """A press a file as an instrument writes it."""
-    description = rig(
-        recording={
-            "sensor": "s01",
-            "indenter_radius_mm": 4,
-            "dynamic_force_n": 0.1,
-            "preload_n": {"property": "preload"},
-        }
-    )
-    files = [
-        (f"press-{n}.tdms", read_file(tdms(n, group={"preload": float(n)}), f"press-{n}.tdms", description))
-        for n in (1, 2)
-    ]
-    found = join("palm", files)
-    assert ids(found) == ["press-1", "press-2"]
-    assert [recording.preload_n for recording in found.campaign.recordings if isinstance(recording, FrfRecording)] == [
-        1.0,
-        2.0,
-    ]
 
 
 def test_a_campaign_needs_a_name_and_a_file() -> None:

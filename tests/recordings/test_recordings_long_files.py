@@ -1,6 +1,5 @@
 """Long texts are read in blocks of lines, and say the same as short ones; their limits are settings."""
 
-import io
 import re
 from collections.abc import Iterator
 
@@ -10,10 +9,10 @@ import pytest
 from tests.recordings.contents_of_files import contents
 from tests.recordings.test_recordings_cells import ABOVE, HEADINGS
 from underskin.errors import FileError, InvalidInput
-from underskin.recordings import read_file, reading
+from underskin.recordings import read_file
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers import csv_file, text
+from underskin.recordings.readers import text
 
 RANDOM = np.random.default_rng(20251224)
 VALUES = RANDOM.normal(size=(3, 900)).round(9)
@@ -110,16 +109,6 @@ def test_empty_cell_long_template_refused() -> None:
     assert [(problem.recording, problem.field) for problem in problems] == [("r2", "frf_im_pc_per_n[108]")]
 
 
-def test_bad_cell_file_parsed_apart_named_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bad cell of a file that is parsed apart is named by its line."""
-    monkeypatch.setattr(reading, "LARGEST_TEXT", 1000)
-    lines = template(900)
-    lines[717] = lines[717].rpartition(",")[0] + ",x"
-    (problem,) = read_file("\n".join(lines).encode(), "a.csv").problems
-    assert (problem.field, problem.value) == ("frf_im_pc_per_n[708]", "x")
-    assert problem.allowed == "must be a number (line 718, column 8)"
-
-
 def table(separator: str, decimal: str) -> list[str]:
     rows = [separator.join(map(repr, row)).replace(".", decimal) for row in VALUES.T.tolist()]
     return ["Operator: mb", separator.join(["Time [s]", "Force [N]", "Charge [pC]"]), *rows]
@@ -136,17 +125,6 @@ def test_every_number_of_a_long_table_arrives(separator: str, decimal: str, enco
     assert np.array_equal([channel.values for channel in block.channels], VALUES)
 
 
-def test_parts_groups_long_table_short() -> None:
-    """Parts and groups of a long table are those of a short one."""
-    lines = table(",", ".")
-    lines[600:600] = ["Operator: ab", lines[1]]
-    lines.insert(300, "# next curve")
-    held = contents("\n".join(lines).encode(), "a.csv")
-    assert [len(block.channels[0].values) for block in held.blocks] == [598, 302]
-    assert [block.group_starts for block in held.blocks] == [(0, 298), ()]
-    assert (held.properties["1.Operator"], held.properties["2.Operator"]) == ("mb", "ab")
-
-
 def test_text_far_down_long_table_named_line() -> None:
     """Text far down in a long table is named by its line."""
     lines = table(",", ".")
@@ -154,34 +132,6 @@ def test_text_far_down_long_table_named_line() -> None:
     with pytest.raises(FileError, match=r"found '0\.1,broken,0\.3'") as refused:
         contents("\n".join(lines).encode(), "a.csv")
     assert refused.value.place == "line 751"
-
-
-def test_column_text_long_table() -> None:
-    """A column of text in a long table stands beside its channels, with the rows of each text."""
-    lines = table(";", ",")
-    noted = [
-        lines[0],
-        lines[1] + ";Note",
-        *(f"{line};{'end' if n % 100 == 99 else ''}" for n, line in enumerate(lines[2:])),
-    ]
-    held = contents("\n".join(noted).encode(), "a.csv")
-    (note,) = held.blocks[0].texts
-    assert (note.name, note.texts) == ("Note", ("", "end"))
-    assert np.flatnonzero(note.codes).tolist() == list(range(99, len(lines) - 2, 100))
-    assert len(held.blocks[0].channels) == 3
-
-
-def test_a_line_longer_than_a_block_is_whole() -> None:
-    line = "x" * 5000
-    blocks = list(text.blocks(text.content(io.BytesIO(f"a\r\n{line}\rb\n".encode()), "a")))
-    assert [whole for _, lines in blocks for whole in lines] == ["a", line, "b", ""]
-    assert [first for first, _ in blocks] == [0, 2]
-
-
-def test_text_without_table_says_line_holds() -> None:
-    """A text without a table says which line holds most numbers."""
-    with pytest.raises(csv_file.NoTable, match=r"line 2 holds most, 1: 'force,0.5'; names go into the CSV template"):
-        csv_file.read(io.BytesIO(b"name,value\nforce,0.5\ncharge,pC\n"), "a.csv")
 
 
 @pytest.mark.slow

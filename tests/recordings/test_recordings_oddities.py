@@ -2,10 +2,9 @@
 
 import pytest
 
-from tests.support.instrument_files import COMMON, lvm, matlab_5, matlab_variables, rig
+from tests.support.instrument_files import COMMON, rig
 from underskin.errors import FileError
 from underskin.recordings import Reading, read_contents, read_file
-from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.channels import Contents
 
 CURVES = "schema,campaign/1\nname,x\nskin.poisson_ratio,0.5\n\n"
@@ -33,21 +32,6 @@ def test_channels_few_rows_hold_cost_no_numbers() -> None:
     assert lengths == [30_001] + 29_999 * [1]
 
 
-def test_lvm_file_cut_parts_empty_refused() -> None:
-    """An lvm file cut into parts that are all but empty is refused."""
-    samples = "\t".join(["Samples"] + ["1"] * 3000)
-    with pytest.raises(FileError, match=r"wide\.lvm: line 9: Samples = 1 cuts 6000 numbers of 3000 channels into 3001"):
-        read_contents(wide_then_narrow(3000, samples), "wide.lvm")
-
-
-def test_decimal_comma_step_alone_understood() -> None:
-    """A decimal comma in the step alone is understood."""
-    text = lvm(repeats=1).replace("Decimal_Separator\t.\n", "").replace("0.001\t0.001", "0,001\t0,001")
-    contents = read_contents(text.encode(), "run.lvm")
-    assert isinstance(contents, Contents)
-    assert contents.blocks[0].sample_rate_hz == pytest.approx(1000)
-
-
 def csv(table: str) -> Reading:
     return read_file((CURVES + table).encode(), "a.csv")
 
@@ -70,19 +54,6 @@ def test_numbers_different_rows_never_taken_pair() -> None:
     ]
 
 
-def test_columns_recording_not_use_empty() -> None:
-    """Columns that a recording does not use may be empty."""
-    headings = "id,kind,indenter_radius_mm,displacement_mm,time_s,force_n\n"
-    reading = csv(headings + "a,indentation,4,0,,0\n,,,1,,5\nb,indentation,4,0,0,0\n,,,1,2,5\n")
-    assert not reading.problems
-    first, second = reading.campaign.recordings
-    assert isinstance(first, IndentationRecording)
-    assert isinstance(second, IndentationRecording)
-    assert first.time_s is None
-    assert second.time_s is not None
-    assert second.time_s.tolist() == [0, 2]
-
-
 def test_load_cycles_text_header_states_number() -> None:
     """Load cycles that a text header states are a number."""
     text = "cycles;1200\n\nforce;amplifier\nmN;V\n" + "\n".join(f"{n};{n}" for n in range(1, 6))
@@ -90,18 +61,6 @@ def test_load_cycles_text_header_states_number() -> None:
     reading = read_file(text.encode(), "run.csv", described)
     assert not reading.problems
     assert [recording.load_cycles for recording in reading.campaign.recordings] == [1200]
-
-
-def test_parts_file_long_name_ids() -> None:
-    """Parts of a file with a long name have ids of their own."""
-    structures = {name: matlab_variables() for name in ("first", "second")}
-    described = rig(recording={**COMMON, "sample_rate_hz": 10})
-    reading = read_file(matlab_5(structures), "x" * 300 + ".mat", described)
-    assert not reading.problems
-    assert [recording.id for recording in reading.campaign.recordings] == [
-        "x" * 194 + " first",
-        "x" * 193 + " second",
-    ]
 
 
 def test_an_empty_file_is_said_to_be_empty() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.recordings.real_files import example_rig
-from tests.support.instrument_files import CHARGE, COMMON, EXAMPLES, FORCE, matlab_5, rig, tdms
+from tests.support.instrument_files import COMMON, EXAMPLES, rig, tdms
 from underskin.errors import FileError, InvalidInput, SeveralInvalid
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording, IndentationRecording
@@ -193,37 +193,6 @@ def test_property_file_not_state_refused() -> None:
     recording = reading.campaign.recordings[0]
     assert isinstance(recording, FrfRecording)
     assert recording.preload_n == 1.0
-
-
-def test_block_say_sensor_preload() -> None:
-    """Each block can say its own sensor and preload."""
-    data = matlab_5(
-        {name: {"force": FORCE, "amplifier": CHARGE, "preload": n} for name, n in (("s01", 1.0), ("s02", 2.0))}
-    )
-    recording = {**COMMON, "sensor": {"property": "block"}, "preload_n": {"property": "preload"}, "sample_rate_hz": 10}
-    reading = read_file(data, "both.mat", rig(recording=recording))
-    found = [kept for kept in reading.campaign.recordings if isinstance(kept, FrfRecording)]
-    assert [(kept.id, kept.sensor, kept.preload_n) for kept in found] == [
-        ("both s01", "s01", 1.0),
-        ("both s02", "s02", 2.0),
-    ]
-
-
-def test_times_not_evenly_spaced_give_no_sample() -> None:
-    """Times that are not evenly spaced give no sample rate."""
-    channels = {
-        name: {"channel": name[0], "unit": unit}
-        for name, unit in (("force_n", "N"), ("charge_pc", "pC"), ("time_s", "s"))
-    }
-    for times, rate in (([0, 1, 2, 3], 1.0), ([0, 1, 2, 4], None)):
-        table = "t;f;c\n" + "\n".join(f"{time};1;{time}" for time in times)
-        if rate is None:
-            with pytest.raises(FileError, match="time_s: samples are not evenly spaced"):
-                read_file(table.encode(), "a.csv", rig(channels=channels))
-        else:
-            recording = read_file(table.encode(), "a.csv", rig(channels=channels)).campaign.recordings[0]
-            assert isinstance(recording, FrfRecording)
-            assert recording.sample_rate_hz == pytest.approx(rate)
 
 
 @pytest.mark.parametrize("file", RIGS, ids=lambda file: file.stem)

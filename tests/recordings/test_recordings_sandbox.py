@@ -105,18 +105,6 @@ def altered_hdf5(change: Callable[[Any], None]) -> bytes:
     return buffer.getvalue()
 
 
-@pytest.mark.usefixtures("understood_here")
-def test_attributes_named_no_field_refused() -> None:
-    """Attributes named as no field is are refused one by one."""
-
-    def rename(target: Any) -> None:
-        del target["recordings/000000"]
-        target.create_group("recordings/000000").attrs.update({"array": "<f8", "start": 0, "count": 10**9})
-
-    problems = read_file(altered_hdf5(rename), "a.h5").problems
-    assert {"array", "start", "count"} <= {problem.field for problem in problems}
-
-
 def test_a_file_that_takes_too_long_is_refused(stream: BinaryIO) -> None:
     with pytest.raises(FileError, match=r"slow\.tdms: reading it as TDMS took more than 0\.02 s"):
         parse_apart("TDMS", stream, "slow.tdms", ParsingLimits(seconds=0.02))
@@ -228,16 +216,6 @@ def test_hdf5_leads_out_file_refused(kind: str, fill: Any, tmp_path: Path) -> No
         data = buffer.getvalue()
     with pytest.raises(FileError, match=r"somewhere else|another file|same object"):
         read_file(data, "a.h5")
-
-
-@pytest.mark.usefixtures("understood_here")
-def test_references_campaign_refused_values() -> None:
-    """References in a campaign are refused as values."""
-    buffer = io.BytesIO(hdf5(EVERYTHING))
-    with h5py.File(buffer, "r+") as target:
-        target["recordings/000000"].attrs["sensor"] = target["skin"].ref
-    problems = read_file(buffer.getvalue(), "a.h5").problems
-    assert [(problem.recording, problem.field) for problem in problems] == [("r1", "sensor")]
 
 
 @pytest.mark.usefixtures("understood_here")

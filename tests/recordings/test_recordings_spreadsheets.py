@@ -63,23 +63,11 @@ def test_what_spreadsheets_add_changes_nothing(text: str) -> None:
     assert same_as_plain(text).warnings == []
 
 
-def test_a_text_in_utf_16_without_a_mark_is_read() -> None:
-    for encoding in ("utf-16-le", "utf-16-be"):
-        from underskin.recordings import read_file
-
-        assert only(read_file(PLAIN.encode(encoding), "a.csv")).id == "r1"
-
-
 def test_columns_of_words_are_left_out_and_told() -> None:
     text = ABOVE + HEADINGS.replace("\n", ",Bemerkung\n") + ROWS.replace("-0.5\n", "-0.5,erste Messung\n")
     (warning,) = same_as_plain(text).warnings
     assert "'Bemerkung' holds words and is no field" in warning
     assert "conditions.NAME" in warning
-
-
-def test_times_stand_under_a_heading_with_blanks() -> None:
-    text = ABOVE + HEADINGS.replace("\n", ",Recorded at\n") + ROWS.replace("-0.5\n", "-0.5,24.12.2025 09:30\n", 1)
-    assert only(read(text)).recorded_at == "2025-12-24T09:30:00+00:00"
 
 
 def test_numbers_without_field_refused_misspelt() -> None:
@@ -90,30 +78,6 @@ def test_numbers_without_field_refused_misspelt() -> None:
     assert "did you mean skin.thickness_mm?" in refusal(changed("skin.thickness_mm", "skin.thicknes_mm")).reason
     unnamed = refusal(ABOVE + HEADINGS.replace("id,", "id,,") + ROWS.replace("r1,", "r1,40,").replace("\n,", "\n,,"))
     assert unnamed.reason == "has no heading, but cells such as '40'"
-
-
-@pytest.mark.parametrize(
-    ("field", "heading", "meant"),
-    [
-        ("indenter_radius_mm", "Sphere radius [mm]", "indenter_radius_mm"),
-        ("preload_n", "F0 [mN]", "preload_n"),
-        ("dynamic_force_n", "dyn. F (mN)", "dynamic_force_n"),
-        ("frequency_hz", "f [Hz]", "frequency_hz"),
-    ],
-)
-def test_heading_guessed_unit_table_lacks(field: str, heading: str, meant: str) -> None:
-    """A heading of its own is guessed by its unit from what the table lacks."""
-    assert f"{heading!r} is no field, or its unit is not of the field; is it {meant}," in (
-        refusal(changed(HEADINGS, HEADINGS.replace(field, heading))).reason
-    )
-
-
-def test_table_frfs_without_skin_told_missing() -> None:
-    """A table of frfs without its skin is told what is missing."""
-    rows = "".join(f"r1,s01,4,1.0,0.09,{hz},7.1,-0.5\n" for hz in range(10, 40, 5))
-    assert "the first of them schema,campaign/1" in refusal(HEADINGS + rows).reason
-    block = "Stroke [mm];Load [N]\n0;0\n0,1;5\n0,2;10\n"
-    assert "schema,campaign/1" not in refusal(block).reason
 
 
 @pytest.mark.parametrize(
@@ -171,11 +135,6 @@ def test_magnitude_phase_stand_real_imaginary(heading: str, turn: float) -> None
     assert "is given with real and imaginary parts" in beside.reason
 
 
-def test_a_phase_without_a_magnitude_is_guessed() -> None:
-    head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "Phase [deg],Size [pC/N]")
-    assert "is it frf_phase_deg, which the table lacks?" in refusal(ABOVE + head + ROWS).reason
-
-
 def test_phase_without_unit_degrees_values_say() -> None:
     """A phase without a unit is in degrees where its values say so and else asked for."""
     head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,FRF_Phase")
@@ -206,14 +165,6 @@ def test_cell_no_number_told_line(old: str, new: str, field: str, place: str) ->
     (problem,) = read(changed(old, new)).problems
     assert (problem.recording, problem.field) == ("r1", field)
     assert problem.allowed == f"must be a number ({place})"
-
-
-def test_several_cells_no_numbers_first_told() -> None:
-    """Of several cells that are no numbers the first is told with the count."""
-    more = "".join(f",,,,,{line},7.{line},{'x' if line % 2 else -0.5}\n" for line in range(30, 36))
-    (problem,) = read(PLAIN + more).problems
-    assert problem.field == "frf_im_pc_per_n[3]"
-    assert problem.allowed == "must be a number (line 13, column 8, and 2 more in this column)"
 
 
 def test_number_above_table_none_told_line() -> None:
@@ -288,20 +239,9 @@ def test_forces_grams_pounds_converted() -> None:
         assert only(same_as_plain(text)).preload_n == pytest.approx(1.0)
 
 
-def test_id_begin_mark_comments() -> None:
-    """An id may begin with the mark of comments."""
-    reading = read(PLAIN + "#2,s01,4,1.0,0.09,10,8.1,-0.5\n,,,,,20,8.2,-0.6\n")
-    assert [entry.id for entry in reading.campaign.recordings] == ["r1", "#2"]
-
-
 def test_cut_file_ends_not_taken_note() -> None:
     """What a cut file ends with is not taken for a note."""
     cut = read(PLAIN + ",,,,,30\n")
     assert [(problem.recording, problem.value) for problem in cut.problems] == [("r1", None)] * 2
     begun = read(PLAIN + "r2\n")
     assert {problem.recording for problem in begun.problems} == {"r2"}
-
-
-def test_campaign_called_first_heading() -> None:
-    """A campaign may be called as the first heading."""
-    assert read(changed("name,palm 3", "name,ID")).campaign.name == "ID"

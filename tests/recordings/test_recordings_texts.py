@@ -1,7 +1,5 @@
 """Text tables as instruments write them: what is above the numbers, what is between them, how they are separated."""
 
-import tempfile
-
 import numpy as np
 import pytest
 
@@ -10,8 +8,7 @@ from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers.sandbox import parse_apart
-from underskin.recordings.rig_description import Property, common_value, spring_constant
+from underskin.recordings.rig_description import Property, spring_constant
 
 DEPTH = np.concatenate([np.linspace(-0.5, 1.5, 9), np.linspace(1.25, -0.5, 8)])
 FORCE = np.where(DEPTH > 0, 0.25 * np.abs(DEPTH) ** 1.5, 0.0).round(6)
@@ -86,13 +83,6 @@ def test_a_byte_order_mark_is_no_part_of_a_name(encoding: str) -> None:
     the_curve(contents("\r".join(lines).encode(encoding), "curve.txt"), [("Depth (µm)", "µm"), LABELLED[1]])
 
 
-def test_how_a_text_was_read_is_said() -> None:
-    text = "\n".join(["Prüfer;mb", "Depth;Force", "um;mN", "eoh", *rows(";", ",")]).encode()
-    written = "rows of 2 numbers from line 5 to 21, separated by semicolons, with decimal commas"
-    assert contents(text, "curve.txt").layout == f"{written}; names from line 2, units from line 3"
-    assert contents("\n".join(rows(" ")).encode(), "curve.txt").layout.endswith("no names above them")
-
-
 @pytest.mark.parametrize("cells", [("mb", "mb"), ("begin", ""), ("12:00:01", "12:00:02")])
 @pytest.mark.parametrize("place", ["first", "last"])
 def test_columns_text_left_out_warning(cells: tuple[str, str], place: str) -> None:
@@ -162,14 +152,6 @@ def test_spring_constant_above_numbers_property(line: str, name: str, separator:
     assert spring_constant(Property(name), found.properties, "curve.txt") == 3.5
 
 
-def test_comma_part_thousands_makes_no_number() -> None:
-    """A comma that may part thousands makes no number."""
-    assert common_value("preload_n", Property("Preload (N)"), {"Preload (N)": "1,5"}, "curve.txt") == 1.5
-    assert common_value("preload_n", Property("Preload (N)"), {"Preload (N)": "1,500"}, "curve.txt") == "1,500"
-    with pytest.raises(FileError, match=r"is '1,500': must be a number"):
-        spring_constant(Property("k (N/m)"), {"k (N/m)": "1,500"}, "curve.txt")
-
-
 def test_curves_under_headings_parts() -> None:
     """Curves under headings of their own are parts."""
     text = [line for name in ("a", "b") for line in (f"Curve;{name}", "Depth (um);Force (mN)", *rows(";"), "")]
@@ -178,19 +160,6 @@ def test_curves_under_headings_parts() -> None:
     assert found.properties == {"Curve": "a", "1.Curve": "a", "2.Curve": "b"}
     for block in found.blocks:
         the_curve(Contents((block,)), LABELLED)
-
-
-def test_large_text_read_apart_says() -> None:
-    """A large text that is read apart says the same."""
-    text = "\n".join(["Note;Depth (um);Force (mN)", *(f"x;{row}" for row in rows(";")), "", "x;1;2", "x;2;3"]).encode()
-    here = contents(text, "curves.txt")
-    with tempfile.TemporaryFile() as stream:
-        stream.write(text)
-        stream.flush()
-        apart = parse_apart("CSV", stream, "curves.txt")
-    assert isinstance(apart, Contents)
-    assert (apart.layout, apart.warnings) == (here.layout, here.warnings)
-    assert apart.blocks[0].group_starts == here.blocks[0].group_starts == (0, len(DEPTH))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from typing import Any
 import openpyxl
 import pytest
 
-from tests.recordings.contents_of_files import contents
 from tests.recordings.test_recordings_cells import ABOVE, HEADINGS, PLAIN, ROWS, changed, read
 from tests.support.cases import first
 from tests.support.instrument_files import CHARGE, FORCE
@@ -97,15 +96,6 @@ def test_wrong_sheet_named_csv() -> None:
     assert (error.place, "did you mean preload_n?" in error.reason) == ("sheet 'May', line 9, column 4", True)
 
 
-def test_cell_no_number_told_sheet_line() -> None:
-    """A cell that is no number is told with its sheet and line."""
-    table = cells(ROWS.replace("7.1", "7x1").replace("7.2", "x"))
-    reading = read_file(workbook({"May": [*cells(ABOVE + HEADINGS), *table]}), "palm.xlsx")
-    (problem,) = reading.problems
-    assert (problem.field, problem.value) == ("frf_re_pc_per_n[0]", "7x1")
-    assert problem.allowed == "must be a number (sheet 'May', line 10, column 7, and 1 more in this column)"
-
-
 def test_skin_sheet_table_next_campaign() -> None:
     """The skin on one sheet and the table on the next are one campaign."""
     table = cells(HEADINGS + ROWS)
@@ -117,11 +107,6 @@ def test_skin_sheet_table_next_campaign() -> None:
     assert error.place.startswith("sheet 'Skin' with sheet 'May' under it, line ")
     error = refusal(workbook({"Skin": cells(ABOVE), "May": table, "June": table}))
     assert "the table is missing" in error.reason
-
-
-def test_two_campaigns_in_a_workbook_are_named() -> None:
-    error = refusal(workbook({"May": cells(PLAIN), "June": cells(PLAIN)}))
-    assert error.reason == "holds a campaign on each of the sheets 'May', 'June': save each as a workbook"
 
 
 def test_formulas_count_value_kept() -> None:
@@ -182,32 +167,6 @@ def test_sheet_table_recording_name() -> None:
     assert told == [("monday s01", "s01", 1.0), ("monday s02", "s02", 2.5)]
     assert to_dict(reading.campaign)["recordings"][1]["force_n"] == pytest.approx(FORCE)
     assert any("sheet 'about' is left out: it holds no table" in warning for warning in reading.warnings)
-
-
-def test_text_decimal_comma_quotes_read() -> None:
-    """Text with a decimal comma and quotes is read."""
-    held = contents(workbook({"run": [["Force [N]", 'of "A"'], ["0,5", 1.5], [-2, "2,25"]]}), "run.xlsx")
-    (block,) = held.blocks
-    assert (block.name, [channel.name for channel in block.channels]) == ("run", ["Force [N]", 'of "A"'])
-    assert [channel.values.tolist() for channel in block.channels] == [[0.5, -2.0], [1.5, 2.25]]
-
-
-def test_hidden_sheets_are_left_out_and_told() -> None:
-    book = openpyxl.load_workbook(io.BytesIO(workbook({"May": cells(PLAIN), "old": cells(PLAIN)})))
-    book["old"].sheet_state = "hidden"
-    data = io.BytesIO()
-    book.save(data)
-    assert read_file(data.getvalue(), "palm.xlsx").warnings == ["sheet 'old' is hidden, and is left out"]
-
-
-def test_workbook_without_table_says_sheets_hold() -> None:
-    """A workbook without a table says what its sheets hold."""
-    error = refusal(workbook({"a": [["hello"]], "b": [["x", 1]]}))
-    assert "sheet 'a' holds no table" in error.reason
-    assert (
-        "sheet 'b' holds no table, two rows of at least two numbers each: line 1 holds most, 1: 'x\\t1'" in error.reason
-    )
-    assert refusal(workbook({"a": []})).reason == "has no sheet with anything in it"
 
 
 BOMB = b"<a>" + b" " * 30_000_000

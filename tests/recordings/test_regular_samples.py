@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.recordings.test_magnitude_and_phase import RIG
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import FileError
 from underskin.recordings import Reading, read_file, rig_description
 from underskin.recordings.campaign import FrfRecording, IndentationRecording
-from underskin.recordings.regular_samples import even_rate, evenly_sampled, sorted_spectrum
+from underskin.recordings.regular_samples import even_rate, evenly_sampled
 from underskin.units import Floats
 
 FREQUENCIES = np.array([10.0, 20.0, 40.0, 80.0, 160.0])
@@ -55,11 +55,6 @@ def test_readings_of_a_frequency_are_averaged(counts: list[int], down: bool, the
     reading = frf(order)
     assert_is_the_frf(reading)
     assert any("averaged" in note for note in reading.warnings) == (len(set(order)) < len(order))
-
-
-def test_the_average_is_of_all_readings() -> None:
-    reading = frf([0, 0, 0, 1, 2, 3, 4], {0: "6.5", 1: "7.0", 2: "7.5"})
-    assert_is_the_frf(reading)
 
 
 @pytest.mark.parametrize("order", [[*range(5), *range(5)], [0, 1, 2, 0, 1, 2, 3, 4], [*range(5)] * 8])
@@ -140,11 +135,6 @@ def test_an_uneven_clock_is_refused(change: str) -> None:
     }[change]
     with pytest.raises(ValueError, match="samples are not evenly spaced"):
         evenly_sampled({"force_n": np.ones(len(wrong))}, wrong)
-
-
-def test_spectrum_columns_of_other_lengths_are_left_to_the_checks() -> None:
-    columns = {"frequency_hz": np.array([2.0, 1.0]), "frf_re_pc_per_n": np.array([1.0])}
-    assert sorted_spectrum(columns) == (columns, [])
 
 
 def series(cells: dict[int, str]) -> Reading:
@@ -283,35 +273,3 @@ def test_a_pair_of_columns_for_each_sensor() -> None:
     assert found[1].frf_im_pc_per_n == pytest.approx([8, 8.5])
     with pytest.raises(FileError, match=r"lacks s02 \|H\|, s02 phase"):
         read_file(text.replace(b"s02", b"s03"), "wide.csv", rig_description.from_dict(WIDE))
-
-
-@pytest.mark.parametrize(
-    ("entries", "message"),
-    [
-        ([], "recordings = .*: must be a list of recordings"),
-        ("s01", "recordings = 's01': must be a list"),
-        ([{"sensor": "s01", "chanels": {}}], r"recordings\[0\]: recording.chanels"),
-        (
-            [*WIDE["recordings"], {"sensor": "s03", "channels": {"force": {"channel": "F"}}}],
-            r"recordings\[2\]: channels",
-        ),
-    ],
-)
-def test_wrong_entries_are_named(entries: Any, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        rig_description.from_dict({**WIDE, "recordings": entries})
-
-
-def test_a_complex_phase_is_refused() -> None:
-    text = b"f [Hz];M [pC/N];p [deg]\n10;7;1+2i\n20;7;1-2i\n"
-    fields_of = {"frequency_hz": "f", "frf_magnitude_pc_per_n": "M", "frf_phase_deg": "p"}
-    channels = {field: {"channel": name} for field, name in fields_of.items()}
-    with pytest.raises(FileError, match="a channel of complex numbers can only be"):
-        read_file(text, "frf.csv", rig_description.from_dict({**RIG, "channels": channels}))
-
-
-@pytest.mark.parametrize("times", ["1e308,-1e308,1e308", "0,0,0", "3,2,1", "0,1e300,2e300", "1,2", "5"])
-def test_times_that_are_no_clock(times: str) -> None:
-    time = np.array([float(cell) for cell in times.split(",")])
-    rate = even_rate(time)
-    assert rate is None or rate > 0

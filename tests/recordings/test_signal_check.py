@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bench.soak import SOAK
 from tests.recordings.known_signals import RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
 from underskin.errors import InvalidInput
 from underskin.recordings.frf.estimation import broadband, stepped_sine
@@ -168,7 +169,7 @@ def _whole(kind: str, random: np.random.Generator, samples: int) -> Floats:
 def test_clipped_before_noise_was_added(kind: str) -> None:
     """A rail with noise behind it is overload in either channel; signals that dwell at their extremes are whole."""
     clipped_pairs = seen = 0
-    for seed in range(20):
+    for seed in range(20 if SOAK else 12):
         random = np.random.default_rng(seed)
         force, gain = _whole(kind, random, 8192), 7.4
         noise = random.normal(0.0, 10 ** random.uniform(-3.0, -1.5), (2, len(force)))
@@ -218,7 +219,7 @@ def test_limited_tones_are_refused_with_the_reason() -> None:
 def test_skin_and_noise_limit_no_charge(kind: str, power: float) -> None:
     """A charge that goes as such a power of a force of 0.3 rms of its preload is whole behind noise of up to 9 %; one
     limited softly, hard or on one side behind the same noise is not."""
-    for seed in range(6):
+    for seed in range(6 if SOAK else 2):
         random = np.random.default_rng([seed, len(kind)])
         turns = 2 * np.pi * np.outer(random.uniform(0.002, 0.05, 7), np.arange(8192)) + random.uniform(0, 6, (7, 1))
         force = np.sin(turns).sum(axis=0) if kind == "tones" else _whole(kind, random, 8192)

@@ -219,13 +219,6 @@ def test_complex_numbers_in_a_cell(values: list[complex], form: str, separator: 
     assert frf.values == pytest.approx(np.array(values), rel=1e-12, abs=1e-9)
 
 
-@pytest.mark.parametrize("cell", ["1.2-3.4i extra", "(1.2,)", "1.2∠-30", "i", "1.2+i3", "1,2+3.4i", "1.2+3.4k"])
-def test_no_complex_number_is_refused(cell: str) -> None:
-    rows = "".join(f"{number};1.5-0.5i\n" for number in range(1, 6))
-    with pytest.raises(FileError, match="line 4: must be a row of 2 numbers"):
-        contents(f"f;H\n1;1+1i\n2;1+2i\n3;{cell}\n{rows}".encode(), "frf.csv")
-
-
 @given(st.integers(4, 30), st.integers(1, 28), st.sampled_from([",", ";", "\t"]))
 def test_shorter_columns_end_where_they_do(rows: int, helper: int, separator: str) -> None:
     """Columns beside the table that end before it have the numbers that they have."""
@@ -262,20 +255,6 @@ def test_several_tables_in_a_file(lengths: list[int], separator: str, blank: boo
     assert [found.properties[f"{number}.Curve"] for number in range(1, len(lengths) + 1)] == [
         str(number) for number in range(len(lengths))
     ]
-
-
-@pytest.mark.parametrize(
-    ("line", "name", "value"),
-    [
-        ("Force Constant, nN/nm:\t1.5", "Force Constant, nN/nm", "1.5"),
-        ("X, um: 25.0", "X, um", "25.0"),
-        ("Preload, N = 1.5", "Preload, N", "1.5"),
-        ('Operator,"Smith, J."', "Operator", "Smith, J."),
-    ],
-)
-def test_a_comma_in_the_name_of_a_property(line: str, name: str, value: str) -> None:
-    found = contents(f"{line}\n\nDepth [mm],Force [N]\n0,1\n1,2\n2,3\n".encode(), "run.csv")
-    assert found.properties[name] == value
 
 
 @given(

@@ -12,7 +12,7 @@ from tests.support.instrument_files import COMMON
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.readers.unit_labels import contradicts, labelled_unit, meanings, unit
+from underskin.recordings.readers.unit_labels import labelled_unit, meanings, unit
 from underskin.recordings.reading import Reading
 from underskin.recordings.rig_description import RigDescription
 
@@ -145,40 +145,11 @@ def test_end_name_no_label_against_rig(heading: str) -> None:
         np.testing.assert_allclose(force_of(reading), FORCE * newtons, rtol=1e-9)
 
 
-def test_unit_prefixes_no_contradiction() -> None:
-    """One unit by other prefixes is no contradiction."""
-    assert not contradicts("mN/µm", "N/mm", "Stiffness (mN/µm)", "force/length")
-    assert contradicts("mN/µm", "N/m", "Stiffness (mN/µm)", "force/length")
-
-
 @pytest.mark.parametrize("heading", ["F_mN", "Force lbs", "Force mV", "Force / V", "Force (V)", "Force dB"])
 def test_end_name_unit_contradicts_rig(heading: str) -> None:
     """The end of a name that is a unit contradicts the rig."""
     with pytest.raises(FileError, match=r"is labelled '.*', but the rig description says 'N'"):
         read_file(tdms(heading, ""), "a.tdms", rig({"channel": heading, "unit": "N"}))
-
-
-def test_letters_no_unit_every_meaning() -> None:
-    """Letters of no unit have every meaning of them.
-
-    MHZ may be mHz or MHz: it contradicts neither, and alone it says nothing.
-    """
-    assert {known.to_si for known in meanings("MHZ")} == {1e-3, 1e6}
-    assert unit("MHZ") is None
-    assert unit("MPA") == unit("MPa")
-
-
-@pytest.mark.parametrize(
-    ("heading", "label"),
-    [
-        ("Force [lbs] (filtered)", "lbs"), ("Force lbs", "lbs"), ("Kraft / mN", "mN"), ("Load: N", "N"),
-        ("FRF dB", "dB"), ("|H| dB re 1 pC/N", "dB"), ("Magnitude_dB", "dB"), ("FRF pC/N", "pC/N"),
-        ("Channel A", ""), ("Force max", ""),
-        ("Load min", ""), ("Sensor C", ""), ("Mag ((pC)/N)", "(pC)/N"), ("Time in sec", "sec"),
-    ],
-)  # fmt: skip
-def test_a_heading_says_its_unit(heading: str, label: str) -> None:
-    assert labelled_unit(heading) == label
 
 
 SPECTRUM = "Frequency (Hz);{};Phase ({})\n" + "\n".join(f"{5 * n};{17.4 + 0.01 * n};-0.1" for n in range(1, 9))
@@ -214,16 +185,6 @@ def test_decibels_are_refused() -> None:
         spectrum("Magnitude", sign="-")
 
 
-def test_a_phase_in_other_angles_is_refused() -> None:
-    with pytest.raises(FileError, match="is labelled 'rad', but the rig description says 'deg'"):
-        spectrum("Magnitude (pC/N)", "rad", phase="deg")
-    reading = spectrum("Magnitude (pC/N)", "radians")
-    (recording,) = reading.campaign.recordings
-    assert isinstance(recording, FrfRecording)
-    assert recording.frf_im_pc_per_n is not None
-    assert recording.frf_im_pc_per_n[0] == pytest.approx(17.41 * np.sin(-0.1))
-
-
 @pytest.mark.parametrize("formula", [True, False])
 def test_frf_volts_per_newton_becomes_charge(formula: bool) -> None:
     """An frf in volts per newton becomes charge by the amplifier.
@@ -243,13 +204,6 @@ def test_frf_volts_per_newton_becomes_charge(formula: bool) -> None:
 
 
 PARTS = {"frf_re_pc_per_n": "Re", "frf_im_pc_per_n": "Im"}
-
-
-def test_rate_file_states_otherwise_told() -> None:
-    """A rate that the file states otherwise is told."""
-    force = {"channel": "Force", "unit": "N"}
-    reading = read_file(lvm("N"), "a.lvm", rig(force, recording={**COMMON, "sample_rate_hz": 500}))
-    assert "the file states 1000 samples a second; the rig description 500, which counts" in reading.warnings
 
 
 @pytest.mark.parametrize(

@@ -188,13 +188,6 @@ def test_objects_of_matlab_are_refused_with_what_exports_them(data: bytes, expor
         contents(data, "run.mat")
 
 
-def test_an_object_beside_numbers_is_left_out() -> None:
-    data = with_class({"force": FORCE, "amplifier": CHARGE}, "timetable")
-    found = contents(data, "run.mat")
-    assert [channel.name for channel in found.blocks[0].channels] == ["amplifier", "force"]
-    assert any("'data' is a MATLAB timetable" in warning for warning in found.warnings)
-
-
 @pytest.mark.parametrize("kind", [np.int16, np.int32, np.uint8, np.float32])
 def test_sound_files(kind: Any) -> None:
     """A recorder's channels are parts of its full scale, which the rig description makes quantities."""
@@ -210,20 +203,6 @@ def test_sound_files(kind: Any) -> None:
     precision = {np.uint8: 4 / 100, np.int16: 1e-3}.get(kind, 1e-6)
     assert recording.force_n == pytest.approx(FORCE, abs=precision)
     assert recording.charge_pc == pytest.approx(CHARGE, abs=precision)
-
-
-def test_a_sound_file_without_samples_is_refused() -> None:
-    with pytest.raises(FileError, match="holds no samples"):
-        contents(wav(np.zeros(0), np.int16), "run.wav")
-
-
-def test_cells_of_structures_and_numbers_are_left_out() -> None:
-    """A cell array that mixes them does not keep the channels beside it from being read."""
-    mixed = np.empty(2, dtype=object)
-    mixed[:] = [{"gain": 2.0}, FORCE]
-    found = contents(matlab_5({"notes": mixed, "force": FORCE}), "run.mat")
-    assert [channel.name for channel in found.blocks[0].channels] == ["force"]
-    assert any(warning.startswith("'notes': no numbers") for warning in found.warnings)
 
 
 @pytest.mark.parametrize(

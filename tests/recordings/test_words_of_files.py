@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from tests.support.instrument_files import matlab_5, numpy_file, plain_hdf5
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import FileError
 from underskin.recordings import Reading, read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import stepped_sine
 
 RATE = 2000.0
 TIME = np.arange(400) / RATE
@@ -125,6 +124,7 @@ def test_a_spread_is_not_the_quantity(other: str) -> None:
         read(f"{without}\n{table}")
 
 
+@pytest.mark.usefixtures("understood_here")
 @pytest.mark.parametrize("write", [numpy_file, matlab_5, plain_hdf5])
 @pytest.mark.parametrize(("name", "value"), [("fs", RATE), ("Fs", RATE), ("sampling_rate", RATE), ("dt", 1 / RATE)])
 def test_rate_that_an_array_has_beside_it(write: Callable[[Any], bytes], name: str, value: float) -> None:
@@ -171,13 +171,3 @@ def test_date_of_a_column(written: str, mark: str, time: str | None) -> None:
     assert reading.problems == []
     notes = [warning for warning in reading.warnings if written in warning and "left out" in warning]
     assert len(notes) == (time is None)
-
-
-def test_overloaded_charge_is_named() -> None:
-    """A charge that is clipped in every cycle is named, and not the force."""
-    time = np.arange(4000) / RATE
-    force = 1 + 0.05 * np.sin(2 * np.pi * 10 * time)
-    with pytest.raises(InvalidInput) as refused:
-        stepped_sine(force, np.clip(7.4 * (force - 1), -0.2, 0.2), RATE)
-    assert refused.value.field == "charge_pc"
-    assert "overload" in str(refused.value)

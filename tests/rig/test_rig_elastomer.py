@@ -14,7 +14,6 @@ from rig.visible_curves import visibility
 from underskin.recordings import campaign as campaigns
 
 E_MPA, R_MM = 0.5, 2.5
-LOCKING = {"coefficient": 15.0, "law": "limited"}
 INDENTATION: dict[str, dict[str, Any]] = {
     "layered_contact": {},
     "adhesion": {"work_j_per_m2": 1.0, "work_of_separation_j_per_m2": 2.0},

@@ -1,18 +1,13 @@
 """What the instrument writes: zeros, drift, gain, steps; the textbook case; visibility against an independent fit."""
 
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from typer.testing import CliRunner
 
-from rig.commands import rig as command
 from rig.description import parse
 from rig.elastomer import RecordedCurve, campaign_of_curves, record_curves
-from rig.errors import RigError
 from rig.reading import document
 from rig.truth import truth_of_curves
 from rig.visible_curves import visibility
@@ -112,34 +107,3 @@ def test_pair_weighed_beside() -> None:
     assert truth["chi2_gain_of_each"]["adhesion"] > 1000
     assert truth["chi2_gain_of_each"]["instrument_compliance"] < 30  # so stiff a frame does not show
     assert not truth["every_effect_identifiable"]
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        (
-            {"adhesion": {"work_j_per_m2": 0.4, "work_of_separation_j_per_m2": 0.1}},
-            "must be at least work_j_per_m2, 0.4",
-        ),
-        ({"contact_creep": {"fraction": 0.4, "time_s": 1.0, "fraction_2": 0.1}}, "required with fraction_2"),
-        ({"contact_creep": {"fraction": 0.6, "time_s": 1.0, "fraction_2": 0.4, "time_2_s": 9.0}}, "must leave 0.05"),
-    ],
-)
-def test_parameters_exclude_rejected(values: dict[str, Any], message: str) -> None:
-    """Parameters that exclude each other are rejected."""
-    with pytest.raises(RigError, match=message):
-        textbook(values)
-
-
-def test_drawn_raw_curves_seed(tmp_path: Path) -> None:
-    """Drawn raw curves are the same for the same seed."""
-    for name in ("a", "b"):
-        arguments = ["draw", "--output-dir", str(tmp_path / name), "--count", "1", "--seed", "3"]
-        answer = CliRunner().invoke(command, [*arguments, "--kind", "indentation", "--what", "single"])
-        assert answer.exit_code == 0, answer.output
-    first, again = (
-        {path.name: path.read_bytes() for path in sorted((tmp_path / name).rglob("*.json"))} for name in ("a", "b")
-    )
-    assert first == again
-    assert set(first) == {"0000.json", "truth.json"}
-    campaigns.parse(json.loads(first["0000.json"]))

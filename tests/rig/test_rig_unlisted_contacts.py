@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from rig.unlisted.contact_pressure import adhesive_contact, force_over_hertz, layered_contact
 from rig.unlisted.elastic_layer import layer_transfer
 from rig.unlisted.layer import base_stress, hertz_radius, hertz_transform, punch_transform, sigma, transfer
 from tests.support.oracle import oracle_rows
-
-Array = npt.NDArray[np.float64]
 
 
 def test_bonded_incompressible_layer_closed_form() -> None:

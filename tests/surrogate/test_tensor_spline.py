@@ -89,6 +89,7 @@ np.testing.assert_array_equal([answer.rel_error for answer in one_by_one], compi
 """
 
 
+@pytest.mark.slow
 def test_a_single_value_is_the_batch_s_bit_for_bit() -> None:
     """Without compiled code, at nodes and ends of the table too."""
     subprocess.run([sys.executable, "-c", _ONE_BY_ONE], check=True)
