@@ -167,20 +167,6 @@ def test_a_page_of_the_same_name_may_post(proxy: tuple[httpx.Client, int], origi
     assert ask(client, "POST", "/v1/sigma", json=columns, headers={"Origin": origin}).status_code == status
 
 
-def test_the_services_body_limit_rules(proxy: tuple[httpx.Client, int]) -> None:
-    client, _ = proxy
-    columns = {"a_over_h": [0.3] * 300_000, "rt_over_h": 0.6}
-    answer = ask(client, "POST", "/v1/sigma", json=columns)
-    assert answer.status_code == 413
-    assert answer.headers["Content-Type"] == "application/problem+json"
-
-
-def test_a_batch_under_the_limit_passes(proxy: tuple[httpx.Client, int]) -> None:
-    client, _ = proxy
-    answer = ask(client, "POST", "/v1/sigma", json={"a_over_h": [0.3] * 100_000, "rt_over_h": 0.6})
-    assert len(answer.json()["sigma"]) == 100_000
-
-
 def too_large(answer: httpx.Response) -> dict[str, Any]:
     """The problem that both nginx and the service answer where a body is too large."""
     assert (answer.status_code, answer.headers["Content-Type"]) == (413, "application/problem+json")

@@ -116,27 +116,6 @@ def test_a_restart_opens_nothing(place: Place) -> None:
 
 
 @on_sqlite
-def test_file_keys_put_noted_server_runs(place: Place, tmp_path: Path) -> None:
-    """A file of keys that was put there is noted while the server runs."""
-    other = Place(tmp_path / "other")
-    make_key(other)
-    with running(place, **QUIET) as server:
-        shutil.copy(other.folder / "keys.json", place.folder)
-        assert status_in_time(server, 401) == 401
-        time.sleep(0.6)
-    (place.folder / "keys.json").unlink()
-    with running(place, **QUIET) as server:
-        assert_closed(server)
-
-
-@on_sqlite
-def test_the_help_says_what_open_cannot_know(place: Place) -> None:
-    said = " ".join(place.command("key", "open", "--help").stdout.split())
-    assert "other machines reach" in said
-    assert "cannot know" in said
-
-
-@on_sqlite
 def test_other_machines_need_a_key_all_the_same(place: Place) -> None:
     token = make_key(place)
     with running(place, key=token, UNDERSKIN_HOSTS="skin.example.org", **QUIET) as server:

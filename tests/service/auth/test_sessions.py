@@ -14,7 +14,6 @@ import pytest
 from service.auth.keys import Key, KeyStore
 from service.auth.session import COOKIE, logged_in
 from service.auth.sessions import Sessions
-from service.pages.start.sessions import browser_name
 from service.store import database, open_store
 from service.store import sessions as noted
 from service.store.engine import SQLITE_FILE
@@ -65,53 +64,6 @@ def listed(place: Place) -> dict[str, list[str]]:
     """What the command line lists, by the browser's name: id, key, start, end, address."""
     rows = [line.split("\t") for line in place.command("key", "sessions").stdout.splitlines()]
     return {row[5]: row[:5] for row in rows}
-
-
-@pytest.mark.parametrize(
-    ("user_agent", "name"),
-    [
-        ("Mozilla/5.0 (X11; Linux x86_64; rv:140.0) Gecko/20100101 Firefox/140.0", "Firefox 140 on Linux"),
-        (
-            (
-                "Mozilla/5.0 (Windows NT 10.0; Win64; x64) AppleWebKit/537.36 (KHTML, like Gecko) "
-                "Chrome/138.0.0.0 Safari/537.36 Edg/138.0.0.0"
-            ),
-            "Edge 138 on Windows",
-        ),
-        (
-            (
-                "Mozilla/5.0 (Linux; Android 10; K) AppleWebKit/537.36 (KHTML, like Gecko) Chrome/138.0.0.0 Mobile "
-                "Safari/537.36"
-            ),
-            "Chrome 138 on Android",
-        ),
-        (
-            (
-                "Mozilla/5.0 (Macintosh; Intel Mac OS X 10_15_7) AppleWebKit/605.1.15 (KHTML, like Gecko) Version/18.5 "
-                "Safari/605.1.15"
-            ),
-            "Safari 18 on macOS",
-        ),
-        (
-            (
-                "Mozilla/5.0 (iPhone; CPU iPhone OS 18_5 like Mac OS X) AppleWebKit/605.1.15 (KHTML, like Gecko) "
-                "Version/18.5 Mobile/15E148 Safari/604.1"
-            ),
-            "Safari 18 on iOS",
-        ),
-        (
-            (
-                "Mozilla/5.0 (X11; Linux x86_64) AppleWebKit/537.36 (KHTML, like Gecko) "
-                "HeadlessChrome/138.0.0.0 Safari/537.36"
-            ),
-            "Chrome 138 on Linux",
-        ),
-        ("curl/8.14.1", "curl/8.14.1"),
-        ("", ""),
-    ],
-)
-def test_browsers_are_named(user_agent: str, name: str) -> None:
-    assert browser_name(user_agent) == name
 
 
 def post(browser: httpx.Client, path: str) -> int:

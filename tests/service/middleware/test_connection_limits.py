@@ -110,13 +110,6 @@ def test_a_body_that_trickles_is_given_up(server: Server, path: str, drip: bytes
     assert is_well(server)
 
 
-def test_who_is_given_up_is_told(server: Server) -> None:
-    with connect(server) as connection:
-        connection.sendall(BODY.encode())
-        status, headers, _ = read_answer(connection)
-    assert (status, headers["connection"]) == (408, "close")
-
-
 def test_body_goes_taken_however_long_takes(server: Server) -> None:
     """A body that goes on is taken however long it takes."""
     body = json.dumps({"a_over_h": 0.3, "rt_over_h": 0.6}).encode().ljust(60_000)
@@ -170,14 +163,6 @@ def test_the_length_of_headers_is_a_setting(server: Server, request_of: Callable
         connection.sendall(request_of(9000).encode())
         assert read_answer(connection)[0] == 400
     assert httpx.get(f"{server.url}/health", headers={"X-Long": "k" * 7000}).status_code == 200
-
-
-def test_headers_request_follows_once_long(server: Server) -> None:
-    """The headers of a request that follows at once are as long at most."""
-    request = f"GET /health HTTP/1.1\r\n{HEAD}\r\n"
-    with reaching(server, "header_size"), connect(server) as connection:
-        connection.sendall(f"{request}GET /health HTTP/1.1\r\n{HEAD}X-Long: {'k' * 9000}\r\n\r\n".encode())
-        seconds_until_closed(connection, b"")
 
 
 def opened(server: Server, count: int, begun: str, stack: ExitStack) -> Sequence[socket.socket]:

@@ -29,11 +29,6 @@ def test_head_has_the_headers_of_get_and_no_body(http: httpx.Client, path: str) 
         assert asked.headers.get(name) == whole.headers.get(name)
 
 
-def test_head_takes_post_alone_refused(http: httpx.Client) -> None:
-    """Head of what takes post alone is refused."""
-    assert http.head("/umbridge/Evaluate").status_code == 405
-
-
 def test_every_route_refuses_in_the_same_shape(http: httpx.Client) -> None:
     for method, path in all_routes(http):
         problem_of(http.request(method, path, headers={"Host": "evil.example"}), 421)
@@ -122,31 +117,11 @@ def test_slip_units_guessed_meant(http: httpx.Client, field: str, value: float, 
     assert http.post("/v1/frf", json={**fields, "units_checked": True}).status_code == 200
 
 
-def test_unequal_columns_are_both_named(http: httpx.Client) -> None:
-    answer = http.post("/v1/sigma", json={"a_over_h": [0.3, 0.6], "rt_over_h": [0.1, 0.2, 0.3]})
-    detail = problem_of(answer, 422)["detail"]
-    assert "a_over_h" in detail
-    assert "rt_over_h" in detail
-
-
 def test_skin_without_adopted_model_not_found(http: httpx.Client) -> None:
     """A skin without an adopted model is not found."""
     for path, good in (("/v1/frf", FRF), ("/v1/d33", D33)):
         answer = http.post(path, json={**good, "model": "adopted", "skin_id": "palm-3"})
         assert "'palm-3' has no adopted model" in problem_of(answer, 404)["detail"]
-
-
-@pytest.mark.parametrize("query", ["a_over_h=-1&rt_over_h=1", "a_over_h=nan&rt_over_h=1", "a_over_h=1&rt_over_h=inf"])
-def test_wrong_value_in_a_query(http: httpx.Client, query: str) -> None:
-    (error,) = problem_of(http.get(f"/v1/sigma?{query}"), 422)["errors"]
-    assert error["field"] in query
-
-
-@pytest.mark.parametrize(
-    "query", ["", "a_over_h=1", "a_over_h=1&rt_over_h=", "a_over_h=1&rt_over_h=x", "a_over_h=1&rt_over_h=1&load=0.1"]
-)
-def test_query_that_is_not_understood(http: httpx.Client, query: str) -> None:
-    assert problem_of(http.get(f"/v1/sigma?{query}"), 422)["errors"]
 
 
 @pytest.mark.parametrize(
@@ -167,37 +142,6 @@ def test_query_that_is_not_understood(http: httpx.Client, query: str) -> None:
 def test_csv_that_is_not_understood(http: httpx.Client, body: bytes, status: int, says: str) -> None:
     answer = http.post("/v1/sigma", content=body, headers={"Content-Type": "text/csv"})
     assert says in problem_of(answer, status)["detail"]
-
-
-def test_rows_spreadsheet_come_back_called(http: httpx.Client) -> None:
-    """Rows of a spreadsheet come back with what they are called.
-
-    Semicolons, decimal commas and a column of words, as German spreadsheets have them.
-    """
-    body = b"sep=;\r\nPress;a_over_h;rt_over_h\r\nerste;0,3;0,6\r\nzweite;0,4;0,6\r\n"
-    headers = {"Content-Type": "text/csv", "Accept": "text/csv"}
-    header, *rows = http.post("/v1/sigma", content=body, headers=headers).text.splitlines()
-    assert header.startswith("Press,sigma,")
-    assert [row.split(",")[0] for row in rows] == ["erste", "zweite"]
-    plain = http.post("/v1/sigma", json={"a_over_h": [0.3, 0.4], "rt_over_h": 0.6}).json()
-    sigma = header.split(",").index("sigma")
-    assert [float(row.split(",")[sigma]) for row in rows] == pytest.approx(plain["sigma"], rel=1e-15)
-
-
-def test_what_csv_cannot_tell_is_said(http: httpx.Client) -> None:
-    fields = {**FRF, "preload_n": 1.0, "frequency_hz": 10.0}
-    body = ",".join(fields) + "\n" + ",".join(map(str, fields.values()))
-    answer = http.post("/v1/frf", content=body, headers={"Content-Type": "text/csv"})
-    (error,) = problem_of(answer, 422)["errors"]
-    assert error["field"] == "frequency_hz"
-    assert "application/json" in error["allowed"]
-
-
-def test_values_too_large_double_outside(http: httpx.Client) -> None:
-    """Values too large for a double are outside not a failure."""
-    answer = http.post("/v1/frf", json={**FRF, "preload_n": [1.0, 1e308], "units_checked": True})
-    assert answer.status_code == 200
-    assert answer.json()["status"] == ["ok", "out_of_domain"]
 
 
 def test_nobody_expected_problem_traceback_log(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -1,7 +1,6 @@
 """Two campaigns side by side: the same colours, the difference and what of it is beyond chance."""
 
 import csv
-import html
 import re
 import time
 from collections.abc import Sequence
@@ -10,7 +9,6 @@ from dataclasses import replace
 import pytest
 from playwright.sync_api import Page
 
-from service.pages.compare.page import drawn_maps
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.support import store_server
@@ -125,10 +123,6 @@ def test_a_sensor_that_was_dead_differs_in_charge(server: Server) -> None:
     assert "nan" not in re.findall(r'class="result lead".*?</p>', text, re.DOTALL)[0]
 
 
-def test_nothing_to_compare_is_said(server: Server) -> None:
-    assert server.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
-
-
 def test_first_recorded_first_however_late(server: Server) -> None:
     """First is the one recorded first however late it arrives."""
     ids = {}
@@ -181,32 +175,6 @@ def test_two_skins_without_sensor_common_say(server: Server) -> None:
     assert said == f"sensors are matched by their ids, and the first has s0, s1, the second {named} and 3 more."
     alike = server.http.get("/compare", params={"first": ids["left"], "second": ids["left"]}, headers=BROWSING).text
     assert "No sensor is in both" not in alike
-
-
-@pytest.mark.soak
-def test_campaigns_offered_compared_pages(server: Server) -> None:
-    """Of more campaigns than are offered the others are compared from their pages."""
-    many = [store_server.campaign(f"day {number}", sensors=1, lines=3) for number in range(202)]
-    for number, document in enumerate(many):
-        (recorded, _) = document["recordings"]
-        recorded["recorded_at"] = f"20{number // 12:02d}-{number % 12 + 1:02d}-03T09:00:00Z"
-        document["recordings"] = [recorded]
-    kept = server.http.post("/v1/campaigns?skin=long", json=many).raise_for_status().json()["campaigns"]
-    text = server.http.get("/compare?skin=long", headers=BROWSING).text
-    assert "The 200 campaigns recorded last of this skin are offered" in text
-    second = kept[1]["id"]
-    assert second not in text
-    page = server.http.get(f"/campaigns/{second}", headers=BROWSING).text
-    (place,) = re.findall(r'href="(/compare[^"]*)"', page)
-    chosen = server.http.get(html.unescape(place), headers=BROWSING).text
-    assert re.findall(r'value="([^"]*)" selected', chosen) == [second, kept[-1]["id"]]
-
-
-def test_sensors_without_d33_leave_nothing_draw() -> None:
-    """Sensors without d33 leave nothing to draw."""
-    nothing = dict.fromkeys(("d33_pc_per_n", "d33_uncertainty_pc_per_n"))
-    rows = [{"sensor": "s0", "first_pc_per_n": None, "second_pc_per_n": None}]
-    assert drawn_maps([], [{"sensors": [{"sensor": "s0", **nothing}]}] * 2, rows) == []
 
 
 def one_sensor(number: int) -> dict[str, object]:
@@ -292,17 +260,6 @@ def test_kinds_campaigns_offered(server: Server) -> None:
     assert server.http.get("/compare?kind=tension", headers=BROWSING).status_code == 422
 
 
-def test_map_grey_campaign(server: Server) -> None:
-    """A map is grey where that of its campaign is."""
-    ids = [sent(server, to_dict(campaign(BEFORE, table())) | {"name": f"alike {number}"}, "alike") for number in (1, 2)]
-    own = server.http.get(f"/campaigns/{ids[0]}", headers=BROWSING).text
-    beside = server.http.get("/compare?skin=alike", headers=BROWSING).text
-    told = re.search(r"[^.<]*differ from the others beyond chance[^.<]*", own)
-    assert told is not None
-    captions = re.findall(r"<figcaption.*?</figcaption>", beside, re.DOTALL)
-    assert [told[0] in caption for caption in captions] == [True, True, False, False]
-
-
 def test_discarded_campaign_not_counted_start(server: Server) -> None:
     """A discarded campaign is not counted at the start."""
     kept = [sent(server, one_sensor(number), "counted") for number in (2, 3)]
@@ -312,11 +269,3 @@ def test_discarded_campaign_not_counted_start(server: Server) -> None:
         start = server.http.get("/?find=counted", headers=BROWSING).text
         assert f'<td class="figures" data-label="Campaigns">{count}</td>' in start
     assert "none in use" in start
-
-
-def test_start_tells_time_arrival_recording(server: Server) -> None:
-    """The start tells a time of arrival from one of recording."""
-    sent(server, one_sensor(4), "arrived")
-    sent(server, block("pressed", recorded_at="2021-01-01T00:00:00Z"), "recorded")
-    assert '<span class="quiet">received <time' in server.http.get("/?find=arrived", headers=BROWSING).text
-    assert '<span class="quiet"><time' in server.http.get("/?find=recorded", headers=BROWSING).text

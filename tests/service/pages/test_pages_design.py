@@ -2,14 +2,12 @@
 
 import re
 
-import numpy as np
 import pytest
 from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
 from tests.support.cases import first
 from tests.support.store_server import Server
-from underskin.figures.design import design_region
 
 
 def cell(visitor: Visit, name: str, column: str) -> str:
@@ -61,12 +59,6 @@ def test_design_pinned_moves_beside(visitor: Visit) -> None:
     expect(page.get_by_role("heading", name="A, pinned")).to_have_count(0)
 
 
-def test_a_large_change_is_a_plain_number(server: Server) -> None:
-    text = server.http.get("/design?preload_n=25&pin=preload_n%3D1", headers={"Accept": "text/html"}).text
-    assert "+2400 %" in text
-    assert "e+0" not in text
-
-
 def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
     answer = server.http.get("/design?pin=pitch_mm%3D1", headers={"Accept": "text/html"})
     assert answer.status_code == 200
@@ -98,12 +90,6 @@ def test_material_gives_number_leaves(visitor: Visit) -> None:
     assert told.last.inner_text() == "PVDF film"
 
 
-def test_an_unknown_material_is_refused(server: Server) -> None:
-    answer = server.http.get("/design?material=cheese", headers={"Accept": "text/html"})
-    assert answer.status_code == 422
-    assert "material" in answer.text
-
-
 def test_asked_searched_offered_leads_design(visitor: Visit) -> None:
     """What is asked is searched and what is offered leads to its design."""
     page = visitor.page
@@ -122,28 +108,6 @@ def test_asked_searched_offered_leads_design(visitor: Visit) -> None:
     apart = float(page.locator("[data-result=apart] b").inner_text().split()[0])
     assert apart <= 3.5
     assert float(page.locator("#pitch_mm").input_value()) == pitch
-
-
-@pytest.mark.soak
-def test_where_no_skin_does_the_limit_is_named(visitor: Visit) -> None:
-    page = visitor.page
-    visitor.go("/design/search?thinnest_mm=3")
-    expect(page.get_by_role("heading", name="that were tried meets it")).to_be_visible()
-    expect(page.get_by_text("The thinnest layer that can be made: none of them that does the rest")).to_be_visible()
-    visitor.drawn(1)
-    fits_and_is_accessible(visitor)
-    page.get_by_label("thinnest layer").fill("thick")
-    page.get_by_role("button", name="Search").click()
-    expect(page.get_by_role("alert")).to_contain_text("thinnest layer that can be made [mm]: thick – must be a number")
-    assert page.get_by_label("thinnest layer").input_value() == "thick"
-
-
-@pytest.mark.parametrize(("pitches", "ends"), [((0.8, 0.95), (0.8, 0.95)), ((0.9, 0.901), (0.95 * 0.901, 0.901))])
-def test_colours_map_span_pitches_shown(pitches: tuple[float, float], ends: tuple[float, float]) -> None:
-    """Colours of the map span the pitches that are shown."""
-    pitch = np.array([[*pitches, np.nan, 5.0]])
-    figure = design_region(np.ones(4), np.ones(1), pitch, pitch, np.array([[True, True, False, False]]), [])
-    assert (figure.data[2].zmin, figure.data[2].zmax) == pytest.approx(ends)
 
 
 def test_the_map_of_skins_comes_as_numbers(server: Server) -> None:

@@ -6,54 +6,15 @@ from xml.etree import ElementTree
 import pytest
 from playwright.sync_api import expect
 
-import underskin
 from service.store import database, diagnosed_together, diagnoses
 from service.usecases.mechanism_findings import findings
 from tests.service.pages.conftest import Visit
-from tests.service.routes.test_mechanisms import WARM, warmed
+from tests.service.routes.test_mechanisms import WARM
 from tests.support.cases import first
 from tests.support.diagnosed import diagnosed, report, resonant, sent, table
-from tests.support.lean_reports import beside
 from tests.support.store_server import Server
 from underskin import __version__
 from underskin.mechanisms.registry import built_in
-from underskin.recordings.campaign import parse
-
-
-@pytest.mark.soak
-def test_law_kept_diagnosis_campaign_diagnosed(visitor: Visit, server: Server) -> None:
-    """A law is kept from its diagnosis and the campaign diagnosed with and without it."""
-    page = visitor.page
-    found = underskin.diagnose(parse(warmed()), table(), without=beside())
-    _, diagnosis_id = diagnosed(server, warmed(), dict(found.document), "warmed")
-    visitor.go(f"/diagnoses/{diagnosis_id}")
-    page.get_by_role("heading", name="Keep this law under a name").wait_for()
-    page.get_by_label("Name", exact=False).first.fill("Warm Amplifier")
-    page.get_by_role("button", name="Keep it").click()  # which the browser refuses: capitals and a blank
-    page.get_by_label("Name", exact=False).first.fill("warm_amplifier")
-    page.get_by_label("What it is").fill("The gain follows the temperature.")
-    page.get_by_role("button", name="Keep it").click()
-    page.wait_for_url("**/mechanisms")
-    own = page.get_by_role("region", name="The lab's own")
-    expect(own.get_by_role("heading", name="Warm amplifier")).to_be_visible()
-    expect(own.get_by_text("The gain follows the temperature.", exact=True)).to_be_visible()
-    expect(page.get_by_role("row", name="adhesion")).to_be_visible()
-    _require_accessible_at_both_widths(visitor)
-
-    own_law = {**report()["mechanisms"][0], "name": "warm_amplifier"}
-    named = {**report(), "mechanisms": [own_law]}
-    _, diagnosis_id = diagnosed(server, {**warmed(), "name": "again"}, named, "warmed")
-    visitor.go(f"/diagnoses/{diagnosis_id}")
-    page.get_by_role("heading", name="Suppose that it is not").wait_for()
-    _require_accessible_at_both_widths(visitor)
-    page.get_by_role("button", name="Without warm amplifier").click()
-    page.get_by_text("Supposed that it is not warm amplifier").wait_for()
-    page.get_by_role("button", name="Cancel").click()
-    page.get_by_text("It was cancelled").wait_for()
-
-    page.get_by_role("link", name="Mechanisms", exact=True).click()
-    page.get_by_role("button", name="Discard warm amplifier").click()
-    expect(page.get_by_text("There is none yet.")).to_be_visible()
 
 
 def _require_accessible_at_both_widths(visitor: Visit) -> None:

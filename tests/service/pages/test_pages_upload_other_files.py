@@ -68,46 +68,6 @@ def test_shaker_s_file_not_read_settings_force(visitor: Visit) -> None:
     expect(page.get_by_text("less 3")).to_have_count(0)
 
 
-@pytest.mark.soak
-def test_files_two_instruments_say_channels(visitor: Visit) -> None:
-    """Files of two instruments say which channels are whose and what will not be kept."""
-    page = visitor.page
-    curve = file("afm.txt", text_of_raw_curve(above="# both"))
-    look_at(visitor, [file("shaker.tdms", shaker()), curve])
-    expect(page.get_by_text("These files differ in their channels.")).to_be_visible()
-    channels = page.get_by_role("region", name="Channels")
-    expect(channels.get_by_role("row", name="Charge")).to_contain_text("only in shaker.tdms")
-    expect(channels.get_by_role("row", name="Height (nm)")).to_contain_text("only in afm.txt")
-    files = page.get_by_role("region", name="Files")
-    expect(files.get_by_role("row", name="afm.txt")).to_contain_text("what its channels are is not said yet")
-    visitor.require_accessible()
-
-    look_at(visitor, [file("good.json", as_json(campaign("whole", id="both"))), curve])
-    lost = page.get_by_role("region", name="What will not be kept")
-    expect(lost).to_contain_text("afm.txt, the whole file: nobody has said yet what its channels are")
-    expect(page.get_by_label("Name of the campaign")).to_have_value("good.json")
-    lost.get_by_role("link", name="afm.txt").click()
-    expect(page.get_by_role("heading", name="afm.txt")).to_be_visible()
-    expect(page.get_by_text("What the channels are")).to_be_visible()
-    expect(page.get_by_text("These files differ")).to_have_count(0)  # one file alone has channels
-    visitor.require_accessible()
-
-
-@pytest.mark.soak
-def test_rig_description_cannot_used_named(visitor: Visit) -> None:
-    """A rig description that cannot be used is named and not what was typed."""
-    page = visitor.page
-    curve = file("afm.txt", text_of_raw_curve(above="# rig"))
-    look_at(visitor, [curve], rig="schema: rig/1\nkind: indentation\n")
-    alert = page.get_by_role("alert")
-    expect(alert).to_contain_text("The rig description rig.yaml cannot be used: put it right and send it again, or say")
-    expect(alert).not_to_contain_text("What you typed")
-    fill_in(page)
-    page.get_by_label("Formula of derived channel 1", exact=True).fill("depth +")
-    read_it(page)
-    expect(alert).to_contain_text("What you typed is still in the form")
-
-
 def test_second_file_instrument_says_read_start(visitor: Visit) -> None:
     """A second file of the instrument says what it is read by and can start without."""
     page = visitor.page
@@ -122,21 +82,6 @@ def test_second_file_instrument_says_read_start(visitor: Visit) -> None:
     expect(page.get_by_role("form", name="Read as before")).to_have_count(0)
     expect(page.get_by_label(RAW)).to_have_value("")
     expect(page.get_by_label("Formula of derived channel 1", exact=True)).to_have_value("")
-
-
-@pytest.mark.soak
-def test_typed_value_counts_property(visitor: Visit) -> None:
-    """A typed value counts for more than a property."""
-    page = visitor.page
-    look_at(visitor, [file("typed.txt", text_of_raw_curve(above="# Tip radius [mm]: 5"))])
-    source = page.get_by_label("sphere radius R: where it is")
-    offered = source.locator("option").all_inner_texts()
-    if any("Tip radius" in text for text in offered):
-        source.select_option(label=next(text for text in offered if "Tip radius" in text))
-    page.locator("#indenter_radius_mm").fill("2")
-    expect(source).to_have_value("")
-    read_it(page)
-    expect(page.locator("#indenter_radius_mm")).to_have_value("2")
 
 
 def one_refused() -> dict[str, Any]:
@@ -182,15 +127,3 @@ def test_preload_beyond_table_gives_no_d33_said(server: Server, first: float | N
     assert said in page
     assert "L = F/(R²E) measures the strain under the sphere" in page
     assert page.index(said) < page.index("<button>Keep")
-
-
-@pytest.mark.soak
-def test_kind_lacks_channel_said_form_s_words(visitor: Visit) -> None:
-    """A kind that lacks a channel is said in the form s words."""
-    page = visitor.page
-    look_at(visitor, [file("shaker.tdms", shaker())])
-    page.get_by_label("Kind of recording").select_option("indentation")
-    read_it(page)
-    alert = page.get_by_role("alert")
-    expect(alert).to_contain_text("the kind of recording that is chosen has no charge: choose another kind")
-    expect(alert).not_to_contain_text("dict")

@@ -8,7 +8,7 @@ import numpy as np
 import orjson
 import pytest
 
-from tests.support.diagnosed import joint_reports, report, table
+from tests.support.diagnosed import report, table
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.document_schemas import report_validator
 from tests.support.kinds_campaigns import BLOCK, curves, lines
@@ -91,17 +91,6 @@ def test_report_every_kind_recording_described(kind: str) -> None:
     require_described(
         lean_report(KINDS[kind](), table(), *(BESIDE_SKINS if kind in ("words", "FRFs and a block") else COSTLY))
     )
-
-
-@pytest.mark.slow
-def test_reports_explain_alone_together() -> None:
-    """Reports that explain alone and together are described."""
-    alone, (skin, fleet) = report(), joint_reports().values()
-    assert alone["verdict"] == skin["verdict"] == "explained"
-    assert "per_sensor" in skin["d33"]
-    assert "population" in fleet
-    for made in (alone, skin, fleet):
-        require_described(made)
 
 
 SPOILT: tuple[tuple[tuple[Any, ...], Any], ...] = (

@@ -95,16 +95,6 @@ def test_arrays_are_answered_as_json_is(http: httpx.Client, path: str, fields: d
             assert array.tolist() == expected[name], name
 
 
-def test_many_rows_are_answered_without_loss(http: httpx.Client) -> None:
-    points = {name: GENERATOR.uniform(0, 1.1 * high, 50_000) for name, (_, high) in TABLE.domain.items()}
-    reply = post(http, "/v1/sigma", archive(points), NPZ)
-    expected = TABLE.sigma(**points)
-    with np.load(io.BytesIO(reply.content)) as arrays:
-        assert np.array_equal(arrays["sigma"], expected.sigma, equal_nan=True)
-        assert np.array_equal(arrays["rel_error"], expected.rel_error, equal_nan=True)
-        assert np.array_equal(arrays["status"] == "ok", expected.inside)
-
-
 @pytest.mark.parametrize(
     "body",
     [
@@ -118,11 +108,6 @@ def test_whatever_holds_numbers_read_alike(http: httpx.Client, body: bytes) -> N
     """Whatever holds the same numbers is read alike."""
     expected = http.post("/v1/sigma", json={"a_over_h": [0.5, 1.0], "rt_over_h": 0.5}).json()
     assert post(http, "/v1/sigma", body).json() == expected
-
-
-def test_lines_stored_by_columns_are_read(http: httpx.Client) -> None:
-    by_columns = {**LINES, "frf_re_pc_per_n": np.asfortranarray(LINES["frf_re_pc_per_n"])}
-    assert post(http, "/v1/d33", archive(by_columns)).json() == http.post("/v1/d33", json=LINES).json()
 
 
 def test_any_answer_in_columns_comes_as_arrays(http: httpx.Client) -> None:

@@ -1,7 +1,6 @@
 """Backups on a schedule by a real server: made, read back, rotated, restored."""
 
 import re
-import shutil
 import sqlite3
 import time
 from contextlib import closing
@@ -9,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from service.usecases.scheduled_backups import OWNER, stored_backups
+from service.usecases.scheduled_backups import stored_backups
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
-from tests.support import postgres
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -94,23 +92,6 @@ def test_folder_disk_not_mounted_gets_no_place(place: Place, tmp_path: Path) -> 
         before = len(stored_backups(away))
         away.rename(folder)
         wait_for(folder, before + 1)
-
-
-def test_backups_begin_anew_emptied_folder_once(place: Place, tmp_path: Path) -> None:
-    """Backups begin anew in an emptied folder once its note is deleted."""
-    folder = tmp_path / "backups"
-    log = place.folder.parent / f"{place.folder.name}.log"
-    with running(place, **scheduled(folder)):
-        wait_for(folder, 1)
-    shutil.rmtree(folder)
-    with running(place, **scheduled(folder)):
-        deadline = time.monotonic() + 240
-        while not (advice := re.search(r"To begin anew there, delete (\S+) and restart", log.read_text())):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-    Path(advice[1]).unlink()
-    with running(place, **scheduled(folder)):
-        wait_for(folder, 1)
 
 
 def test_backup_fails_counted_logged_made_later(place: Place, tmp_path: Path) -> None:
@@ -219,38 +200,3 @@ def test_store_restored_backup_before_schedule(tmp_path: Path) -> None:
         assert restored.returncode == 0, restored.stderr
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)):
         wait_for(folder, 2)
-
-
-def test_empty_note_folder_ends_no_schedule(place: Place, tmp_path: Path) -> None:
-    """An empty note of whose folder it is ends no schedule.
-
-    What an older version left where the disk was full, or the power failed.
-    """
-    folder = tmp_path / "backups"
-    folder.mkdir()
-    (folder / OWNER).touch()
-    with running(place, **scheduled(folder)):
-        wait_for(folder, 1)
-    assert (folder / OWNER).read_text()
-
-
-def test_metrics_wait_for_no_database(tmp_path: Path) -> None:
-    if not postgres.available():
-        pytest.skip("PostgreSQL (Debian's package postgresql) is not installed")
-    folder, backups = tmp_path / "data", tmp_path / "backups"
-    folder.mkdir()
-    with postgres.running() as cluster:
-        place = Place(folder, cluster.new_database())
-        with running(place, **scheduled(backups)) as server:
-            (file,) = wait_for(backups, 1)
-            deadline = time.monotonic() + 240
-            while metric(server, "underskin_backup_bytes") == 0:
-                assert time.monotonic() < deadline
-                time.sleep(0.05)
-            cluster.stop()
-            assert server.http.get("/health").status_code == 200
-            assert metric(server, "underskin_backup_bytes") == file.stat().st_size
-            status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), **NO_WORKERS)
-    assert status == 2
-    assert "does not answer" in found["store"]["found"]
-    assert (found["store"]["level"], found["backups"]["level"]) == ("critical", "warning")

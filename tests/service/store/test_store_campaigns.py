@@ -33,13 +33,6 @@ def test_sent_comes_back_last_digit(server: Server) -> None:
     assert document == sent
 
 
-def test_campaign_without_skin_gets_new(server: Server) -> None:
-    """A campaign without a skin gets a new one."""
-    skins = {post(server, campaign(name))["skin_id"] for name in ("a", "b")}
-    assert len(skins) == 2
-    assert {entry["id"] for entry in server.http.get("/v1/skins").json()["skins"]} == skins
-
-
 def test_bad_recordings_named_good_ones_kept(server: Server) -> None:
     """Bad recordings are named and the good ones kept."""
     document = campaign("mixed")
@@ -102,17 +95,6 @@ def test_key_gets_answer_keeps_once(server: Server) -> None:
     elsewhere = server.http.post("/v1/campaigns?skin=b", json=campaign("run"), headers=headers)
     assert elsewhere.status_code == 422
     assert len(listed(server, state="all")) == 1
-
-
-def test_form_recognised_although_boundary(server: Server) -> None:
-    """A form is recognised although its boundary differs."""
-    import orjson
-
-    file = {"file": ("a.json", orjson.dumps(campaign("form")))}
-    answers = [server.http.post("/v1/campaigns", files=file, headers={"Idempotency-Key": "f"}) for _ in range(2)]
-    assert answers[0].json() == answers[1].json()
-    assert [answer.headers.get("Idempotency-Replayed") for answer in answers] == [None, "true"]
-    assert len(listed(server)) == 1
 
 
 def test_key_many_times_once_keeps_once(server: Server) -> None:

@@ -140,31 +140,6 @@ def test_campaign_corrected_once_however_often(server: Server, tmp_path: Path) -
     assert "cannot be opened" in refused(server, "correct", first, str(tmp_path / "none"), "--reason", "x")
 
 
-def test_moduli_import_say_recording(server: Server, tmp_path: Path) -> None:
-    """Moduli of an import say of which recording."""
-    travel = [0.05 * step for step in range(20)]
-    blocks = [
-        {"id": name, "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0,
-         "displacement_mm": travel, "force_n": [stiffness * one for one in travel]}
-        for name, stiffness in (("soft", 80.0), ("hard", 160.0))
-    ]  # fmt: skip
-    skin = {"id": "blocks", "youngs_modulus_mpa": 16.0, "poisson_ratio": 0.5}
-    file = tmp_path / "blocks.json"
-    file.write_text(json.dumps({"schema": "campaign/1", "name": "blocks", "skin": skin, "recordings": blocks}))
-    words = told(server, "import", str(file))
-    soft, hard = (float(re.findall(rf"E of {name} ([\d.]+) ±", words)[0]) for name in ("soft", "hard"))
-    assert hard == pytest.approx(2 * soft, rel=1e-3)
-
-
-def test_skins_are_joined(server: Server) -> None:
-    for skin in ("palm", "palm-b"):
-        sent(server, skin, skin)
-    words = told(server, "join", "palm", "palm-b", "--reason", "one skin, two labels")
-    assert words == "skin palm counts as one with palm-b\n"
-    assert len(rows(told(server, "campaigns", "--skin", "palm"))) == 2
-    assert refused(server, "join", "palm", "none", "--reason", "x").endswith("There is no skin 'none'.")
-
-
 def test_the_model_of_a_diagnosis_is_adopted(server: Server) -> None:
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     assert told(server, "adopt", "palm", diagnosis_id).startswith("skin palm: version 1 of its model, by diagnosis d-")
