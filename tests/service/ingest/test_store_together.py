@@ -99,16 +99,6 @@ def test_files_of_different_skins_are_refused(server: Server) -> None:
         assert server.http.post(f"/v1/campaigns?together={name}", json=WHOLE).status_code == 422
 
 
-def test_list_goes_together_joined_campaign(server: Server) -> None:
-    """A list goes together and a joined campaign corrects."""
-    first = server.http.post("/v1/campaigns?skin=palm", json=WHOLE).json()["id"]
-    documents = [orjson.loads(content) for _, content in presses()]
-    answer = server.http.post(f"/v1/campaigns?together=palm&corrects={first}&reason=again", json=documents)
-    assert answer.status_code == 201, answer.text
-    (kept,) = answer.json()["campaigns"]
-    assert [entry["id"] for entry in server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]] == [kept["id"]]
-
-
 def test_instrument_files_two_formats_rig(server: Server) -> None:
     """Instrument files of two formats and their rig."""
     files = [("one.tdms", tdms(1)), ("two.tdms", tdms(2)), ("three.lvm", lvm(repeats=1).encode())]

@@ -67,29 +67,6 @@ def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
     assert "pitch of the array [mm]: x – must be a number" in answer.text
 
 
-@pytest.mark.soak
-def test_material_gives_number_leaves(visitor: Visit) -> None:
-    """A material gives its number and leaves the others."""
-    page = visitor.page
-    visitor.go("/design?thickness_mm=3")
-    page.get_by_text("Materials, with their sources").press("Enter")
-    row = page.get_by_role("row", name=re.compile("^Sylgard 184, 10 : 1"))
-    assert "10.1002/app.41050" in row.inner_text()
-    fits_and_is_accessible(visitor)
-    page.get_by_role("button", name="Take Sylgard 184, 10 : 1").click()
-    page.wait_for_url("**youngs_modulus_mpa=2&**")
-    assert page.locator("#thickness_mm").input_value() == "3"
-    page.get_by_text("Materials, with their sources").click()
-    page.get_by_role("button", name="Take PVDF film").click()
-    page.wait_for_url("**d33_pc_per_n=33&**")
-    assert page.locator("#youngs_modulus_mpa").input_value() == "2"
-    told = page.locator("[data-material]")
-    assert told.all_inner_texts() == ["Sylgard 184, 10 : 1", "PVDF film"]
-    page.locator("#youngs_modulus_mpa").fill("2.5")
-    page.wait_for_function("() => document.querySelector('[data-material]').textContent === ''")
-    assert told.last.inner_text() == "PVDF film"
-
-
 def test_asked_searched_offered_leads_design(visitor: Visit) -> None:
     """What is asked is searched and what is offered leads to its design."""
     page = visitor.page

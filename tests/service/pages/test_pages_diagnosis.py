@@ -4,6 +4,7 @@ import csv
 from copy import deepcopy
 from pathlib import Path
 
+import orjson
 import pytest
 from playwright.sync_api import Locator
 
@@ -176,3 +177,18 @@ def test_imported_report_odd_shape_said(server: Server) -> None:
         answer = server.http.get(path, headers=BROWSING)
         assert answer.status_code == 422
         assert "lacks what a page shows" in answer.text
+
+
+def test_figures_older_versions_tell_recordings(server: Server) -> None:
+    """Figures of older versions tell the recordings by name."""
+    figures = dict(made().figures)
+    older = orjson.loads(figures["frf"])
+    for name in ("indenters_mm", "preloads_n", "left_percent"):
+        del older["layout"]["meta"][name]
+    figures["frf"] = orjson.dumps(older).decode()
+    place = keep(server, "older", Made(made().report, figures))
+    shown = server.http.get(f"{place}?sensor=s1", headers=BROWSING)
+    assert shown.status_code == 200
+    assert shown.text.count('<th scope="row">r') == 6
+    assert "Recordings of s1" in shown.text
+    assert "Recordings of" not in server.http.get(f"{place}?sensor=nothing", headers=BROWSING).text

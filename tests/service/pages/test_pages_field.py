@@ -3,13 +3,11 @@
 import csv
 import html
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser
 
-from tests.service.pages.conftest import Visit, visit
+from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.support.cases import first
 from tests.support.store_server import Server
@@ -32,14 +30,6 @@ def trace(visitor: Visit, figure: str, name: str | None = None) -> dict[str, Any
         name,
     )
     return found
-
-
-@pytest.fixture
-def calm(browser: Browser, server: Server) -> Iterator[Visit]:
-    """Somebody whose system asks for less motion."""
-    for visitor in visit(browser, server):
-        visitor.page.emulate_media(reduced_motion="reduce")
-        yield visitor
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
@@ -103,17 +93,6 @@ def test_the_slider_moves_the_load_by_keys(visitor: Visit, width: int) -> None:
     visitor.page.wait_for_function(f"() => {peak} > -0.03")
     with visitor.page.expect_download():
         visitor.page.locator("#figure-base").get_by_role("button", name="SVG").click()
-
-
-def test_nothing_plays_asks_less_motion(calm: Visit) -> None:
-    """Nothing plays for who asks for less motion."""
-    calm.go(f"/field?{QUERY}")
-    calm.drawn(2)
-    assert calm.page.get_by_role("button", name="Play").count() == 0
-    assert "asks for less motion" in calm.page.get_by_role("main").inner_text()
-    calm.page.get_by_label(LOAD).press("ArrowLeft")
-    calm.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.85 N'")
-    calm.require_accessible()
 
 
 def test_request_accepts_page_accepts(server: Server) -> None:

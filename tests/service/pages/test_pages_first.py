@@ -9,6 +9,7 @@ from tests.service.pages.conftest import Visit
 from tests.service.pages.finished import keep, made
 from tests.service.pages.forms import BROWSING
 from tests.support import store_server
+from tests.support.cases import first
 from tests.support.diagnosed import sent
 from tests.support.store_server import Server
 
@@ -30,11 +31,11 @@ def array(name: str, year: int, level: float, factors: dict[str, float]) -> dict
 @pytest.fixture(scope="module")
 def ids(server: Server) -> list[str]:
     """Two campaigns of a skin: in the second s1 is weak, s2 dead, and all fell by a tenth."""
-    first = sent(server, array("before", 2017, 14.0, {}), "aged")
-    return [first, sent(server, array("after", 2018, 12.6, {"s1": 0.8, "s2": 0.0}), "aged")]
+    before = sent(server, array("before", 2017, 14.0, {}), "aged")
+    return [before, sent(server, array("after", 2018, 12.6, {"s1": 0.8, "s2": 0.0}), "aged")]
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_overviews_name_what_is_wrong(visitor: Visit, ids: list[str], width: int) -> None:
     """Start, skin and campaign name the weak and the dead sensor and what was refused, in a line."""
     page = visitor.page
@@ -59,7 +60,7 @@ def visited(visitor: Visit, path: str, selector: str) -> str:
     return visitor.page.locator(selector).inner_text()
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_compare_leads_with_what_differs(visitor: Visit, ids: list[str], width: int) -> None:
     """A sentence says by how much the array and which sensors differ; rows have percent; FRFs lie over each other."""
     page = visitor.page
@@ -79,7 +80,7 @@ def test_compare_leads_with_what_differs(visitor: Visit, ids: list[str], width: 
     visitor.require_accessible()
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_first_screen_of_a_report(visitor: Visit, server: Server, width: int) -> None:
     """Headline, what to quote, what to do, one button; the rest is folded, and no percentage comes twice."""
     page = visitor.page
@@ -108,7 +109,7 @@ def test_first_screen_of_a_report(visitor: Visit, server: Server, width: int) ->
     assert recorded in server.http.get(f"{place}/report.html").text
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_documentation_is_served(visitor: Visit, server: Server, ids: list[str], width: int) -> None:
     """Each page links to its part of the documentation; a route is tried by a click; no link leads nowhere."""
     page = visitor.page

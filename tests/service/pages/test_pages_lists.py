@@ -2,16 +2,14 @@
 
 import csv
 import io
-from collections.abc import Iterator
 from urllib.parse import quote
 
 import numpy as np
 import pytest
 from openpyxl import load_workbook
-from playwright.sync_api import Browser
 
 from service.pages.shared.workbooks import workbook
-from tests.service.pages.conftest import Visit, visit
+from tests.service.pages.conftest import Visit
 from tests.support.cases import first
 from tests.support.store_server import Server, campaign
 
@@ -23,13 +21,6 @@ def place(server: Server) -> str:
     """The page of a campaign of 80 recordings."""
     document = campaign("many", sensors=SENSORS, lines=4)
     return f"/campaigns/{server.http.post('/v1/campaigns?skin=many', json=document).raise_for_status().json()['id']}"
-
-
-@pytest.fixture
-def dark(browser: Browser, server: Server) -> Iterator[Visit]:
-    for seen in visit(browser, server):
-        seen.page.emulate_media(color_scheme="dark")
-        yield seen
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1280]))

@@ -3,7 +3,6 @@
 import httpx
 from playwright.sync_api import Browser
 
-from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, HOSTILE, token_of
 from tests.support.diagnosed import finished, sent
 from tests.support.store_server import Server, campaign
@@ -72,16 +71,6 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, server: Server) ->
     page.get_by_role("navigation").get_by_role("link", name="Fleets").click()
     assert page.get_by_role("heading", name="Diagnosed before").count() == 1
     context.close()
-
-
-def test_the_page_of_fleets_is_accessible(visitor: Visit, server: Server) -> None:
-    sent_to(server, "fleet-9", "nine")
-    server.http.patch("/v1/skins/fleet-9", json={"title": "left <palm>"}).raise_for_status()
-    visitor.go("/fleets")
-    assert visitor.page.get_by_label("left <palm> fleet-9").get_attribute("value") == "fleet-9"
-    visitor.require_accessible()
-    visitor.go("/fleets?find=nothing-is-called-so")
-    assert "No skin is called so" in visitor.page.get_by_role("main").inner_text()
 
 
 def test_fleet_skin_nothing_diagnose_refused(server: Server) -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from tests.service.pages.forms import said
 from tests.support.diagnosed import sent
-from tests.support.pressed_curves import pressed
 from tests.support.simulated_campaign import Rig, simulate
 from tests.support.store_server import Server
 from underskin.recordings.campaign import to_dict
@@ -43,11 +42,3 @@ def test_stated_tolerances_replace_usual_ones(server: Server) -> None:
     assert answer["declared_percent"] == 0
     assert answer["array"] == pytest.approx(answer["array_relative"])
     assert server.http.get(f"/v1/campaigns/{campaign_id}/document").json()["skin"]["tolerances"] == exact
-
-
-def test_slip_curve_s_force_finding_upload(server: Server) -> None:
-    """A slip of a curve s force is a finding of its upload."""
-    document = {**to_dict(pressed(1e5, [2.0])), "units_checked": False}
-    document["recordings"][0]["force_n"] = [1e6 * force for force in document["recordings"][0]["force_n"]]
-    answer = server.http.post("/v1/campaigns?skin=slip", json=document).json()
-    assert any("would need a modulus of about" in finding for finding in answer["findings"])

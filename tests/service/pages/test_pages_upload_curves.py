@@ -122,15 +122,6 @@ def test_force_depth_come_deflection_form(client: httpx.Client) -> None:
     assert client.get(f"{upload.address}/rig.json").json() == before
 
 
-def test_curves_file_told_apart_form(client: httpx.Client) -> None:
-    """Curves of one file are told apart in the form."""
-    one = table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN})
-    upload = Upload(client, one + "\n\n" + one.partition("eoh\n")[2])
-    upload.say(curves="groups", indenter_radius_mm="0.0075", units_checked="yes")
-    assert "<b>2</b> recordings understood" in upload.page
-    assert client.get(f"{upload.address}/rig.json").json()["curves"] == "groups"
-
-
 def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
     depth = np.concatenate([DEPTH_UM - DEPTH_UM[0], DEPTH_UM[-2::-1] - DEPTH_UM[0]])
     force = np.concatenate([FORCE_UN, FORCE_UN[-2::-1]])
@@ -147,22 +138,6 @@ def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
     course = upload.figure("course")
     assert {trace["name"] for trace in course["data"]} == {"loading", "way back"}
     assert all(np.nanmin(decoded(trace["y"])) >= 0 for trace in course["data"])
-
-
-def test_formula_cleared_gives_way_guess(client: httpx.Client) -> None:
-    """A formula that is cleared gives way to the guess."""
-    raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
-    upload = Upload(client, table(raw, "k (N/m)\t3"))
-    formula = {"derived-name-0": "depth", "derived-is-0": "displacement_mm"}
-    formula["derived-formula-0"] = "'Piezo (um)' - 'Deflection (nm)'"
-    upload.say(indenter_radius_mm="0.0075", units_checked="yes", **{**formula, "is-0": "", "is-1": "deflection"})
-    assert client.get(f"{upload.address}/rig.json").json()["channels"]["displacement_mm"] == {"channel": "depth"}
-    upload.say(units_checked="yes", **dict.fromkeys(formula, ""))
-    assert client.get(f"{upload.address}/rig.json").json()["channels"] == {
-        "displacement_mm": {"channel": "Piezo (um)", "deflection": {"channel": "Deflection (nm)"}},
-        "force_n": {"channel": "Deflection (nm)", "spring_constant_n_per_m": {"property": "k (N/m)"}},
-    }
-    assert upload.curve[0] == pytest.approx(1e-3 * DEPTH_UM, abs=1e-9)
 
 
 def test_page_and_command_say_the_same_of_a_punch(client: httpx.Client, tmp_path: Path) -> None:

@@ -2,15 +2,13 @@
 
 import csv
 from collections.abc import Iterator
-from pathlib import Path
 
 import httpx
 import pytest
 
-from service.ingest.uploads import Upload
 from tests.service.pages.forms import BROWSING, token_of
 from tests.service.pages.uploads import as_json, campaigns_of
-from tests.support.store_server import Place, Server, campaign, running
+from tests.support.store_server import Server, campaign
 
 
 @pytest.fixture
@@ -58,23 +56,3 @@ def test_an_upload_is_its_session_s_own(sender: httpx.Client, server: Server) ->
     rows = list(csv.DictReader(sender.get(f"{place}/0/frf.csv").text.splitlines()))
     assert len(rows) == 6 * 20
     assert sender.get(f"{place}/1/frf.csv").status_code == 404
-
-
-@pytest.mark.slow
-def test_upload_beyond_limit_refused_page(tmp_path: Path) -> None:
-    """An upload beyond the limit is refused on a page."""
-    with (
-        running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.1") as server,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody,
-    ):
-        form = {"form_token": token_of(somebody.get("/upload").text)}
-        answer = somebody.post("/upload", data=form, files={"file": ("a.csv", b"1,2\n" * 50_000)})
-        assert answer.status_code == 413
-        assert "UNDERSKIN_MAX_UPLOAD_MB" in answer.text
-        assert "<h1>" in answer.text
-
-
-def upload(folder: Path, size: int) -> Upload:
-    path = folder / f"{len(list(folder.iterdir()))}"
-    path.write_bytes(b"x" * size)
-    return Upload(path, "a", "file", "", in_form=True)

@@ -96,10 +96,13 @@ def test_slider_design_view_answers_once(newcomer: Visit) -> None:
 
 
 def test_no_page_is_wider_than_a_phone(newcomer: Visit) -> None:
+    """And each is accessible."""
     page = newcomer.page
     page.set_viewport_size({"width": 390, "height": 844})
-    campaign = page.get_by_role("link", name="example, as built").get_attribute("href")
-    for path in first(1, (EXAMPLE, str(campaign), "/", "/upload", "/design", "/loads")):
+    campaign = str(page.get_by_role("link", name="example, as built").get_attribute("href"))
+    others = (EXAMPLE, campaign, "/upload", "/design", "/loads", "/fleets", "/mechanisms", "/d33", "/field")
+    for path in first(4, ("/tables", "/docs/glossary", "/", "/design/search", *others)):
         newcomer.go(path)
         newcomer.drawn(page.locator(".plot").count())
         assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+        newcomer.require_accessible()

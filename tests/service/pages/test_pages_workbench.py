@@ -133,3 +133,22 @@ def test_everything_is_done_by_keyboard_alone(visitor: Visit) -> None:
     page.wait_for_load_state()
     expect(page.get_by_role("status").first).to_contain_text("1 recording understood")
     expect(page.get_by_text("of each curve, samples 11 to 380 are used")).to_be_visible()
+
+
+def test_a_second_file_is_read_as_the_first_or_afresh(visitor: Visit) -> None:
+    """What it is read by is said, and it can start without."""
+    page = visitor.page
+    look_at(visitor, [file("afm.txt", text_of_raw_curve(above="# first"))], skin="pdms-8")
+    fill_in(page)
+    page.locator("#instrument").fill("force microscope 7")
+    read_it(page)
+    page.get_by_role("button", name="Keep 1 recording").click()
+    page.wait_for_url("**/campaigns/*")
+    look_at(visitor, [file("next.txt", text_of_raw_curve(above="# next"))], skin="pdms-8")
+    told = page.get_by_role("form", name="Read as before")
+    expect(told).to_contain_text("afm.txt of force microscope 7 of skin pdms-8 was, kept")
+    told.get_by_role("button", name="Start without it").click()
+    page.wait_for_load_state()
+    expect(page.get_by_role("form", name="Read as before")).to_have_count(0)
+    expect(page.get_by_label("force is 0 over the first")).to_have_value("")
+    expect(page.get_by_label("Formula of derived channel 1", exact=True)).to_have_value("")

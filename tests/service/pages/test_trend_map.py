@@ -1,7 +1,7 @@
 """The map of trends colours what the trend's own test calls significant, and says as much as the page's text."""
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import orjson
@@ -12,8 +12,6 @@ from service.pages.skin.figures import drawn_map, map_rows
 from service.schemas.skins import History, Point, SensorHistory, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.array_history import SIGNIFICANT, holm, trend
-
-GREY = "#cfd4d9"
 
 
 def points(values: list[float]) -> list[Point]:
@@ -50,25 +48,6 @@ def history(d33: list[list[float]], uncertainty: float) -> History:
         left_out_points=[],
         left_out_recordings=[],
     )
-
-
-@pytest.mark.parametrize(
-    ("d33", "coloured"),
-    [
-        ([[20.0, 20.9, 22.4], [20.0, 20.1, 19.9]], [False, False]),  # 6.9 uncertainties, of 1 degree of freedom: p 0.09
-        ([[20.0, 21.0, 22.001], [20.0, 20.1, 19.9]], [True, False]),
-    ],
-)
-def test_slope_coloured_trend_significant(d33: list[list[float]], coloured: list[bool]) -> None:
-    """A slope is coloured where its trend is significant."""
-    places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(3)]
-    row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
-    answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
-    of_skin = history(d33, 0.001)
-    drawn = drawn_map("palm", row, map_rows(row, answer, of_skin, places), "trend", "paper", None)
-    shapes: list[dict[str, Any]] = orjson.loads(str(drawn.json))["layout"]["shapes"]
-    assert [shape["fillcolor"] not in (GREY, "#ffffff") for shape in shapes] == [*coloured, False]
-    assert ("no sensor's differs from 0" in drawn.about) is not any(coloured)
 
 
 @pytest.mark.parametrize("values", [[20.0, 20.9, 22.4], [20.0, 21.0, 22.001], [20.0, 20.9, 22.4, 23.0]])

@@ -75,21 +75,6 @@ def test_columns_of_a_long_table() -> None:
     rig_description.from_dict(said)
 
 
-def test_magnitude_phase_not_taken_real_part() -> None:
-    """Magnitude and phase are not taken for a real part."""
-    channels = [channel("Frequency", "Hz"), channel("FRF magnitude", "pC/N"), channel("FRF phase", "deg")]
-    found = guessed(channels, {}, {})
-    assert found["channels"] == {
-        "frequency_hz": {"channel": "Frequency"},
-        "frf_magnitude_pc_per_n": {"channel": "FRF magnitude"},
-        "frf_phase_deg": {"channel": "FRF phase"},
-    }
-    assert [guessed([channel(f"FRF {name}", "pC/N")], {}, {})["channels"] for name in ("real", "imag")] == [
-        {"frf_re_pc_per_n": {"channel": "FRF real"}},
-        {"frf_im_pc_per_n": {"channel": "FRF imag"}},
-    ]
-
-
 def test_channels_file_states_guessed_unit_name() -> None:
     """Channels and what a file states are guessed by unit and name."""
     channels = [channel("Kraftmessdose", "mN"), channel("Charge amplifier", "V"), channel("temperature", "V")]
@@ -104,25 +89,6 @@ def test_channels_file_states_guessed_unit_name() -> None:
     curve = guessed([channel("z", "um"), channel("F", "uN"), channel("t", "s")], {}, {})
     assert curve["kind"] == "indentation"
     assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
-
-
-def test_testing_machine_s_table_guessed() -> None:
-    """A testing machine s table is guessed to be a compression."""
-    table = [channel("Time (s)", "s"), channel("Compression (mm)", "mm"), channel("Load (N)", "N")]
-    found = guessed([*table, channel("Engineering Strain [-]", "-")], {}, {})
-    assert found["kind"] == "compression"
-    named = {field: how["channel"] for field, how in found["channels"].items()}
-    assert named == {"time_s": "Time (s)", "displacement_mm": "Compression (mm)", "force_n": "Load (N)"}
-    assert guessed([channel("Displacement (mm)", "mm"), channel("Load (N)", "N")], {}, {})["kind"] == "indentation"
-
-
-def test_parts_frf_guessed_complex_ones_sample() -> None:
-    """Both parts of an frf are guessed and complex ones and the sample rate."""
-    parts = [channel("frequency", ""), channel("FRF real", "pC/N"), channel("FRF imaginary", "pC/N")]
-    assert set(guessed(parts, {}, {})["channels"]) == {"frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"}
-    assert guessed([channel("H1", "pC/N", is_complex=True)], {}, {})["channels"] == {"frf_pc_per_n": {"channel": "H1"}}
-    stated = guessed([channel("force", ""), channel("charge", "")], {"Sampling rate": 1000.0}, {})
-    assert stated["recording"] == {"sample_rate_hz": {"property": "Sampling rate"}}
 
 
 def test_time_typed_lab_s_zone_shown_typed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -202,11 +168,3 @@ def test_deflection_form_makes_force_depth() -> None:
     _, (wrong,) = document_of({**form, **measured, "spring_constant_n_per_m": ""}, {})
     assert "say which channel is the deflection" in wrong.allowed
     assert field_words("spring_constant_n_per_m") == "spring constant [N/m]"
-
-
-def test_curves_said_words_channel() -> None:
-    """Curves are said by words or by a channel."""
-    for said, curves in (("groups", "groups"), ("channel", {"channel": "n"}), ("segments", {"segments": "n"})):
-        assert document_of({"curves": said, "curves-by": "n"}, {})[0]["curves"] == curves
-    assert "curves" not in document_of({"curves": "", "curves-by": "n"}, {"curves": "file"})[0]
-    assert document_of({}, {"curves": "file"})[0]["curves"] == "file"

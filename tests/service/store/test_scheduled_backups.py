@@ -10,6 +10,7 @@ import pytest
 
 from service.usecases.scheduled_backups import stored_backups
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
+from tests.service.waiting import until
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -32,10 +33,7 @@ def test_backup_made_start_restored(place: Place, tmp_path: Path) -> None:
         (file,) = wait_for(folder, 1)
         assert file.stat().st_mode & 0o077 == 0
         later = sent(server, campaign("later"))
-        deadline = time.monotonic() + 240
-        while metric(server, "underskin_backup_bytes") != file.stat().st_size:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: metric(server, "underskin_backup_bytes") == file.stat().st_size)
         assert metric(server, "underskin_backup_age_seconds") < 60
         assert "Last backup" in server.http.get("/").text
     with running(place, **scheduled(folder)):  # the one that is there is young enough
@@ -58,10 +56,7 @@ def test_old_ones_deleted_files(place: Place, tmp_path: Path) -> None:
         other.write_text("mine")
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND, UNDERSKIN_BACKUP_KEEP="2")):
         (first, *_) = wait_for(folder, 1)
-        deadline = time.monotonic() + 240
-        while first.exists():
-            assert time.monotonic() < deadline, "the oldest backup stays"
-            time.sleep(0.05)
+        until(lambda: not first.exists(), "the oldest backup stays")
         assert 1 <= len(stored_backups(folder)) <= 3
     assert all(other.read_text() == "mine" for other in others)
     assert not list(folder.glob("*.part*"))
@@ -74,19 +69,13 @@ def test_folder_disk_not_mounted_gets_no_place(place: Place, tmp_path: Path) -> 
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
         wait_for(folder, 1)
         folder.rename(away)
-        deadline = time.monotonic() + 240
-        while "is its disk mounted?" not in log.read_text():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: "is its disk mounted?" in log.read_text())
         assert metric(server, "underskin_backup_failures_total") >= 1
         folder.mkdir()  # the empty folder below the mount
         time.sleep(1.0)
         assert not list(folder.iterdir())
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:  # nor after a restart
-        deadline = time.monotonic() + 240
-        while metric(server, "underskin_backup_failures_total") < 1:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: metric(server, "underskin_backup_failures_total") >= 1)
         assert not list(folder.iterdir())
         folder.rmdir()
         before = len(stored_backups(away))
@@ -100,10 +89,7 @@ def test_backup_fails_counted_logged_made_later(place: Place, tmp_path: Path) ->
     folder.write_text("a file")
     log = place.folder.parent / f"{place.folder.name}.log"
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
-        deadline = time.monotonic() + 240
-        while "no scheduled backup could be made" not in log.read_text():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: "no scheduled backup could be made" in log.read_text())
         assert metric(server, "underskin_backup_failures_total") >= 1
         assert "overdue" in server.http.get("/").text
         folder.unlink()
@@ -146,10 +132,7 @@ def test_store_busy_long_ends_no_schedule(tmp_path: Path) -> None:
         wait_for(folder, 1)
         with closing(sqlite3.connect(data / "underskin.sqlite3", isolation_level=None)) as other:
             other.execute("BEGIN EXCLUSIVE")
-            deadline = time.monotonic() + 240
-            while "no scheduled backup could be made" not in (tmp_path / "data.log").read_text():
-                assert time.monotonic() < deadline
-                time.sleep(0.2)
+            until(lambda: "no scheduled backup could be made" in (tmp_path / "data.log").read_text())
             other.execute("ROLLBACK")
         count = len(stored_backups(folder))
         wait_for(folder, count + 1)
@@ -173,10 +156,7 @@ def test_folder_store_left_alone_doctor_says(place: Place, tmp_path: Path) -> No
         theirs = wait_for(folder, 1)
     often = {"UNDERSKIN_BACKUP_EVERY": _SECOND, "UNDERSKIN_BACKUP_KEEP": "1"}
     with running(other, **scheduled(folder, **often)) as server:
-        deadline = time.monotonic() + 240
-        while metric(server, "underskin_backup_failures_total") < 1:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: metric(server, "underskin_backup_failures_total") >= 1)
         assert "overdue" in server.http.get("/").text
     assert [entry.path for entry in stored_backups(folder)] == theirs
     assert "holds the backups of another store" in (tmp_path / "other.log").read_text()

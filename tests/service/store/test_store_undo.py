@@ -163,4 +163,4 @@ def test_undo_correction_waits_model_skin_left(on_postgresql: Database) -> None:
         assert not undone.done()
         connection.commit()
         with pytest.raises(Conflict, match="a model was adopted since"):
-            undone.result(10)
+            undone.result(240)

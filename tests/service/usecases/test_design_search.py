@@ -147,14 +147,6 @@ def test_force_beyond_table_told_highest() -> None:
     assert not np.isfinite(found(preload_n=1.01 * highest, resolution_mm=10.0).region.frf_pc_per_n).any()
 
 
-@pytest.mark.parametrize("preload_n", [2.7, 3.0])
-def test_thinnest_layer_search_inside_table(preload_n: float) -> None:
-    """The thinnest layer of the search is inside the table."""
-    region = found(preload_n=preload_n, indenter_radius_mm=10.0, youngs_modulus_mpa=1.0, resolution_mm=1.0).region
-    assert region.contact_radius_mm[0] / region.thickness_mm[0] == pytest.approx(3.0, rel=5e-3)
-    assert np.isfinite(region.frf_pc_per_n[0]).all()
-
-
 def test_largest_pitch_bell_sensor_sensor_dip() -> None:
     """The largest pitch of a bell is where sensor by sensor the dip is just seen."""
     spread, distance = 0.4e-3, 2.4e-3

@@ -106,34 +106,6 @@ def test_it_is_withdrawn_once(server: Server, client: Client) -> None:
     assert client.skins.model("palm") == newest
 
 
-def test_elsewhere_after_restore_here(server: Server, elsewhere: Server, client: Client, tmp_path: Path) -> None:
-    """It is elsewhere and after a restore as it was here."""
-    _, diagnosis_id = diagnosed(server, resonant("array"), report())
-    client.skins.adopt("palm", diagnosis_id)
-    in_force, withdrawn = tmp_path / "in-force.h5", tmp_path / "withdrawn.h5"
-    client.skins.export("palm", in_force)
-    client.skins.withdraw_model("palm", "wrong diagnosis")
-    kept = client.skins.models("palm")
-    client.skins.export("palm", withdrawn)
-    with Client(str(elsewhere.http.base_url)) as there:
-        assert there.skins.load(withdrawn)["kept"] == 1
-        assert there.skins.load(withdrawn)["present"] == 1
-        assert there.skins.models("palm") == kept
-        with pytest.raises(ServiceError, match="no adopted model"):
-            there.skins.model("palm")
-        with pytest.raises(ServiceError, match="Model 1 of skin 'palm' is there already and differs"):
-            there.skins.load(in_force)
-        assert there.skins.adopt("palm", diagnosis_id)["version"] == 2
-    backup = tmp_path / "backup"
-    assert server.place.command("backup", str(backup)).returncode == 0
-    client.skins.adopt("palm", diagnosis_id)
-    done = server.place.command("restore", str(backup))
-    assert done.returncode == 0, done.stderr
-    assert client.skins.models("palm") == kept
-    with pytest.raises(ServiceError, match="no adopted model"):
-        client.skins.model("palm")
-
-
 def test_files_older_underskin_come_spoilt_ones(
     server: Server, elsewhere: Server, client: Client, tmp_path: Path
 ) -> None:
