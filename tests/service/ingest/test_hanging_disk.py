@@ -55,7 +55,7 @@ def test_answered_disk_uploads_hangs(hanging_server: Server, disk: HangingDisk, 
         with disk.hanging(call):
             by_page = [pool.submit(send_by_page, hanging_server, number) for number in range(FEW)]
             sent = [pool.submit(send, hanging_server, number) for number in range(count)]
-            until(lambda: disk.waiting(), "nothing hangs")
+            until(disk.waiting, "nothing hangs")
             time.sleep(1.0)
             for path in OTHERS:
                 assert hanging_server.http.get(path, timeout=240).status_code == 200, path

@@ -114,19 +114,6 @@ def test_a_broken_form_is_refused(server: Server) -> None:
         assert answer.status_code in (400, 422), answer.text
 
 
-def test_parts_of_a_form_need_no_name(server: Server) -> None:
-    parts = [
-        b'--x\r\nContent-Disposition: form-data; filename="%s.json"\r\n\r\n%s\r\n'
-        % (name.encode(), orjson.dumps(campaign(name)))
-        for name in ("one", "two")
-    ]
-    headers = {"Content-Type": "multipart/form-data; boundary=x"}
-    for some in (parts, parts[:1]):
-        answer = server.http.post("/v1/campaigns", content=b"".join(some) + b"--x--\r\n", headers=headers)
-        assert answer.status_code == 201, answer.text
-        assert [entry["status"] for entry in answer.json()["campaigns"]] == ["ok"] * len(some)
-
-
 def test_a_request_may_bring_so_much_and_no_more(server: Server) -> None:
     many = orjson.dumps([0] * 1001)
     half = ("file", ("half.json", orjson.dumps([0] * 501)))

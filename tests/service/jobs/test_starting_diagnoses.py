@@ -51,7 +51,7 @@ def test_diagnosis_worker_slow_start_kept_alive(place: Place) -> None:
             diagnosis_id = begun(server, small())
             awaited(server, diagnosis_id, "running")
             claimed_at = row_of(place, diagnosis_id).alive_at
-            until(lambda: not (row_of(place, diagnosis_id).alive_at < claimed_at + 2), "no sign of life")
+            until(lambda: row_of(place, diagnosis_id).alive_at >= claimed_at + 2, "no sign of life")
             with closing(database(place.database_url, place.folder)) as store, store.writing() as connection:
                 killed = {"claimed_by": "a server that was killed", "alive_at": 0.0}
                 connection.execute(table_of_diagnoses.update().values(**killed))
@@ -86,10 +86,7 @@ def test_diagnosis_no_thread_starts_put_back(
         runner = Runner(store, processes, 1)
         runner.start()
         try:
-            until(
-                lambda: store.read(diagnoses.find, diagnosis.id).state == "done",
-                store.read(diagnoses.find, diagnosis.id),
-            )
+            until(lambda: store.read(diagnoses.find, diagnosis.id).state == "done")
         finally:
             runner.stop()
     first, second = tried

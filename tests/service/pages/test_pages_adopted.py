@@ -184,17 +184,3 @@ def test_a_tag_says_how_sure_it_is(
     page = said(server, f"/diagnoses/{diagnosis_id}")
     can = verdict == "explained" or "a law" in tag
     assert ("It cannot be adopted as the skin's model:" in page) is not can
-
-
-@pytest.mark.parametrize(("probability", "settled"), [(0.341, False), (0.998, True)])
-def test_first_button_adopts_settled_alone(server: Server, probability: float, settled: bool) -> None:
-    """The first button adopts what is settled alone.
-
-    A law that holds a third of the probability can still be adopted, at the foot of the page, where that is said.
-    """
-    found = {**report(), "verdict": "unexplained", "probability": probability, "mechanisms": [], "unnamed": WARMTH}
-    _, diagnosis_id = diagnosed(server, resonant("law"), found, f"law {settled}")
-    shown = server.http.get(f"/diagnoses/{diagnosis_id}").text
-    assert ('<a class="button" href="#adopt">' in shown) == settled
-    assert ">Adopt the law over the time of day</button>" in shown
-    assert ("It is not settled: " in shown) != settled

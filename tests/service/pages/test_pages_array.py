@@ -4,18 +4,6 @@ import pytest
 from playwright.sync_api import Locator
 
 from tests.service.pages.conftest import EXAMPLE, Visit
-from tests.support.cases import first
-
-WIDTHS = [1180, 390]
-
-
-@pytest.fixture(params=first(1, WIDTHS))
-def lab(visitor: Visit, request: pytest.FixtureRequest) -> Visit:
-    """Somebody on the example's page, in a window of this width."""
-    visitor.page.set_viewport_size({"width": request.param, "height": 800})
-    newcomer: Visit = request.getfixturevalue("newcomer")
-    newcomer.drawn(2)
-    return newcomer
 
 
 def place_of(figure: Locator, sensor: str) -> tuple[float, float]:
@@ -34,13 +22,14 @@ def place_of(figure: Locator, sensor: str) -> tuple[float, float]:
 
 
 @pytest.mark.soak
-def test_click_map_leads_sensor_s_history(lab: Visit) -> None:
+def test_click_map_leads_sensor_s_history(newcomer: Visit) -> None:
     """A click on the map leads to a sensor s history and recordings."""
-    page = lab.page
+    page = newcomer.page
+    newcomer.drawn(2)
     page.mouse.click(*place_of(page.locator("#figure-map"), "s03"))
     page.wait_for_url("**sensor=s03*")
-    lab.drawn(3)
-    lab.require_accessible()
+    newcomer.drawn(3)
+    newcomer.require_accessible()
     assert page.evaluate("document.documentElement.scrollWidth") <= page.evaluate("innerWidth")
     assert page.get_by_label("Sensor", exact=True).input_value() == "s03"
     history = page.locator("#figure-history .plot").evaluate("plot => plot.data.map((trace) => trace.name)")
@@ -53,14 +42,14 @@ def test_click_map_leads_sensor_s_history(lab: Visit) -> None:
     assert page.locator("#figure-frf .legend .traces").count() == 8
     page.mouse.click(*place_of(page.locator("#figure-map"), "s05"))
     page.wait_for_url("**sensor=s05*")
-    lab.drawn(3)
+    newcomer.drawn(3)
     assert "FRF of s05" in page.locator("#figure-frf figcaption").inner_text()
     assert page.get_by_role("columnheader", name="d33 of s05").count() == 1
-    lab.go(f"{EXAMPLE}?sensor=s03")
+    newcomer.go(f"{EXAMPLE}?sensor=s03")
     page.get_by_role("link", name="example, after six months").click()
     page.wait_for_url("**show=s03*")
-    lab.drawn(4)
-    lab.require_accessible()
+    newcomer.drawn(4)
+    newcomer.require_accessible()
     assert page.locator("#figure-frf .legend .traces").count() == 8
     assert page.locator("tr.chosen th").all_inner_texts() == ["s03"]
     points = page.locator("#figure-preload .plot").evaluate("plot => plot.data.flatMap((one) => one.text ?? [])")

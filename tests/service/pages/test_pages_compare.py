@@ -11,7 +11,6 @@ from playwright.sync_api import Page
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
-from tests.support import store_server
 from tests.support.blocks import block
 from tests.support.cases import first
 from tests.support.diagnosed import sent, table
@@ -86,18 +85,6 @@ def test_a_sensor_that_was_dead_differs_in_charge(server: Server) -> None:
     assert "nan" not in re.findall(r'class="result lead".*?</p>', text, re.DOTALL)[0]
 
 
-def test_first_recorded_first_however_late(server: Server) -> None:
-    """First is the one recorded first however late it arrives."""
-    ids = {}
-    for year in (2020, 2017):
-        made = campaign(BEFORE, table())
-        entries = tuple(replace(entry, recorded_at=f"{year}-05-03T09:00:00Z") for entry in made.recordings)
-        ids[year] = sent(server, to_dict(replace(made, name=str(year), recordings=entries)), "by-time")
-    text = server.http.get("/compare?skin=by-time", headers=BROWSING).text
-    chosen = re.findall(r'value="([^"]*)" selected', text)
-    assert chosen == [ids[2017], ids[2020]]
-
-
 def test_without_choice_last_two_skin_compared(server: Server) -> None:
     """Without a choice the last two of one skin are compared and sensors elsewhere are named."""
 
@@ -122,22 +109,6 @@ def test_without_choice_last_two_skin_compared(server: Server) -> None:
     warned = server.http.get("/compare", params={"first": alone, "second": bent}, headers=BROWSING).text
     (said,) = re.findall(r"Sensors of the same id lie elsewhere in the two campaigns: (.*?)\. Their", warned)
     assert re.sub(r"<[^>]+>|&nbsp;", "", said) == "s1 by 6.00mm"
-
-
-def test_two_skins_without_sensor_common_say(server: Server) -> None:
-    """Two skins without a sensor in common say so and how sensors are matched."""
-    first = store_server.campaign("left", sensors=2, lines=3)
-    second = store_server.campaign("right", sensors=9, lines=3)
-    for one in [*second["skin"]["sensors"], *second["recordings"]]:
-        name = "id" if "x_mm" in one else "sensor"
-        one[name] = one[name].replace("s", "finger ")
-    ids = {name: sent(server, document, name) for name, document in (("left", first), ("right", second))}
-    text = server.http.get("/compare", params={"first": ids["left"], "second": ids["right"]}, headers=BROWSING).text
-    (said,) = re.findall(r"No sensor is in both campaigns: (.*?\.)", text)
-    named = ", ".join(f"finger {number}" for number in range(6))
-    assert said == f"sensors are matched by their ids, and the first has s0, s1, the second {named} and 3 more."
-    alike = server.http.get("/compare", params={"first": ids["left"], "second": ids["left"]}, headers=BROWSING).text
-    assert "No sensor is in both" not in alike
 
 
 def one_sensor(number: int) -> dict[str, object]:
@@ -221,14 +192,3 @@ def test_kinds_campaigns_offered(server: Server) -> None:
     chosen = server.http.get(f"/compare?skin=kinds&first={first}", headers=BROWSING).text
     assert "<strong>compressions</strong>" in chosen
     assert server.http.get("/compare?kind=tension", headers=BROWSING).status_code == 422
-
-
-def test_discarded_campaign_not_counted_start(server: Server) -> None:
-    """A discarded campaign is not counted at the start."""
-    kept = [sent(server, one_sensor(number), "counted") for number in (2, 3)]
-    reason = {"reason": "a mere trial"}
-    for one, count in zip(kept, (1, 0), strict=True):
-        assert server.http.post(f"/v1/campaigns/{one}/discard", json=reason).status_code == 200
-        start = server.http.get("/?find=counted", headers=BROWSING).text
-        assert f'<td class="figures" data-label="Campaigns">{count}</td>' in start
-    assert "none in use" in start

@@ -10,7 +10,6 @@ from service.store import database, diagnosed_together, diagnoses
 from service.usecases.mechanism_findings import findings
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import said
-from tests.service.routes.test_mechanisms import WARM
 from tests.support.cases import first
 from tests.support.diagnosed import diagnosed, report, resonant, sent, table
 from tests.support.store_server import Server
@@ -95,32 +94,6 @@ def test_pictures_drawings_line_strength(server: Server) -> None:
     assert header.count("magnitude") == 4
     for path in ("picture.svg", "effect.csv", "found.csv"):
         assert server.http.get(f"/mechanisms/cheese/{path}").status_code == 404
-
-
-def test_lab_s_stand_beside_files(visitor: Visit, server: Server) -> None:
-    """The lab s own stand beside with their files."""
-    damped = (
-        WARM.replace("warm_amplifier", "long_cable")
-        .replace("acts_on: gain", "acts_on: frequency_response")
-        .replace("[temperature_c]", "[frequency_hz]")
-        .replace("1 + rise * (temperature_c - 23)", "1 / (1 + i * rise * frequency_hz)")
-        .replace("low: -0.1", "low: 0")
-    )
-    for document in (WARM, damped):
-        answer = server.http.post("/v1/mechanisms", content=document, headers={"Content-Type": "application/yaml"})
-        assert answer.status_code == 201, answer.text
-    page = visitor.page
-    visitor.go("/mechanisms")
-    own = page.get_by_role("region", name="The lab's own")
-    warm, cable = own.locator("#warm_amplifier"), own.locator("#long_cable")
-    expect(warm.get_by_text("No picture on the reference rig: not every recording has")).to_be_visible()
-    expect(cable.locator("img.picture")).to_be_visible()
-    warm.get_by_text("Its file").press("Enter")
-    assert warm.locator("pre").inner_text().strip() == WARM.strip()
-    _require_accessible_at_both_widths(visitor)
-    assert server.http.get("/mechanisms/warm_amplifier/picture.svg").status_code == 404
-    for name in ("warm_amplifier", "long_cable"):
-        server.http.delete(f"/v1/mechanisms/{name}").raise_for_status()
 
 
 def test_campaigns_diagnosed_together_count_once(server: Server) -> None:

@@ -139,8 +139,8 @@ def test_plan_report_taken_table_workbook(server: Server) -> None:
     rig = server.http.get(f"{place}/planned/1/rig.yaml").content
     assert rig_description.parse(rig, "rig.yaml").recording["preload_n"] == 3.0
     assert server.http.get(f"{place}/planned/3/rig.yaml").status_code == 404
-    table = [tuple(row) for row in csv.reader(io.StringIO(server.http.get(f"{place}/plan.csv").text))]
-    book = load_workbook(io.BytesIO(server.http.get(f"{place}/plan.xlsx").content)).active
+    table = [tuple(row) for row in csv.reader(io.StringIO(server.http.get(f"{place}/planned.csv").text))]
+    book = load_workbook(io.BytesIO(server.http.get(f"{place}/planned.xlsx").content)).active
     rows = list(book.iter_rows(values_only=True))
     assert table[0] == rows[0] == ("sensor", "indenter_radius_mm", "preload_n", "position_mm", "repeats", "dwell_s")
     assert table[1:] == [("s1", "4.0", "3.0", "0.0 2.5", "2", "NaN"), ("'=s2", "4.0", "3.0", "0.0 2.5", "1", "60.0")]

@@ -118,30 +118,6 @@ def test_file_states_time_taken_word() -> None:
     assert guessed(channels, {"Date": "Monday", "recorded_at": "noon"}, {})["recording"] == {}
 
 
-def test_cannot_said_named_typed_kept() -> None:
-    """What cannot be said is named and what was typed is kept."""
-    layout = "s1, 0, 0\ns2, 8\ns3, a, 0"
-    found, (wrong,) = document_of({"sensors": layout, "thickness_mm": "2,5"}, {})
-    assert wrong.field == "skin.sensors"
-    assert "line 2" in wrong.allowed
-    assert found["skin"]["thickness_mm"] == 2.5
-    assert sensors_text(found) == layout
-    twice = {"channel-0": "a", "is-0": "force_n", "channel-1": "b", "is-1": "force_n"}
-    found, (wrong,) = document_of(twice, {})
-    assert wrong.allowed == "a is force already: set one of the two to “not used”"
-    assert found["channels"] == {"force_n": {"channel": "a"}}
-
-
-def test_values_checked_before_file_read_file() -> None:
-    """Values are checked before a file is read and those that a file states are not."""
-    typed = {"kind": "frf", "poisson_ratio": "", "preload_n": "0.0001", "indenter_radius_mm": "", "dynamic_force_n": ""}
-    stated = {"indenter_radius_mm-from": "R"}
-    (unlikely,) = document_of({**typed, **stated}, {})[1]
-    assert (unlikely.field, unlikely.value) == ("recording.preload_n", 0.0001)
-    assert document_of({**typed, **stated, "units_checked": "yes"}, {})[1] == []
-    assert document_of({**typed, "kind": "indentation"}, {})[1] == []  # which has no preload
-
-
 @pytest.mark.parametrize("line", ["s1, 0.5, 8", "s1; 0,5; 8", "s1\t0,5\t8", "s1 0.5 8", "s1   0,5 8"])
 def test_a_layout_is_written_as_people_write_it(line: str) -> None:
     found, wrong = document_of({"sensors": line}, {})

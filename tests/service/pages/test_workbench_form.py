@@ -3,15 +3,13 @@
 import json
 from typing import Any
 
-import numpy as np
 import pytest
 
-from service.ingest.instruments import recognised, template_of, with_skin
+from service.ingest.instruments import template_of, with_skin
 from service.pages.upload.mapping import document_of
 from service.pages.upload.workbench import rows
 from tests.support.raw_curves import rig_of_raw_curve
 from underskin.recordings import rig_description
-from underskin.recordings.channels import Block, Channel, Contents
 
 
 def form_of(document: dict[str, Any], **changes: str) -> dict[str, str]:
@@ -41,19 +39,6 @@ def test_form_nobody_changed_says() -> None:
     rig_description.from_dict(found)
 
 
-def test_derived_channel_takes_place_table_names() -> None:
-    """A derived channel takes the place of the one that the table names."""
-    raw = {"channel-0": "Piezo", "is-0": "displacement_mm", "channel-1": "Bend", "is-1": "deflection", "travel": "yes"}
-    made = {"derived-formula-0": "-Piezo - Bend", "derived-is-0": "displacement_mm", "spring_constant_n_per_m": "3"}
-    document, wrong = document_of({"kind": "indentation"} | raw | made, {})
-    assert wrong == []
-    assert document["derived"] == {"derived displacement": "-Piezo - Bend"}
-    assert document["channels"] == {
-        "displacement_mm": {"channel": "derived displacement"},
-        "force_n": {"channel": "Bend", "spring_constant_n_per_m": 3.0},
-    }
-
-
 @pytest.mark.parametrize("number", ["007", "9" * 4301, "\u0663", "-1"], ids=["zeros", "long", "digits", "sign"])
 def test_name_page_not_write_no_row(number: str) -> None:
     """A name that the page does not write is no row."""
@@ -75,23 +60,6 @@ def test_template_holds_instrument_s_alone() -> None:
     again = rig_description.from_dict(with_skin(template_of(rig), {"thickness_mm": 3}))
     assert again.skin == {"thickness_mm": 3}
     assert again.derived.keys() == rig.derived.keys()
-
-
-def test_instrument_recognised_format_headings() -> None:
-    """An instrument is recognised by format and headings."""
-
-    def contents(*headings: tuple[str, str]) -> Contents:
-        return Contents((Block("", tuple(Channel(name, unit, np.zeros(2)) for name, unit in headings)),))
-
-    one = recognised("CSV", contents(("Piezo", "nm"), ("Deflection", "nm")))
-    assert one == recognised("CSV", contents(("Deflection", "nm"), ("Piezo", "nm")))
-    others = [
-        recognised("TDMS", contents(("Piezo", "nm"), ("Deflection", "nm"))),
-        recognised("CSV", contents(("Piezo", "um"), ("Deflection", "nm"))),
-        recognised("CSV", contents(("Piezo", "nm"))),
-    ]
-    assert one not in others
-    assert recognised("CSV", Contents(())) is None
 
 
 def test_typed_value_counts_property() -> None:

@@ -237,7 +237,7 @@ def test_diagnoses_wait_file_log_says_once(place: Place, tmp_path: Path) -> None
     with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
         answer = server.http.post("/v1/campaigns", json=campaign("one", lines=5))
         (place.folder / DATABASE).rename(tmp_path / "aside")
-        until(lambda: not (any(told not in log.read_text() for told in watchers)))
+        until(lambda: all(told in log.read_text() for told in watchers))
         time.sleep(2.5)  # another look at the queue
         (tmp_path / "aside").rename(place.folder / DATABASE)
         started = server.http.post(f"/v1/campaigns/{answer.json()['id']}/diagnosis")
