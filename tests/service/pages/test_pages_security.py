@@ -1,11 +1,12 @@
 """Other sites, other people and hostile names get nowhere."""
 
+import importlib
+import pkgutil
 import re
 from collections.abc import Iterator
 
 import httpx
 import pytest
-from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from playwright.sync_api import Browser
 
@@ -20,10 +21,10 @@ from tests.support.store_server import Server, campaign
 
 def _posts() -> list[str]:
     """The addresses of all forms of pages."""
-    api = FastAPI()
-    pages.add_to(api)
-    routes = [route for route in api.routes if isinstance(route, APIRoute) and "POST" in (route.methods or ())]
-    return sorted({re.sub(r"{.*?}", "x", route.path) for route in routes})
+    names = [found.name for found in pkgutil.walk_packages(pages.__path__, f"{pages.__name__}.")]
+    routers = [router for name in names if (router := getattr(importlib.import_module(name), "router", None))]
+    routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
+    return sorted({re.sub(r"{.*?}", "x", route.path) for route in routes if "POST" in route.methods})
 
 
 POSTS = _posts()
