@@ -11,7 +11,6 @@ import h5py
 import httpx
 import pytest
 
-from service.settings import Settings
 from tests.service.connections import HEAD, connect, read_answer
 from tests.service.requests import SIGMA, problem_of
 from tests.support import preloaded
@@ -95,15 +94,6 @@ def test_a_wrong_setting_is_named(tmp_path: Path, variable: str, value: str, say
     line = refusal(tmp_path, **{variable: value})
     assert line.startswith(f"underskin: {variable} = {value!r}: ")
     assert says in line
-
-
-def test_an_empty_setting_is_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in Settings.model_fields:
-        monkeypatch.delenv(f"UNDERSKIN_{name.upper()}", raising=False)
-    default = Settings()
-    for name in Settings.model_fields:
-        monkeypatch.setenv(f"UNDERSKIN_{name.upper()}", "")
-    assert Settings() == default
 
 
 # Tables

@@ -3,8 +3,6 @@
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import pytest
-
 from tests.support.store_server import Server, campaign
 
 BACKEND = "postgresql"
@@ -212,13 +210,6 @@ def test_two_corrections_once_leave_current(server: Server) -> None:
     with ThreadPoolExecutor(4) as pool:
         assert sorted(pool.map(correct, range(4))) == [201, 409, 409, 409]
     assert len(listed(server, skin="palm")) == 1
-
-
-@pytest.mark.parametrize("skin", ["a/b", "..", "  "])
-def test_skin_no_address_name_refused(server: Server, skin: str) -> None:
-    """A skin that no address can name is refused."""
-    assert server.http.post("/v1/campaigns", json=campaign("x"), params={"skin": skin}).status_code == 422
-    assert server.http.post("/v1/campaigns", json=campaign("x", id=skin)).status_code == 422
 
 
 def test_odd_texts_are_refused_and_break_nothing(server: Server) -> None:
