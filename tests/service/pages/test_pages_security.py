@@ -24,7 +24,7 @@ def _posts() -> list[str]:
     names = [found.name for found in pkgutil.walk_packages(pages.__path__, f"{pages.__name__}.")]
     routers = [router for name in names if (router := getattr(importlib.import_module(name), "router", None))]
     routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
-    return sorted({re.sub(r"{.*?}", "x", route.path) for route in routes if "POST" in route.methods})
+    return sorted({re.sub(r"{.*?}", "x", route.path) for route in routes if "POST" in (route.methods or ())})
 
 
 POSTS = _posts()
