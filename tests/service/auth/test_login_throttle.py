@@ -43,12 +43,6 @@ def test_guesses_keys_wait_logs(guarded: tuple[str, str]) -> None:
     assert httpx.get(f"{url}/v1/tables", headers={"Authorization": f"Bearer {key}"}).status_code == 200
 
 
-def test_a_right_key_counts_as_no_try(guarded: tuple[str, str]) -> None:
-    url, key = guarded
-    for _ in range(AT_ONCE + 5):
-        assert tried(url, key).status_code == 303
-
-
 def test_tries_counted_address_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tries are counted by address and forgotten."""
     now = 1000.0

@@ -11,7 +11,6 @@ import h5py
 import httpx
 import pytest
 
-from service.settings import Settings
 from tests.service.connections import HEAD, connect, read_answer
 from tests.service.requests import SIGMA, problem_of
 from tests.support import preloaded
@@ -78,13 +77,6 @@ def test_a_misspelt_setting_is_named_in_the_log(tmp_path: Path) -> None:
     assert "nothing reads UNDERSKIN_MAX_HAEDER_KB" in started.log.read_text()
 
 
-def test_keys_that_cannot_be_read_end_the_start(tmp_path: Path) -> None:
-    (tmp_path / "data").mkdir()
-    kept = tmp_path / "data" / "keys.json"
-    kept.write_text('{"keys": [{"name": "lab"')
-    assert f"the keys in {kept} cannot be read" in refusal(tmp_path)
-
-
 @pytest.mark.parametrize(
     ("variable", "value", "says"),
     [
@@ -102,15 +94,6 @@ def test_a_wrong_setting_is_named(tmp_path: Path, variable: str, value: str, say
     line = refusal(tmp_path, **{variable: value})
     assert line.startswith(f"underskin: {variable} = {value!r}: ")
     assert says in line
-
-
-def test_an_empty_setting_is_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in Settings.model_fields:
-        monkeypatch.delenv(f"UNDERSKIN_{name.upper()}", raising=False)
-    default = Settings()
-    for name in Settings.model_fields:
-        monkeypatch.setenv(f"UNDERSKIN_{name.upper()}", "")
-    assert Settings() == default
 
 
 # Tables
@@ -137,17 +120,6 @@ def test_a_missing_table_ends_the_start(table: Path) -> None:
     assert "cannot be read: No such file or directory" in refused_table(table)
 
 
-def test_a_truncated_table_ends_the_start(table: Path) -> None:
-    os.truncate(table, table.stat().st_size // 2)
-    assert "is truncated or damaged" in refused_table(table)
-
-
-def test_something_else_table_ends_start(table: Path) -> None:
-    """Something else than a table ends the start."""
-    table.write_text("a_over_h,rt_over_h,sigma\n")
-    assert "is not an HDF5 file" in refused_table(table)
-
-
 def test_an_altered_table_ends_the_start(table: Path) -> None:
     with h5py.File(table, "r+") as file:
         file["sigma/sigma"][3, 3, 3] *= 1 + 1e-12
@@ -161,13 +133,6 @@ def test_a_damaged_byte_ends_the_start(table: Path) -> None:
     content[chunk.byte_offset + chunk.size // 2] ^= 1
     table.write_bytes(content)
     assert "is truncated or damaged" in refused_table(table)
-
-
-def test_table_older_schema_ends_start(table: Path) -> None:
-    """A table of an older schema ends the start."""
-    with h5py.File(table, "r+") as file:
-        file.attrs["schema"] = "underskin-sigma/0"
-    assert "has schema 'underskin-sigma/0'; this version reads 'underskin-sigma/1'" in refused_table(table)
 
 
 # The end

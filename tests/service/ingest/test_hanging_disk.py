@@ -10,6 +10,7 @@ import pytest
 
 from bench.soak import SOAK
 from tests.service.pages.forms import BROWSING, token_of
+from tests.service.waiting import until
 from tests.support.hanging.disk import CALLS, HangingDisk
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -54,10 +55,7 @@ def test_answered_disk_uploads_hangs(hanging_server: Server, disk: HangingDisk, 
         with disk.hanging(call):
             by_page = [pool.submit(send_by_page, hanging_server, number) for number in range(FEW)]
             sent = [pool.submit(send, hanging_server, number) for number in range(count)]
-            end = time.monotonic() + 240
-            while not disk.waiting():
-                assert time.monotonic() < end, "nothing hangs"
-                time.sleep(0.05)
+            until(disk.waiting, "nothing hangs")
             time.sleep(1.0)
             for path in OTHERS:
                 assert hanging_server.http.get(path, timeout=240).status_code == 200, path

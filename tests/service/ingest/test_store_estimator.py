@@ -72,16 +72,6 @@ def test_estimator_stays_skin_moves(server: Server, elsewhere: Server, tmp_path:
     assert d33(elsewhere, sent) == d33(server, sent)
 
 
-def test_estimator_part_request_key_stands(server: Server) -> None:
-    """The estimator is a part of the request that a key stands for."""
-    headers = {"Idempotency-Key": "one"}
-    document = shaken("shaken")
-    first = server.http.post("/v1/campaigns?estimator=H2", json=document, headers=headers)
-    again = server.http.post("/v1/campaigns?estimator=H2", json=document, headers=headers)
-    assert again.json() == first.json()
-    assert server.http.post("/v1/campaigns?estimator=Hv", json=document, headers=headers).status_code == 422
-
-
 def test_client_commands_choose_estimator(server: Server, tmp_path: Path) -> None:
     """The client and the commands choose the estimator."""
     file = tmp_path / "shaken.json"

@@ -76,11 +76,6 @@ def test_what_a_form_says_is_never_ignored(
     assert server.http.get("/v1/campaigns").json()["campaigns"] == []
 
 
-def test_the_same_in_query_and_form_is_said_once(server: Server) -> None:
-    entry = kept(send(server, {"skin": "palm-3", "all_or_nothing": "1"}, "?skin=palm-3&all_or_nothing=true"))
-    assert entry["skin_id"] == "palm-3"
-
-
 def test_an_option_is_no_file(server: Server) -> None:
     files: Fields = [("skin", ("palm-3.json", orjson.dumps(campaign("monday"))))]
     assert refused(server.http.post("/v1/campaigns", files=files)) == [("skin", "must be a text, not a file")]

@@ -1,9 +1,6 @@
 """Recordings that come twice: told when they come, counted once in histories."""
 
-from pathlib import Path
 from typing import Any
-
-import orjson
 
 from tests.service.usecases.test_store_skins import history, points
 from tests.support.store_server import Server, campaign
@@ -78,20 +75,6 @@ def test_twin_counts_once_withdrawn_corrected(server: Server) -> None:
     corrected = post(server, renamed(day, "right"), corrects=twin, reason="a slip in the name")
     assert corrected["notes"] == []
     assert points(server, "palm") == [corrected["id"]]
-
-
-def test_correction_changes_nothing_told(server: Server) -> None:
-    """A correction that changes nothing is told."""
-    day = made("monday")
-    first = post(server, day)["id"]
-    again = post(server, day, corrects=first, reason="E was mistyped")
-    assert again["notes"] == ["it says the same as the campaign that it corrects"]
-    thicker = {**day, "skin": {**day["skin"], "thickness_mm": 1.01 * day["skin"]["thickness_mm"]}}
-    last = post(server, thicker, corrects=again["id"], reason="h was mistyped")
-    assert last["notes"] == []
-    loose = {"recording": day["recordings"][0]["id"], "reason": "cable loose"}
-    server.http.post(f"/v1/campaigns/{last['id']}/exclusions", json=loose).raise_for_status()
-    assert post(server, thicker, corrects=last["id"], reason="the cable was fine")["notes"] == []  # it is in use again
 
 
 def test_two_points_share_recording_fuller(server: Server) -> None:
@@ -175,26 +158,6 @@ def test_copy_known_time_skin_not_numbers(server: Server) -> None:
     assert points(server, "palm") == [first, changed["id"]]
 
 
-def test_the_note_names_the_campaign_that_counts(server: Server) -> None:
-    day = made("monday")
-    elsewhere = post(server, day, skin="finger")
-    first = post(server, renamed(day, "first"))
-    second = post(server, renamed(day, "second"))
-    third = post(server, renamed(day, "third"))
-    assert points(server, "palm") == [first["id"]]
-    for answer, counts in ((first, elsewhere), (second, first), (third, first)):
-        assert f"That is {counts['id']};" in answer["notes"][0]
-    corrected = post(server, renamed(day, "right"), corrects=third["id"], reason="a slip in the name")
-    assert f"That is {first['id']};" in corrected["notes"][0]
-
-
-def test_repeats_within_one_request_are_told(server: Server) -> None:
-    day = made("monday")
-    first, second = server.http.post("/v1/campaigns?skin=palm", json=[day, renamed(day, "again")]).json()["campaigns"]
-    assert first["notes"] == []
-    assert f"That is {first['id']}" in second["notes"][0]
-
-
 def test_an_imported_skin_counts_them_once_too(server: Server, elsewhere: Server) -> None:
     day = made("monday")
     first = post(server, day)["id"]
@@ -203,16 +166,3 @@ def test_an_imported_skin_counts_them_once_too(server: Server, elsewhere: Server
     elsewhere.http.post("/v1/skins/import", content=exported).raise_for_status()
     assert points(elsewhere, "palm") == [first]
     assert history(elsewhere, "palm") == history(server, "palm")
-
-
-def test_the_command_line_tells_it(server: Server, tmp_path: Path) -> None:
-    day = made("monday")
-    lines = []
-    for name, document in (("monday", day), ("again", renamed(day, "again"))):
-        file = tmp_path / f"{name}.json"
-        file.write_bytes(orjson.dumps(document))
-        done = server.place.command("import", str(file), "--skin", "palm", "--url", str(server.http.base_url))
-        assert done.returncode == 0, done.stderr
-        lines.append(done.stdout)
-    assert "already" not in lines[0]
-    assert f"{tmp_path / 'again.json'}: these recordings are in campaign monday of skin palm already" in lines[1]

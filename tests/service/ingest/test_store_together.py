@@ -99,38 +99,6 @@ def test_files_of_different_skins_are_refused(server: Server) -> None:
         assert server.http.post(f"/v1/campaigns?together={name}", json=WHOLE).status_code == 422
 
 
-def test_the_skin_can_be_said_for_all(server: Server) -> None:
-    files = []
-    for number in range(2):
-        document = orjson.loads(press(number))
-        document["skin"]["id"] = f"said-{number}"
-        files.append((f"{number}.json", orjson.dumps(document)))
-    assert "skin.id" in post(server, files).json()["detail"]
-    (kept,) = post(server, files, "skin=palm").json()["campaigns"]
-    assert kept["skin_id"] == "palm"
-    assert server.http.get(f"/v1/campaigns/{kept['id']}").json()["skin"]["id"] == "palm"
-
-
-def test_request_kept_once_apart(server: Server) -> None:
-    """The same request is kept once and apart is another."""
-    key = {"Idempotency-Key": "monday"}
-    first = post(server, presses(), **key)
-    assert post(server, presses(), **key).json() == first.json()
-    apart = server.http.post("/v1/campaigns", files=[("file", file) for file in presses()], headers=key)
-    assert (apart.status_code, "another request" in apart.json()["detail"]) == (422, True)
-    assert len(server.http.get("/v1/campaigns").json()["campaigns"]) == 1
-
-
-def test_list_goes_together_joined_campaign(server: Server) -> None:
-    """A list goes together and a joined campaign corrects."""
-    first = server.http.post("/v1/campaigns?skin=palm", json=WHOLE).json()["id"]
-    documents = [orjson.loads(content) for _, content in presses()]
-    answer = server.http.post(f"/v1/campaigns?together=palm&corrects={first}&reason=again", json=documents)
-    assert answer.status_code == 201, answer.text
-    (kept,) = answer.json()["campaigns"]
-    assert [entry["id"] for entry in server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]] == [kept["id"]]
-
-
 def test_instrument_files_two_formats_rig(server: Server) -> None:
     """Instrument files of two formats and their rig."""
     files = [("one.tdms", tdms(1)), ("two.tdms", tdms(2)), ("three.lvm", lvm(repeats=1).encode())]

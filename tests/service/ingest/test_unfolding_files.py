@@ -5,11 +5,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import h5py
-import httpx
 import numpy as np
 import pytest
 
-from tests.service.pages.forms import BROWSING, token_of
 from tests.support.memory import family_mb
 from tests.support.store_server import Place, Server, campaign, running
 from underskin.recordings.readers import hdf5_file
@@ -79,14 +77,3 @@ def test_request_files_unfold_too_much_refused(small: Server, zeros: bytes) -> N
     assert kept(small, "many") == 0
     assert small.http.post("/v1/campaigns?skin=many", files=files(zeros, FITTING)).status_code == 201
     assert kept(small, "many") == FITTING
-
-
-@pytest.mark.soak
-def test_the_page_says_so_too(small: Server, zeros: bytes) -> None:
-    with httpx.Client(base_url=small.http.base_url, headers=BROWSING, timeout=300) as browser:
-        form = {"form_token": token_of(browser.get("/upload").text)}
-        place = browser.post("/upload", data=form, files=files(zeros, FITTING + 1)).headers["location"]
-        form = {"form_token": token_of(browser.get(place).text), "skin": "by page"}
-        assert browser.post(f"{place}/keep", data=form).headers["location"] == place
-        assert f"more than the {MOST_MB} MB that one request may bring" in browser.get(place).text
-    assert kept(small, "by page") == 0

@@ -33,16 +33,6 @@ def test_what_to_diagnose_must_be_given_once(given: list[str], tmp_path: Path) -
     assert not (tmp_path / "reports").exists()
 
 
-def test_without_folder_reports_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a folder reports go into one of their own."""
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, ["diagnose", "nowhere.json"])
-    assert result.exit_code == 2
-    assert "nowhere.json" in result.stderr
-    assert "Missing option" not in result.stderr
-    assert not any(Path("diagnosis").iterdir())
-
-
 def test_a_report_never_overwrites_its_campaign(tmp_path: Path) -> None:
     file = tmp_path / "palm.json"
     file.write_text("{}", encoding="utf-8")

@@ -114,18 +114,6 @@ def test_all_or_chosen_campaigns_are_queued_once(server: Server, client: Client)
         client.skins.adopt("palm", whole["id"])
 
 
-def test_asked_twice_under_key_queued_once(server: Server) -> None:
-    """Asked twice under one key is queued once."""
-    sent_to(server, "palm", 2)
-    key = {"Idempotency-Key": "mine"}
-    first = server.http.post("/v1/skins/palm/diagnosis", headers=key).json()
-    server.http.delete(f"/v1/diagnoses/{first['id']}")
-    assert server.http.post("/v1/skins/palm/diagnosis", headers=key).json() == first
-    other = server.http.post("/v1/skins/palm/diagnosis", headers=key, json={"name": "other"})
-    assert other.status_code == 422
-    assert server.http.post("/v1/skins/palm/diagnosis").json()["id"] != first["id"]
-
-
 def test_asked_at_once_is_queued_once(server: Server) -> None:
     skins = ["palm", "finger", "thumb"]
     for skin in skins:
@@ -174,16 +162,6 @@ def test_change_campaign_outdates(server: Server, client: Client) -> None:
     assert outdated() == [withdrawn, withdrawn]
 
 
-def test_a_correction_outdates_a_fleet(server: Server, client: Client) -> None:
-    (first, *_) = [sent_to(server, f"palm-{number}", 1)[0] for number in range(3)]
-    fleet = client.fleets.diagnose(["palm-0", "palm-1", "palm-2"], "batch 7")["id"]
-    newer = client.campaigns.post(campaign("right", sensors=1), corrects=first, reason="E was mistyped")["id"]
-    assert found(server, fleet)["outdated"] == f"campaign {first} was corrected by {newer}"
-    again = client.fleets.diagnose(["palm-0", "palm-1", "palm-2"], "batch 7")["id"]
-    assert newer in found(server, again)["campaign_ids"]
-    assert [entry["id"] for entry in client.diagnoses.all(skin="palm-1")] == [again, fleet]
-
-
 def test_skin_too_few_campaigns_refused(server: Server, client: Client) -> None:
     """A skin with too few campaigns is refused."""
     assert "no skin 'palm'" in refused(server, "/v1/skins/palm/diagnosis", {}, 404)["detail"]
@@ -209,26 +187,18 @@ WRONG_OF_A_SKIN: Wrong = [
     ({"campaigns": ["FIRST", "FIRST"]}, "campaigns", 1, "not_unique"),
     ({"campaigns": ["FIRST", "FOREIGN"]}, "campaigns", 1, "not_one_of"),
     ({"campaigns": ["FIRST", "c-1"]}, "campaigns", 1, "not_one_of"),
-    ({"campaigns": ["FIRST", 7]}, "campaigns", 1, None),
-    ({"campaigns": "FIRST"}, "campaigns", None, None),
     ({"name": ""}, "name", None, None),
     ({"name": " \n"}, "name", None, "wrong_type"),
-    ({"name": 7}, "name", None, None),
-    ({"name": "x" * 201}, "name", None, None),
     ({"without": ["nothing"]}, "without", None, "not_one_of"),
     ({"skins": ["palm"]}, "skins", None, "unknown_field"),
 ]
 WRONG_OF_A_FLEET: Wrong = [
     ({"name": "fleet"}, "skins", None, "required"),
     ({"skins": ["a", "b", "c"]}, "name", None, "required"),
-    ({"skins": [], "name": "fleet"}, "skins", None, "too_few"),
     ({"skins": ["a", "b"], "name": "fleet"}, "skins", None, "too_few"),
     ({"skins": ["a", "b", "a"], "name": "fleet"}, "skins", 2, "not_unique"),
     ({"skins": ["a", "b", "joined"], "name": "fleet"}, "skins", 2, "not_unique"),
     ({"skins": ["a", "nowhere", "c"], "name": "fleet"}, "skins", 1, "not_one_of"),
-    ({"skins": ["a", "b", 3], "name": "fleet"}, "skins", 2, None),
-    ({"skins": {"a": 1}, "name": "fleet"}, "skins", None, None),
-    ({"skins": ["a", "b", "c"], "name": "\t"}, "name", None, "wrong_type"),
     ({"skins": ["a", "b", "c"], "name": "fleet", "without": ["x"]}, "without", None, "not_one_of"),
     ({"skins": ["a", "b", "c"], "name": "fleet", "campaigns": []}, "campaigns", None, "unknown_field"),
 ]
@@ -252,12 +222,3 @@ def test_a_wrong_request_names_the_field(server: Server, client: Client) -> None
         (error,) = refused(server, "/v1/fleets/diagnosis", body, 422)["errors"]
         assert (error["field"], error["index"]) == (field, index), body
         assert code in (None, error["code"]), body
-
-
-def test_skin_fleet_without_campaign_use_named(server: Server, client: Client) -> None:
-    """A skin of a fleet without a campaign in use is named."""
-    for skin in ("a", "b"):
-        sent_to(server, skin, 1)
-    client.campaigns.withdraw(sent_to(server, "c", 1)[0], "wrong sphere")
-    problem = refused(server, "/v1/fleets/diagnosis", {"skins": ["a", "b", "c"], "name": "fleet"}, 409)
-    assert "'c' has no campaign in use" in problem["detail"]

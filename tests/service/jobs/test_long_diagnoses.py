@@ -13,6 +13,7 @@ from service.jobs import runner
 from service.jobs.process import CampaignInput, WorkerProcesses
 from service.jobs.runner import Runner
 from service.store import Database, campaigns, diagnoses, open_store
+from tests.service.waiting import until
 from tests.support.diagnosed import asked, awaited, report, resonant, sent
 from tests.support.store_server import Place, campaign, running
 from underskin.recordings.campaign import parse
@@ -95,10 +96,7 @@ def test_short_diagnoses_not_wait_long_ones(store: Database, monkeypatch: pytest
     runs = Runner(store, cast("WorkerProcesses", workers), 1)
     runs.start()
     try:
-        ends = time.monotonic() + 240
-        while [state(store, one) for one in short] != ["done", "done"]:
-            assert time.monotonic() < ends, workers.begun
-            time.sleep(0.05)
+        until(lambda: [state(store, one) for one in short] == ["done", "done"], workers.begun)
         assert state(store, first) == "running"
         assert state(store, second) in ("queued", "running")
         assert workers.begun.count("long") == 2

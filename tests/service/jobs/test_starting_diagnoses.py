@@ -16,6 +16,7 @@ from service.store import campaigns, database, diagnoses, open_store
 from service.store.tables import AnyRow
 from service.store.tables import diagnoses as table_of_diagnoses
 from tests.service.jobs.test_diagnoses import SEVERAL, await_workers
+from tests.service.waiting import until
 from tests.support.diagnosed import awaited, begun, small, small_report, table
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import __version__
@@ -50,10 +51,7 @@ def test_diagnosis_worker_slow_start_kept_alive(place: Place) -> None:
             diagnosis_id = begun(server, small())
             awaited(server, diagnosis_id, "running")
             claimed_at = row_of(place, diagnosis_id).alive_at
-            ends = time.monotonic() + diagnoses.HEARTBEAT_TIMEOUT_S
-            while row_of(place, diagnosis_id).alive_at < claimed_at + 2:
-                assert time.monotonic() < ends, "no sign of life"
-                time.sleep(0.1)
+            until(lambda: row_of(place, diagnosis_id).alive_at >= claimed_at + 2, "no sign of life")
             with closing(database(place.database_url, place.folder)) as store, store.writing() as connection:
                 killed = {"claimed_by": "a server that was killed", "alive_at": 0.0}
                 connection.execute(table_of_diagnoses.update().values(**killed))
@@ -88,10 +86,7 @@ def test_diagnosis_no_thread_starts_put_back(
         runner = Runner(store, processes, 1)
         runner.start()
         try:
-            ends = time.monotonic() + 240
-            while store.read(diagnoses.find, diagnosis.id).state != "done":
-                assert time.monotonic() < ends, store.read(diagnoses.find, diagnosis.id)
-                time.sleep(0.1)
+            until(lambda: store.read(diagnoses.find, diagnosis.id).state == "done")
         finally:
             runner.stop()
     first, second = tried

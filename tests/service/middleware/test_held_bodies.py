@@ -10,6 +10,7 @@ import pytest
 
 from tests.service.connections import HEAD, connect, read_answer
 from tests.service.requests import SIGMA
+from tests.service.waiting import until
 from tests.support.process_memory import memory_bytes
 from tests.support.server import Server, running
 
@@ -61,7 +62,10 @@ def test_room_free_again_once_answered(server: Server) -> None:
             assert read_answer(connection)[0] == 400
     for _ in range(11):
         begun(server, 7).close()  # the client leaves
-    time.sleep(0.5)
-    with begun(server, 7) as connection:
-        connection.sendall(b" ")
-        assert read_answer(connection)[0] == 400
+
+    def has_room() -> bool:
+        with begun(server, 7) as connection:
+            connection.sendall(b" ")
+            return read_answer(connection)[0] == 400
+
+    until(has_room, "there is no room again")

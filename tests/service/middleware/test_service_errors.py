@@ -29,11 +29,6 @@ def test_head_has_the_headers_of_get_and_no_body(http: httpx.Client, path: str) 
         assert asked.headers.get(name) == whole.headers.get(name)
 
 
-def test_head_takes_post_alone_refused(http: httpx.Client) -> None:
-    """Head of what takes post alone is refused."""
-    assert http.head("/umbridge/Evaluate").status_code == 405
-
-
 def test_every_route_refuses_in_the_same_shape(http: httpx.Client) -> None:
     for method, path in all_routes(http):
         problem_of(http.request(method, path, headers={"Host": "evil.example"}), 421)
@@ -59,41 +54,25 @@ def test_every_route_refuses_in_the_same_shape(http: httpx.Client) -> None:
     [
         ("/v1/sigma", SIGMA, {"a_over_h": [0.3, -0.1]}, "a_over_h", 1),
         ("/v1/sigma", SIGMA, {"a_over_h": [0.3, math.nan]}, "a_over_h", 1),
-        ("/v1/sigma", SIGMA, {"a_over_h": [math.inf, 0.3]}, "a_over_h", 0),
         ("/v1/sigma", SIGMA, {"a_over_h": [0.3, None]}, "a_over_h", 1),
-        ("/v1/sigma", SIGMA, {"a_over_h": [0.3, "0.6"]}, "a_over_h", 1),
         ("/v1/sigma", SIGMA, {"a_over_h": [True, 0.6]}, "a_over_h", 0),
-        ("/v1/sigma", SIGMA, {"a_over_h": "0.3"}, "a_over_h", None),
         ("/v1/sigma", SIGMA, {"a_over_h": [[0.3], 0.6]}, "a_over_h", 0),
-        ("/v1/sigma", SIGMA, {"a_over_h": []}, "a_over_h", None),
         ("/v1/sigma", SIGMA, {"rt_over_h": [0.6, 0.6, 0.6]}, "rt_over_h", None),
-        ("/v1/sigma", SIGMA, {"rt_over_h": [0.6]}, "rt_over_h", None),
-        ("/v1/sigma", SIGMA, {"load_parameter": -1e-9}, "load_parameter", None),
         ("/v1/sigma", SIGMA, {"load_paramter": 0.1}, "load_paramter", None),
         ("/v1/sigma", SIGMA, {"model": "sphere"}, "model", None),
         ("/v1/sigma", SIGMA, {"a_over_h": 10**400}, "a_over_h", None),
         ("/v1/frf", FRF, {"preload_n": [1.0, 0.0]}, "preload_n", 1),
-        ("/v1/frf", FRF, {"preload_n": [1.0, -3.0]}, "preload_n", 1),
-        ("/v1/frf", FRF, {"thickness_mm": 0.0}, "thickness_mm", None),
         ("/v1/frf", FRF, {"youngs_modulus_mpa": math.nan}, "youngs_modulus_mpa", None),
-        ("/v1/frf", FRF, {"indenter_radius_mm": [4.0, math.inf]}, "indenter_radius_mm", 1),
         ("/v1/frf", FRF, {"d33_pc_per_n": 0.0}, "d33_pc_per_n", None),
         ("/v1/frf", FRF, {"poisson_ratio": 0.51}, "poisson_ratio", None),
         ("/v1/frf", FRF, {"frequency_hz": [10.0, -1.0]}, "frequency_hz", 1),
-        ("/v1/frf", FRF, {"frequency_hz": []}, "frequency_hz", None),
         ("/v1/frf", FRF, {"frequency_hz": [1.0] * 500_001}, "frequency_hz", None),
-        ("/v1/frf", FRF, {"skin_id": "palm"}, "skin_id", None),
         ("/v1/frf", FRF, {"model": "adopted"}, "skin_id", None),
         ("/v1/d33", D33, {"frf_pc_per_n": [1.0, math.nan]}, "frf_pc_per_n", 1),
-        ("/v1/d33", D33, {"frf_pc_per_n": [1.0, 2.0, 3.0]}, "frf_pc_per_n", None),
         ("/v1/d33", D33, {"frf_uncertainty_pc_per_n": -0.1}, "frf_uncertainty_pc_per_n", None),
         ("/v1/d33", D33, {"band_hz": [1, 2]}, "band_hz", None),
-        ("/v1/d33", LINES, {"band_hz": None}, "band_hz", None),
-        ("/v1/d33", LINES, {"band_hz": [30, 100]}, "band_hz", None),
-        ("/v1/d33", LINES, {"band_hz": [15, 100]}, "frf_uncertainty_pc_per_n", None),
         ("/v1/d33", LINES, {"frf_re_pc_per_n": [[7, 7.1], [8]]}, "frf_re_pc_per_n", 1),
         ("/v1/d33", LINES, {"frf_re_pc_per_n": [[7, 7.1], [8, math.inf]]}, "frf_re_pc_per_n", 1),
-        ("/v1/d33", LINES, {"frf_re_pc_per_n": [[7, 7.1]]}, "frf_re_pc_per_n", None),
         ("/v1/d33", LINES, {"frf_im_pc_per_n": [[7, 7.1], [8, None]]}, "frf_im_pc_per_n", 1),
     ],
 )
@@ -122,31 +101,11 @@ def test_slip_units_guessed_meant(http: httpx.Client, field: str, value: float, 
     assert http.post("/v1/frf", json={**fields, "units_checked": True}).status_code == 200
 
 
-def test_unequal_columns_are_both_named(http: httpx.Client) -> None:
-    answer = http.post("/v1/sigma", json={"a_over_h": [0.3, 0.6], "rt_over_h": [0.1, 0.2, 0.3]})
-    detail = problem_of(answer, 422)["detail"]
-    assert "a_over_h" in detail
-    assert "rt_over_h" in detail
-
-
 def test_skin_without_adopted_model_not_found(http: httpx.Client) -> None:
     """A skin without an adopted model is not found."""
     for path, good in (("/v1/frf", FRF), ("/v1/d33", D33)):
         answer = http.post(path, json={**good, "model": "adopted", "skin_id": "palm-3"})
         assert "'palm-3' has no adopted model" in problem_of(answer, 404)["detail"]
-
-
-@pytest.mark.parametrize("query", ["a_over_h=-1&rt_over_h=1", "a_over_h=nan&rt_over_h=1", "a_over_h=1&rt_over_h=inf"])
-def test_wrong_value_in_a_query(http: httpx.Client, query: str) -> None:
-    (error,) = problem_of(http.get(f"/v1/sigma?{query}"), 422)["errors"]
-    assert error["field"] in query
-
-
-@pytest.mark.parametrize(
-    "query", ["", "a_over_h=1", "a_over_h=1&rt_over_h=", "a_over_h=1&rt_over_h=x", "a_over_h=1&rt_over_h=1&load=0.1"]
-)
-def test_query_that_is_not_understood(http: httpx.Client, query: str) -> None:
-    assert problem_of(http.get(f"/v1/sigma?{query}"), 422)["errors"]
 
 
 @pytest.mark.parametrize(
@@ -167,37 +126,6 @@ def test_query_that_is_not_understood(http: httpx.Client, query: str) -> None:
 def test_csv_that_is_not_understood(http: httpx.Client, body: bytes, status: int, says: str) -> None:
     answer = http.post("/v1/sigma", content=body, headers={"Content-Type": "text/csv"})
     assert says in problem_of(answer, status)["detail"]
-
-
-def test_rows_spreadsheet_come_back_called(http: httpx.Client) -> None:
-    """Rows of a spreadsheet come back with what they are called.
-
-    Semicolons, decimal commas and a column of words, as German spreadsheets have them.
-    """
-    body = b"sep=;\r\nPress;a_over_h;rt_over_h\r\nerste;0,3;0,6\r\nzweite;0,4;0,6\r\n"
-    headers = {"Content-Type": "text/csv", "Accept": "text/csv"}
-    header, *rows = http.post("/v1/sigma", content=body, headers=headers).text.splitlines()
-    assert header.startswith("Press,sigma,")
-    assert [row.split(",")[0] for row in rows] == ["erste", "zweite"]
-    plain = http.post("/v1/sigma", json={"a_over_h": [0.3, 0.4], "rt_over_h": 0.6}).json()
-    sigma = header.split(",").index("sigma")
-    assert [float(row.split(",")[sigma]) for row in rows] == pytest.approx(plain["sigma"], rel=1e-15)
-
-
-def test_what_csv_cannot_tell_is_said(http: httpx.Client) -> None:
-    fields = {**FRF, "preload_n": 1.0, "frequency_hz": 10.0}
-    body = ",".join(fields) + "\n" + ",".join(map(str, fields.values()))
-    answer = http.post("/v1/frf", content=body, headers={"Content-Type": "text/csv"})
-    (error,) = problem_of(answer, 422)["errors"]
-    assert error["field"] == "frequency_hz"
-    assert "application/json" in error["allowed"]
-
-
-def test_values_too_large_double_outside(http: httpx.Client) -> None:
-    """Values too large for a double are outside not a failure."""
-    answer = http.post("/v1/frf", json={**FRF, "preload_n": [1.0, 1e308], "units_checked": True})
-    assert answer.status_code == 200
-    assert answer.json()["status"] == ["ok", "out_of_domain"]
 
 
 def test_nobody_expected_problem_traceback_log(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -1,7 +1,6 @@
 """Two campaigns side by side: the same colours, the difference and what of it is beyond chance."""
 
 import csv
-import html
 import re
 import time
 from collections.abc import Sequence
@@ -10,10 +9,8 @@ from dataclasses import replace
 import pytest
 from playwright.sync_api import Page
 
-from service.pages.compare.page import drawn_maps
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
-from tests.support import store_server
 from tests.support.blocks import block
 from tests.support.cases import first
 from tests.support.diagnosed import sent, table
@@ -51,54 +48,17 @@ def compared(visitor: Visit, skin: str, width: int, figures: int) -> Page:
     return page
 
 
-@pytest.mark.soak
-@pytest.mark.parametrize("width", first(1, [390, 1180]))
-def test_skin_before_after_sensor_changed(visitor: Visit, server: Server, width: int) -> None:
-    """A skin before and after and the sensor that changed."""
-    skin = f"aged{width}"
-    before = sent(server, to_dict(campaign(BEFORE, table())), skin)
-    second = sent(server, to_dict(weakened(campaign(BEFORE, table()), "s2", 0.7)), skin)
-    page = compared(visitor, skin, width, 3)
-    assert page.get_by_label("First", exact=True).input_value() == before
-    ends = [
-        page.locator(f"#figure-map-{name} .plot").evaluate(
-            "plot => [plot.data[0].marker.cmin, plot.data[0].marker.cmax]"
-        )
-        for name in ("first", "second")
-    ]
-    assert ends[0] == ends[1]
-    across, bar = page.locator("#figure-map-first .plot").evaluate(
-        "plot => [plot._fullLayout.xaxis._length, plot._fullData.find((one) => one.marker?.colorbar).marker.colorbar"
-        ".orientation]"
-    )
-    assert bar == ("h" if width == 390 else "v")
-    assert across > 240 or width != 390  # the scale of colours leaves the width to the map
-    values = page.get_by_role("region", name="d33 of each sensor")
-    row = values.get_by_role("row", name=re.compile("^s2")).locator("td")
-    gap, half = row.nth(0).inner_text(), row.nth(1).inner_text()
-    assert re.fullmatch(r"−[34]\.\d+", gap)  # 30 % less, right after the sensor
-    assert re.fullmatch(r"0\.0*[1-9]\d", half)  # two digits, which say how many the difference has
-    assert len(gap.partition(".")[2]) == len(half.partition(".")[2])
-    assert re.fullmatch(r"1\d\.\d+\n\(1\d\.\d+ to 1\d\.\d+\)", row.nth(2).inner_text())
-    box = row.first.bounding_box()
-    assert box is not None
-    assert box["x"] + box["width"] <= width  # without moving the table sideways
-    told = page.locator("#figure-map-difference figcaption").inner_text()
-    assert "1 of 4 differ from 0 beyond chance" in told
-    changed = page.locator("#figure-map-difference .plot").evaluate(
-        "plot => plot.data.find((one) => one.name === 'difference of d33').ids"
-    )
-    assert changed == ["s2"]
-    page.get_by_label("First", exact=True).select_option(second)
-    page.get_by_label("Second", exact=True).select_option(before)
-    page.get_by_role("button", name="Compare").click()
-    page.wait_for_url(f"**first={second}*")
-    rows = csv.DictReader(
-        server.http.get("/compare/difference.csv", params={"first": second, "second": before}).text.splitlines()
-    )
-    gaps = {row["sensor"]: float(row["difference_pc_per_n"]) for row in rows}
-    assert gaps["s2"] == pytest.approx(0.3 * BEFORE.d33_pc_per_n, abs=0.5)
-    assert max(abs(gap) for sensor, gap in gaps.items() if sensor != "s2") < 0.05
+def test_skin_before_after_sensor_changed(server: Server) -> None:
+    """A skin before and after, one sensor of which lost 30 %: that one differs beyond chance, the others do not."""
+    before = sent(server, to_dict(campaign(BEFORE, table())), "aged")
+    after = sent(server, to_dict(weakened(campaign(BEFORE, table()), "s2", 0.7)), "aged")
+    both = {"first": before, "second": after}
+    assert "1 of 4 differ from 0 beyond chance" in server.http.get("/compare", params=both, headers=BROWSING).text
+    for order, sign in ((both, -1), ({"first": after, "second": before}, 1)):
+        rows = csv.DictReader(server.http.get("/compare/difference.csv", params=order).text.splitlines())
+        gaps = {row["sensor"]: float(row["difference_pc_per_n"]) for row in rows}
+        assert gaps["s2"] == pytest.approx(sign * 0.3 * BEFORE.d33_pc_per_n, abs=0.5)
+        assert max(abs(gap) for sensor, gap in gaps.items() if sensor != "s2") < 0.05
 
 
 def test_campaigns_without_a_condition_in_common(server: Server) -> None:
@@ -125,22 +85,6 @@ def test_a_sensor_that_was_dead_differs_in_charge(server: Server) -> None:
     assert "nan" not in re.findall(r'class="result lead".*?</p>', text, re.DOTALL)[0]
 
 
-def test_nothing_to_compare_is_said(server: Server) -> None:
-    assert server.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
-
-
-def test_first_recorded_first_however_late(server: Server) -> None:
-    """First is the one recorded first however late it arrives."""
-    ids = {}
-    for year in (2020, 2017):
-        made = campaign(BEFORE, table())
-        entries = tuple(replace(entry, recorded_at=f"{year}-05-03T09:00:00Z") for entry in made.recordings)
-        ids[year] = sent(server, to_dict(replace(made, name=str(year), recordings=entries)), "by-time")
-    text = server.http.get("/compare?skin=by-time", headers=BROWSING).text
-    chosen = re.findall(r'value="([^"]*)" selected', text)
-    assert chosen == [ids[2017], ids[2020]]
-
-
 def test_without_choice_last_two_skin_compared(server: Server) -> None:
     """Without a choice the last two of one skin are compared and sensors elsewhere are named."""
 
@@ -165,48 +109,6 @@ def test_without_choice_last_two_skin_compared(server: Server) -> None:
     warned = server.http.get("/compare", params={"first": alone, "second": bent}, headers=BROWSING).text
     (said,) = re.findall(r"Sensors of the same id lie elsewhere in the two campaigns: (.*?)\. Their", warned)
     assert re.sub(r"<[^>]+>|&nbsp;", "", said) == "s1 by 6.00mm"
-
-
-def test_two_skins_without_sensor_common_say(server: Server) -> None:
-    """Two skins without a sensor in common say so and how sensors are matched."""
-    first = store_server.campaign("left", sensors=2, lines=3)
-    second = store_server.campaign("right", sensors=9, lines=3)
-    for one in [*second["skin"]["sensors"], *second["recordings"]]:
-        name = "id" if "x_mm" in one else "sensor"
-        one[name] = one[name].replace("s", "finger ")
-    ids = {name: sent(server, document, name) for name, document in (("left", first), ("right", second))}
-    text = server.http.get("/compare", params={"first": ids["left"], "second": ids["right"]}, headers=BROWSING).text
-    (said,) = re.findall(r"No sensor is in both campaigns: (.*?\.)", text)
-    named = ", ".join(f"finger {number}" for number in range(6))
-    assert said == f"sensors are matched by their ids, and the first has s0, s1, the second {named} and 3 more."
-    alike = server.http.get("/compare", params={"first": ids["left"], "second": ids["left"]}, headers=BROWSING).text
-    assert "No sensor is in both" not in alike
-
-
-@pytest.mark.soak
-def test_campaigns_offered_compared_pages(server: Server) -> None:
-    """Of more campaigns than are offered the others are compared from their pages."""
-    many = [store_server.campaign(f"day {number}", sensors=1, lines=3) for number in range(202)]
-    for number, document in enumerate(many):
-        (recorded, _) = document["recordings"]
-        recorded["recorded_at"] = f"20{number // 12:02d}-{number % 12 + 1:02d}-03T09:00:00Z"
-        document["recordings"] = [recorded]
-    kept = server.http.post("/v1/campaigns?skin=long", json=many).raise_for_status().json()["campaigns"]
-    text = server.http.get("/compare?skin=long", headers=BROWSING).text
-    assert "The 200 campaigns recorded last of this skin are offered" in text
-    second = kept[1]["id"]
-    assert second not in text
-    page = server.http.get(f"/campaigns/{second}", headers=BROWSING).text
-    (place,) = re.findall(r'href="(/compare[^"]*)"', page)
-    chosen = server.http.get(html.unescape(place), headers=BROWSING).text
-    assert re.findall(r'value="([^"]*)" selected', chosen) == [second, kept[-1]["id"]]
-
-
-def test_sensors_without_d33_leave_nothing_draw() -> None:
-    """Sensors without d33 leave nothing to draw."""
-    nothing = dict.fromkeys(("d33_pc_per_n", "d33_uncertainty_pc_per_n"))
-    rows = [{"sensor": "s0", "first_pc_per_n": None, "second_pc_per_n": None}]
-    assert drawn_maps([], [{"sensors": [{"sensor": "s0", **nothing}]}] * 2, rows) == []
 
 
 def one_sensor(number: int) -> dict[str, object]:
@@ -290,33 +192,3 @@ def test_kinds_campaigns_offered(server: Server) -> None:
     chosen = server.http.get(f"/compare?skin=kinds&first={first}", headers=BROWSING).text
     assert "<strong>compressions</strong>" in chosen
     assert server.http.get("/compare?kind=tension", headers=BROWSING).status_code == 422
-
-
-def test_map_grey_campaign(server: Server) -> None:
-    """A map is grey where that of its campaign is."""
-    ids = [sent(server, to_dict(campaign(BEFORE, table())) | {"name": f"alike {number}"}, "alike") for number in (1, 2)]
-    own = server.http.get(f"/campaigns/{ids[0]}", headers=BROWSING).text
-    beside = server.http.get("/compare?skin=alike", headers=BROWSING).text
-    told = re.search(r"[^.<]*differ from the others beyond chance[^.<]*", own)
-    assert told is not None
-    captions = re.findall(r"<figcaption.*?</figcaption>", beside, re.DOTALL)
-    assert [told[0] in caption for caption in captions] == [True, True, False, False]
-
-
-def test_discarded_campaign_not_counted_start(server: Server) -> None:
-    """A discarded campaign is not counted at the start."""
-    kept = [sent(server, one_sensor(number), "counted") for number in (2, 3)]
-    reason = {"reason": "a mere trial"}
-    for one, count in zip(kept, (1, 0), strict=True):
-        assert server.http.post(f"/v1/campaigns/{one}/discard", json=reason).status_code == 200
-        start = server.http.get("/?find=counted", headers=BROWSING).text
-        assert f'<td class="figures" data-label="Campaigns">{count}</td>' in start
-    assert "none in use" in start
-
-
-def test_start_tells_time_arrival_recording(server: Server) -> None:
-    """The start tells a time of arrival from one of recording."""
-    sent(server, one_sensor(4), "arrived")
-    sent(server, block("pressed", recorded_at="2021-01-01T00:00:00Z"), "recorded")
-    assert '<span class="quiet">received <time' in server.http.get("/?find=arrived", headers=BROWSING).text
-    assert '<span class="quiet"><time' in server.http.get("/?find=recorded", headers=BROWSING).text

@@ -2,14 +2,12 @@
 
 import re
 
-import numpy as np
 import pytest
 from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
 from tests.support.cases import first
 from tests.support.store_server import Server
-from underskin.figures.design import design_region
 
 
 def cell(visitor: Visit, name: str, column: str) -> str:
@@ -61,47 +59,12 @@ def test_design_pinned_moves_beside(visitor: Visit) -> None:
     expect(page.get_by_role("heading", name="A, pinned")).to_have_count(0)
 
 
-def test_a_large_change_is_a_plain_number(server: Server) -> None:
-    text = server.http.get("/design?preload_n=25&pin=preload_n%3D1", headers={"Accept": "text/html"}).text
-    assert "+2400 %" in text
-    assert "e+0" not in text
-
-
 def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
     answer = server.http.get("/design?pin=pitch_mm%3D1", headers={"Accept": "text/html"})
     assert answer.status_code == 200
     assert "cannot overlap" in answer.text
     answer = server.http.get("/design?pin=pitch_mm%3Dx", headers={"Accept": "text/html"})
     assert "pitch of the array [mm]: x – must be a number" in answer.text
-
-
-@pytest.mark.soak
-def test_material_gives_number_leaves(visitor: Visit) -> None:
-    """A material gives its number and leaves the others."""
-    page = visitor.page
-    visitor.go("/design?thickness_mm=3")
-    page.get_by_text("Materials, with their sources").press("Enter")
-    row = page.get_by_role("row", name=re.compile("^Sylgard 184, 10 : 1"))
-    assert "10.1002/app.41050" in row.inner_text()
-    fits_and_is_accessible(visitor)
-    page.get_by_role("button", name="Take Sylgard 184, 10 : 1").click()
-    page.wait_for_url("**youngs_modulus_mpa=2&**")
-    assert page.locator("#thickness_mm").input_value() == "3"
-    page.get_by_text("Materials, with their sources").click()
-    page.get_by_role("button", name="Take PVDF film").click()
-    page.wait_for_url("**d33_pc_per_n=33&**")
-    assert page.locator("#youngs_modulus_mpa").input_value() == "2"
-    told = page.locator("[data-material]")
-    assert told.all_inner_texts() == ["Sylgard 184, 10 : 1", "PVDF film"]
-    page.locator("#youngs_modulus_mpa").fill("2.5")
-    page.wait_for_function("() => document.querySelector('[data-material]').textContent === ''")
-    assert told.last.inner_text() == "PVDF film"
-
-
-def test_an_unknown_material_is_refused(server: Server) -> None:
-    answer = server.http.get("/design?material=cheese", headers={"Accept": "text/html"})
-    assert answer.status_code == 422
-    assert "material" in answer.text
 
 
 def test_asked_searched_offered_leads_design(visitor: Visit) -> None:
@@ -122,28 +85,6 @@ def test_asked_searched_offered_leads_design(visitor: Visit) -> None:
     apart = float(page.locator("[data-result=apart] b").inner_text().split()[0])
     assert apart <= 3.5
     assert float(page.locator("#pitch_mm").input_value()) == pitch
-
-
-@pytest.mark.soak
-def test_where_no_skin_does_the_limit_is_named(visitor: Visit) -> None:
-    page = visitor.page
-    visitor.go("/design/search?thinnest_mm=3")
-    expect(page.get_by_role("heading", name="that were tried meets it")).to_be_visible()
-    expect(page.get_by_text("The thinnest layer that can be made: none of them that does the rest")).to_be_visible()
-    visitor.drawn(1)
-    fits_and_is_accessible(visitor)
-    page.get_by_label("thinnest layer").fill("thick")
-    page.get_by_role("button", name="Search").click()
-    expect(page.get_by_role("alert")).to_contain_text("thinnest layer that can be made [mm]: thick – must be a number")
-    assert page.get_by_label("thinnest layer").input_value() == "thick"
-
-
-@pytest.mark.parametrize(("pitches", "ends"), [((0.8, 0.95), (0.8, 0.95)), ((0.9, 0.901), (0.95 * 0.901, 0.901))])
-def test_colours_map_span_pitches_shown(pitches: tuple[float, float], ends: tuple[float, float]) -> None:
-    """Colours of the map span the pitches that are shown."""
-    pitch = np.array([[*pitches, np.nan, 5.0]])
-    figure = design_region(np.ones(4), np.ones(1), pitch, pitch, np.array([[True, True, False, False]]), [])
-    assert (figure.data[2].zmin, figure.data[2].zmax) == pytest.approx(ends)
 
 
 def test_the_map_of_skins_comes_as_numbers(server: Server) -> None:

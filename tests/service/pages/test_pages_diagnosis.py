@@ -1,18 +1,16 @@
 """A diagnosis in the browser: asked for, watched, read, saved, adopted; and what nobody else may do with it."""
 
 import csv
-import json
 from copy import deepcopy
 from pathlib import Path
 
-import httpx
+import orjson
 import pytest
 from playwright.sync_api import Locator
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.finished import LINES, Made, finish, keep, made
-from tests.service.pages.forms import BROWSING, HOSTILE, token_of
-from tests.support.adhesive_curves import adhesive_figure
+from tests.service.pages.forms import BROWSING, HOSTILE
 from tests.support.cases import first
 from tests.support.diagnosed import asked, resonant, sent
 from tests.support.store_server import Server
@@ -102,36 +100,6 @@ def require_whole(figure: Locator, width: int) -> None:
     assert figure.evaluate("one => one.scrollWidth <= one.clientWidth")
 
 
-@pytest.mark.soak
-def test_a_curve_is_chosen_with_keys(visitor: Visit, server: Server) -> None:
-    figure = adhesive_figure()
-    place = keep(server, "curve", Made(made().report, {**made().figures, "curve": figure.to_json()}))
-    page = visitor.page
-    page.set_viewport_size({"width": 390, "height": 844})
-    visitor.go(place)
-    visitor.drawn(5)
-    visitor.require_accessible()
-    require_whole(page.locator("#figure-curve"), 390)
-    names = [button.name for button in figure.layout.updatemenus[0].buttons]
-    listed = page.locator("#figure-curve").get_by_role("combobox", name="Recording")
-    assert listed.locator("option").all_inner_texts() == names
-    of_plot = "document.querySelector('#figure-curve .plot').data.filter((t) => t.visible).map((t) => t.meta.recording)"
-    seen = []
-    for key in (None, "ArrowDown"):
-        if key is not None:
-            listed.focus()
-            page.keyboard.press(key)
-            page.wait_for_function(f"() => {of_plot}[0] === {names[1].partition(':')[0]!r}")
-        seen.append(set(page.evaluate(of_plot)))
-    assert seen == [{name.partition(":")[0]} for name in names]
-    assert "the fitted contact point" in page.locator(".report").inner_text()
-    rows = list(csv.DictReader(server.http.get(f"{place}/curve.csv").text.splitlines()))
-    (mark,) = [row for row in rows if (row["recording"], row["shows"]) == ("c01", "pull-off")]
-    (trace,) = [one for one in figure.data if (one.meta["recording"], one.meta["shows"]) == ("c01", "pull-off")]
-    assert float(mark["depth_mm"]) == pytest.approx(float(trace.x[0]) * trace.meta["mm"], rel=1e-5)
-    assert float(mark["force_n"]) == pytest.approx(float(trace.y[0]) * trace.meta["n"], rel=1e-5)
-
-
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
 def test_models_laid_over_frf_after_keys(visitor: Visit, server: Server, place: str, width: int) -> None:
     """The models are laid over one frf after another with keys."""
@@ -180,17 +148,6 @@ def test_waits_cancelled_asked(visitor: Visit, server: Server) -> None:
     page.get_by_text("It was cancelled").wait_for()
 
 
-def test_law_no_expression_says_refused_sentence(server: Server) -> None:
-    """A law that no expression says is refused in one sentence."""
-    free = Made(deepcopy(made().report), made().figures)
-    law = {"acts_on": "thickness", "axis": "sensor", "form": "step", "expression": "h = h0·(1 + 0.2·[sensor = s1])"}
-    seen = {"parameters": [], "probability": 1.0, "rivals": [], "range": {"sensor": ["s1", "s2"]}}
-    free.report["unnamed"] = law | seen
-    free.report["provenance"]["unnamed"] = {"law": "unnamed_thickness__sensor__step__s1", "parameters": {}}
-    text = server.http.get(keep(server, "free", free), headers=BROWSING).text
-    assert "<p>It cannot be kept: a smooth course, or one of words, is no expression.</p>" in text
-
-
 def test_hostile_names_in_a_report_stay_text(visitor: Visit, server: Server) -> None:
     hostile = Made(deepcopy(made().report), made().figures)
     hostile.report["statement"] = f"{HOSTILE}. {HOSTILE}"
@@ -222,61 +179,16 @@ def test_imported_report_odd_shape_said(server: Server) -> None:
         assert "lacks what a page shows" in answer.text
 
 
-def test_changes_something_needs_session_s_form(server: Server) -> None:
-    """What changes something needs the session s own form."""
-    diagnosis_id = keep(server, "forms", made()).rpartition("/")[2]
-    campaign_id = server.http.get(f"/v1/diagnoses/{diagnosis_id}").json()["campaign_id"]
-    for path in (
-        f"/campaigns/{campaign_id}/diagnosis",
-        "/skins/forms/diagnosis",
-        "/fleets/diagnosis",
-        f"/diagnoses/{diagnosis_id}/again",
-        f"/diagnoses/{diagnosis_id}/cancel",
-        f"/diagnoses/{diagnosis_id}/adopt",
-        "/skins/forms/model/withdraw",
-    ):
-        assert server.http.post(path, data={"form_token": "x"}, headers=BROWSING).status_code == 403
-    assert server.http.get("/v1/skins/forms/model").status_code == 404
-
-
-def test_read_sees_no_button_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
-    """Who may read only sees no button and changes nothing."""
-    server, keys = locked
-    diagnosis_id = asked(server, campaign_id := sent(server, resonant("locked"), "locked"))
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
-        somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
-        shown = somebody.get(f"/campaigns/{campaign_id}").text
-        assert "Diagnose</button>" not in shown
-        form = {"form_token": token_of(shown)}
-        own = {"Origin": str(server.http.base_url).rstrip("/")}
-        for path in (
-            f"/campaigns/{campaign_id}/diagnosis",
-            "/skins/locked/diagnosis",
-            "/fleets/diagnosis",
-            f"/diagnoses/{diagnosis_id}/again",
-            f"/diagnoses/{diagnosis_id}/cancel",
-            f"/diagnoses/{diagnosis_id}/adopt",
-            "/skins/locked/model/withdraw",
-        ):
-            answer = somebody.post(path, data=form, headers=own)
-            assert answer.status_code == 403
-            assert "scope read" in answer.text
-
-
-def test_the_map_s_words_follow_what_it_draws(server: Server, place: str) -> None:
-    said = server.http.get(place, headers=BROWSING).text
-    assert "Steps of frequency are even in its logarithm. The outlined region holds most" in said
-    assert "the colours reach twice as far" in said
-    where = json.loads(made().figures["where"])
-    where["layout"]["xaxis"]["title"]["text"] = "displacement as recorded [µm]"
-    where["layout"].pop("shapes")
-    figures = {**made().figures, "where": json.dumps(where), "curve": adhesive_figure().to_json()}
-    place = keep(server, "travel", Made(made().report, figures))
-    said = server.http.get(place, headers=BROWSING).text
-    assert "The displacement is that of the file" in said
-    assert "logarithm" not in said
-    assert "outlined" not in said
-    assert "Within the limits of your rig" not in said  # of curves none is planned
-    refused = server.http.get(f"{place}/plan", headers=BROWSING)
-    assert refused.status_code == 404
-    assert "only recordings of FRFs are planned" in refused.text
+def test_figures_older_versions_tell_recordings(server: Server) -> None:
+    """Figures of older versions tell the recordings by name."""
+    figures = dict(made().figures)
+    older = orjson.loads(figures["frf"])
+    for name in ("indenters_mm", "preloads_n", "left_percent"):
+        del older["layout"]["meta"][name]
+    figures["frf"] = orjson.dumps(older).decode()
+    place = keep(server, "older", Made(made().report, figures))
+    shown = server.http.get(f"{place}?sensor=s1", headers=BROWSING)
+    assert shown.status_code == 200
+    assert shown.text.count('<th scope="row">r') == 6
+    assert "Recordings of s1" in shown.text
+    assert "Recordings of" not in server.http.get(f"{place}?sensor=nothing", headers=BROWSING).text

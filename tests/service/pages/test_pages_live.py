@@ -1,13 +1,6 @@
 """What arrives while a skin's page is open is shown there without a reload; what the reader does stays."""
 
-import os
-from pathlib import Path
-
-import orjson
-import pytest
-
 from tests.service.pages.conftest import Visit
-from tests.support import preloaded
 from tests.support.diagnosed import asked, finished, report, sent
 from tests.support.store_server import Server, campaign
 
@@ -59,37 +52,3 @@ def test_verdict_withdrawal_shown_without_reload(visitor: Visit, server: Server)
     server.http.post(f"/v1/campaigns/{campaign_id}/withdraw", json={"reason": "wrong sphere"})
     page.get_by_text("withdrawn: wrong sphere").wait_for()
     assert page.evaluate(STAYED)
-
-
-@pytest.mark.soak
-def test_choice_sensor_stays_works_after_page(visitor: Visit, server: Server) -> None:
-    """The choice of a sensor stays and works after the page was renewed."""
-    page = visitor.page
-    sent(server, campaign("first", sensors=2), "chosen")
-    visitor.go("/skins/chosen?sensor=s1")
-    page.get_by_label("Sensor", exact=True).focus()
-    page.evaluate(MARK)
-    sent(server, campaign("second", sensors=2), "chosen")
-    page.get_by_text("Renewed at").wait_for()
-    assert page.evaluate("document.activeElement.id") == "sensor"
-    assert page.get_by_label("Sensor", exact=True).input_value() == "s1"
-    assert page.evaluate(STAYED)
-    page.get_by_label("Sensor", exact=True).dispatch_event("pointerdown")
-    page.get_by_label("Sensor", exact=True).select_option("s0")
-    page.wait_for_url("**/skins/chosen?**sensor=s0**")
-
-
-def test_bench_saves_page_once(visitor: Visit, server: Server, tmp_path: Path) -> None:
-    """What a bench saves is on the page at once."""
-    page = visitor.page
-    sent(server, campaign("yesterday", sensors=1), "bench")
-    visitor.go("/skins/bench")
-    page.evaluate(MARK)
-    with (tmp_path / "log").open("wb") as log:
-        words = ["watch", str(tmp_path), "--skin", "bench", "--url", visitor.address, "--settle-s", "0.3"]
-        watch = preloaded.start(words, os.environ, (0, log.fileno(), log.fileno()))
-    (tmp_path / "tonight.json").write_bytes(orjson.dumps(campaign("tonight", sensors=1)))
-    page.get_by_role("link", name="tonight", exact=True).wait_for()
-    assert page.evaluate(STAYED)
-    watch.terminate()
-    assert watch.wait(240) == 0

@@ -1,7 +1,6 @@
 """A few measured numbers typed into a page: the d33 that they mean."""
 
 import csv
-from pathlib import Path
 
 import httpx
 import pytest
@@ -10,7 +9,7 @@ from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.service.pages.test_pages_adopted import mistuned
 from tests.support.diagnosed import diagnosed, resonant
-from tests.support.store_server import Place, Server, running
+from tests.support.store_server import Server
 
 
 def test_d33_from_a_few_numbers(visitor: Visit, server: Server) -> None:
@@ -62,35 +61,23 @@ def test_what_is_wrong_is_said_on_the_page(server: Server, query: dict[str, str]
     assert told in answer.text
 
 
-@pytest.mark.slow
-def test_d33_adopted_model_stands_beside_paper_s(tmp_path: Path) -> None:
+def test_d33_adopted_model_stands_beside_paper_s(server: Server) -> None:
     """D33 by the adopted model stands beside the paper s."""
-    with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        _, diagnosis_id = diagnosed(server, resonant("monday"), mistuned(), "palm-m")
-        query = {"skin": "palm-m", "rows": "4 1 7.06 0.1\n8 2 7.45 0.1"}
-        before = server.http.get("/d33/rows.csv", params=query).text
-        assert "d33_adopted_pc_per_n" not in before
-        server.http.post("/v1/skins/palm-m/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
-        rows = list(csv.DictReader(server.http.get("/d33/rows.csv", params=query).text.splitlines()))
-        request = {
-            "thickness_mm": 2.5,
-            "youngs_modulus_mpa": 2.0,
-            "sensor_radius_mm": 1.5,
-            "indenter_radius_mm": [4, 8],
-            "preload_n": [1, 2],
-            "frf_pc_per_n": [7.06, 7.45],
-            "frf_uncertainty_pc_per_n": 0.1,
-        }
-        for model, column in (({}, ""), ({"model": "adopted", "skin_id": "palm-m"}, "adopted_")):
-            expected = server.http.post("/v1/d33", json={**request, **model}).json()
-            for part in ("", "uncertainty_"):
-                told = [float(row[f"d33_{column}{part}pc_per_n"]) for row in rows]
-                assert told == pytest.approx(expected[f"d33_{part}pc_per_n"], rel=1e-12)
-        shown = server.http.get("/d33", params=query, headers=BROWSING).text
-        assert "d33 by the adopted model [pC/N]" in shown
-        other = server.http.get("/d33", params={**query, "thickness_mm": "3"}, headers=BROWSING).text
-        assert "By the adopted model: thickness" in other
-        assert "d33 by the adopted model [pC/N]" not in other
+    _, diagnosis_id = diagnosed(server, resonant("monday"), mistuned(), "palm-m")
+    query = {"skin": "palm-m", "rows": "4 1 7.06 0.1\n8 2 7.45 0.1"}
+    assert "d33_adopted_pc_per_n" not in server.http.get("/d33/rows.csv", params=query).text
+    server.http.post("/v1/skins/palm-m/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
+    rows = list(csv.DictReader(server.http.get("/d33/rows.csv", params=query).text.splitlines()))
+    request = {**SKIN, "youngs_modulus_mpa": 2.0, "indenter_radius_mm": [4, 8], "preload_n": [1, 2]}
+    request |= {"frf_pc_per_n": [7.06, 7.45], "frf_uncertainty_pc_per_n": 0.1}
+    for model, column in (({}, ""), ({"model": "adopted", "skin_id": "palm-m"}, "adopted_")):
+        expected = server.http.post("/v1/d33", json={**request, **model}).json()
+        for part in ("", "uncertainty_"):
+            told = [float(row[f"d33_{column}{part}pc_per_n"]) for row in rows]
+            assert told == pytest.approx(expected[f"d33_{part}pc_per_n"], rel=1e-12)
+    other = server.http.get("/d33", params={**query, "thickness_mm": "3"}, headers=BROWSING).text
+    assert "By the adopted model: thickness" in other
+    assert "d33 by the adopted model [pC/N]" not in other
 
 
 @pytest.mark.parametrize("rows", ["4 1 7,06", "4;1;7,06;", "4\t1\t7,06", "4, 1, 7.06", "4,0 1,0 7,06"])

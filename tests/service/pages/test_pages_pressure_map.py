@@ -101,16 +101,3 @@ def test_much_more_than_a_map_is_not_taken(server: Server) -> None:
         answer = somebody.post("/loads/map", data=form, files={"file": ("a.csv", b"0,1,1\n" * 500_000)})
     assert answer.status_code == 413
     assert "exceeds 2.1 MB" in answer.text
-
-
-def test_map_needs_session_s_form_no_right_write(server: Server, locked: tuple[Server, dict[str, str]]) -> None:
-    """A map needs the session s own form and no right to write."""
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
-        assert somebody.post("/loads/map", files={"map": (None, SMALL)}).status_code == 403
-    other, keys = locked
-    own = {"Origin": str(other.http.base_url).rstrip("/")}
-    with httpx.Client(base_url=other.http.base_url, headers=BROWSING | own, timeout=300) as reader:
-        reader.post("/login", data={"form_token": token_of(reader.get("/login").text), "key": keys["read"]})
-        form = {"form_token": token_of(reader.get("/loads/map").text)}
-        answer = reader.post("/loads/map", data=form, files={"map": (None, SMALL)})
-        assert (answer.status_code, "Charge on the array" in answer.text) == (200, True)

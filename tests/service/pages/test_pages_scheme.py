@@ -1,23 +1,15 @@
 """Figures in the colours that the reader prefers: dark on a screen, on white wherever they are printed or saved."""
 
-import io
 import re
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Literal
 
 import pytest
-from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from tests.service.pages.conftest import Visit, visit
 from tests.service.pages.finished import keep, made
 from tests.support.cases import first
-from tests.support.diagnosed import resonant, table
 from tests.support.store_server import Server
-from underskin.figures.campaign_figures import page as campaign_page
-from underskin.inversion.invert import invert
-from underskin.recordings.campaign import parse
 
 GROUND = (20, 25, 31)
 # What has a colour of its own for the ground: ids on the discs of a map are written on the discs.
@@ -101,55 +93,3 @@ def test_figures_dark_screen_light_paper(dark: Visit, addresses: dict[str, str],
     dark.require_accessible()
     dark.page.emulate_media(media="print")
     require_light(dark.page)
-
-
-@pytest.mark.soak
-def test_saved_figure_browser_prints_white(dark: Visit, addresses: dict[str, str], downloads: Path) -> None:
-    """A saved figure and what a browser prints are on white."""
-    page = dark.page
-    dark.go(f"/campaigns/{addresses['campaign']}")
-    dark.drawn(4)
-    with page.expect_download() as saving:
-        page.locator("#figure-frf").get_by_role("button", name="SVG").click()
-    saving.value.save_as(downloads / "frf.svg")
-    assert "rgb(255, 255, 255)" in (downloads / "frf.svg").read_text()
-    page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    require_light(page)
-    page.evaluate("dispatchEvent(new Event('afterprint'))")
-    require_dark(page)
-
-
-@pytest.mark.soak
-def test_files_without_a_server_are_dark_too(
-    dark: Visit, server: Server, addresses: dict[str, str], downloads: Path
-) -> None:
-    document = parse(resonant("dark"))
-    files = {
-        "report.html": server.http.get(f"/diagnoses/{addresses['diagnosis']}/report.html").text,
-        "campaign.html": campaign_page(document, invert(document, table())),
-    }
-    for name, text in files.items():
-        (downloads / name).write_text(text)
-        dark.page.goto((downloads / name).as_uri())
-        dark.page.wait_for_function("() => document.querySelectorAll('.main-svg').length > 2")
-        assert dark.page.evaluate("getComputedStyle(document.documentElement).backgroundColor") == f"rgb{GROUND}"
-        require_dark(dark.page)
-        dark.page.emulate_media(media="print")
-        require_light(dark.page)
-        dark.page.emulate_media(media="screen")
-    dark.wrong.clear()  # the files themselves are not of the server
-
-
-def test_pictures_of_mechanisms_follow_too(dark: Visit) -> None:
-    page = dark.page
-    dark.go("/mechanisms")
-    picture = page.locator("img.picture").first
-    grounds: dict[Literal["dark", "light"], tuple[int, int, int]] = {"dark": GROUND, "light": (255, 255, 255)}
-    for scheme, ground in grounds.items():
-        page.emulate_media(color_scheme=scheme)
-        picture.scroll_into_view_if_needed()
-        page.wait_for_function("one => one.complete && one.naturalWidth > 0", arg=picture.element_handle())
-        pixels = Image.open(io.BytesIO(picture.screenshot())).convert("RGB")
-        assert pixels.getpixel((20, 20)) == ground
-    dark.go(str(picture.get_attribute("src")))  # by itself, under its own policy
-    assert "stroke:#38434e" in page.content()

@@ -1,17 +1,43 @@
 """Other sites, other people and hostile names get nowhere."""
 
-import time
+import importlib
+import pkgutil
+import re
 from collections.abc import Iterator
 
 import httpx
 import pytest
+from fastapi.routing import APIRoute
 from playwright.sync_api import Browser
 
+from service import pages
 from service.auth import session
 from service.auth.keys import KeyStore
 from tests.service.pages.conftest import Visit, visit
 from tests.service.pages.forms import BROWSING, HOSTILE, token_of
+from tests.service.waiting import until
 from tests.support.store_server import Server, campaign
+
+
+def _posts() -> list[str]:
+    """The addresses of all forms of pages."""
+    names = [found.name for found in pkgutil.walk_packages(pages.__path__, f"{pages.__name__}.")]
+    routers = [router for name in names if (router := getattr(importlib.import_module(name), "router", None))]
+    routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
+    return sorted({re.sub(r"{.*?}", "x", route.path) for route in routes if "POST" in (route.methods or ())})
+
+
+POSTS = _posts()
+assert len(POSTS) > 25
+CHANGE_NOTHING = {"/login", "/logout", "/sessions/x/end", "/loads/map"}  # nothing that is kept of measurements
+MAP = "mm,-1,0,1\n-1,0,0.1,0\n0,0.1,0.3,0.1\n1,0,0.1,0\n"
+
+
+def posted(client: httpx.Client, path: str, token: str, headers: dict[str, str] | None = None) -> httpx.Response:
+    """A form of any page, with a file where it takes some."""
+    form = {"form_token": token, "map": MAP, "reason": "?"}
+    with_file = {"/upload": {"file": ("a.json", b"{}")}, "/loads/map": {"other": ("", b"")}}.get(path)
+    return client.post(path, data=form, files=with_file, headers=headers)
 
 
 @pytest.fixture
@@ -43,20 +69,18 @@ def test_a_page_says_what_it_takes(anyone: httpx.Client) -> None:
     assert anyone.get("/example").headers["allow"] == "POST"
 
 
-def test_a_form_of_another_session_is_refused(anyone: httpx.Client, server: Server) -> None:
+def test_every_form_is_its_session_s_own(anyone: httpx.Client, server: Server) -> None:
+    """No page takes a form of another session, without a token, or of another site; nothing is changed by it."""
     token = token_of(anyone.get("/").text)
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as other:
         assert other.post("/example", data={"form_token": token}).status_code == 403
         other.get("/")
-        assert other.post("/example", data={"form_token": token}).status_code == 403
-    assert anyone.post("/example", data={"form_token": "x"}).status_code == 403
-    assert anyone.post("/example", data={}).status_code == 403
-
-
-def test_a_form_of_another_site_is_refused(anyone: httpx.Client) -> None:
-    token = token_of(anyone.get("/").text)
-    answer = anyone.post("/example", data={"form_token": token}, headers={"Origin": "https://example.org"})
-    assert answer.status_code == 403
+        for path in POSTS:
+            assert posted(other, path, token).status_code == 403, path
+            assert posted(other, path, "").status_code == 403, path
+    for path in POSTS:
+        assert posted(anyone, path, token, {"Origin": "https://example.org"}).status_code == 403, path
+    assert server.http.get("/v1/skins").json()["skins"] == []
 
 
 def test_hostile_and_endless_names_stay_text(visitor: Visit, server: Server) -> None:
@@ -131,15 +155,18 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
 
 
 def test_who_may_read_only_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
+    """By no page; what only computes is answered."""
     server, keys = locked
+    own = {"Origin": str(server.http.base_url).rstrip("/")}
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as reader:
         reader.post("/login", data={"form_token": token_of(reader.get("/login").text), "key": keys["read"]})
         start = reader.get("/").text
         assert "Load the example skin" not in start
-        own = {"Origin": str(server.http.base_url).rstrip("/")}
-        answer = reader.post("/example", data={"form_token": token_of(start)}, headers=own)
-        assert answer.status_code == 403
-        assert "scope read" in answer.text
+        assert 'type="file"' not in reader.get("/upload").text
+        for path in set(POSTS) - CHANGE_NOTHING:
+            answer = posted(reader, path, token_of(start), own)
+            assert (answer.status_code, "scope read" in answer.text) == (403, True), path
+        assert posted(reader, "/loads/map", token_of(start), own).status_code == 200
         # A page's script may read with the session; what changes something must say whose page it is of.
         assert reader.get("/v1/skins").status_code == 200
         assert reader.post("/v1/sigma", json={"a_over_h": 0.3, "rt_over_h": 0.6}).status_code == 401
@@ -152,10 +179,7 @@ def test_a_session_ends_with_its_key(locked: tuple[Server, dict[str, str]]) -> N
         guest.post("/login", data={"form_token": token_of(guest.get("/login").text), "key": key})
         assert guest.get("/").status_code == 200
         server.place.command("key", "revoke", "guest")
-        end = time.monotonic() + 240
-        while guest.get("/").status_code == 200:  # a server reads the keys anew every half second
-            assert time.monotonic() < end
-            time.sleep(0.1)
+        until(lambda: guest.get("/").status_code != 200)
         assert guest.get("/").status_code == 303
 
 

@@ -9,9 +9,8 @@ import httpx
 import pytest
 
 from tests.service.conftest import emptied
-from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, token_of
-from tests.service.pages.uploads import as_json, file, look_at
+from tests.service.pages.uploads import as_json
 from tests.support.cases import first
 from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.store_server import Server, campaign
@@ -64,47 +63,6 @@ def looked_at(client: httpx.Client, content: bytes) -> str:
     answer = client.post("/upload", data=form, files={"file": ("skin.h5", content)}, follow_redirects=True)
     assert answer.status_code == 200, answer.text
     return answer.text
-
-
-@pytest.mark.soak
-def test_exported_skin_comes_somebody_says(visitor: Visit, server: Server, export: bytes) -> None:
-    """An exported skin comes in where somebody says so."""
-    page = visitor.page
-    look_at(visitor, [file("palm.h5", export)])
-    status = page.get_by_role("status")
-    assert "3 campaigns" in status.inner_text()
-    assert "none of them here yet" in status.inner_text()
-    assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
-    told = page.get_by_role("region", name="Adopted models").inner_text()
-    assert "contact resonance" in told
-    assert ", withdrawn " in told
-    row = page.get_by_role("row", name="tuesday").inner_text().split("\t")
-    assert (row[2:]) == ["6", "1", "not yet"]
-    visitor.require_accessible()
-    assert kept(server) == []
-    page.get_by_role("button", name="Bring it in").click()
-    page.wait_for_url("**/skins/*")
-    assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
-    assert sorted(kept(server)) == ["array", "monday", "tuesday"]
-    said = page.get_by_role("status").first.inner_text()
-    assert "version 1" in said
-    assert "wrong diagnosis" in said
-    look_at(visitor, [file("palm.h5", export)], skin="another name")
-    assert "All of it is here already" in page.locator(".adopted").inner_text()
-    assert "keeps its name" in page.locator("main").inner_text()
-    assert page.get_by_role("button", name="Bring it in").count() == 0
-    monday = next(entry for entry in server.http.get("/v1/campaigns").json()["campaigns"] if entry["name"] == "monday")
-    withdrawn = server.http.post(f"/v1/campaigns/{monday['id']}/withdraw", json={"reason": "fell down"})
-    assert withdrawn.status_code == 200
-    look_at(visitor, [file("palm.h5", export)])
-    alert = page.get_by_role("alert").inner_text()
-    assert "'monday'" in alert
-    assert "differs" in alert
-    assert "differs" in page.get_by_role("row", name="monday").inner_text()
-    assert page.get_by_role("button", name="Bring it in").count() == 0
-    visitor.require_accessible()
-    page.get_by_role("button", name="Discard").click()
-    page.wait_for_url("**/upload")
 
 
 def _cut(content: bytes) -> bytes:
@@ -188,21 +146,3 @@ def test_bringing_skin_needs_session_s_form_done(empty: Server, export: bytes) -
         assert len(kept(server)) == 3
         plain = own.post("/upload", data=form, files={"file": ("a.json", as_json(campaign("plain")))})
         assert own.post(f"{plain.headers['location']}/skin", data=form).status_code == 404
-
-
-def test_who_may_read_only_brings_no_skin_in(locked: tuple[Server, dict[str, str]], export: bytes) -> None:
-    server, keys = locked
-    origin = {"Origin": str(server.http.base_url).rstrip("/")}
-    with (
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=300) as writer,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING | origin, timeout=300) as somebody,
-    ):
-        for client, key in ((writer, keys["write"]), (somebody, keys["read"])):
-            client.post("/login", data={"form_token": token_of(client.get("/login").text), "key": key})
-        form = {"form_token": token_of(somebody.get("/upload").text)}
-        sent = somebody.post("/upload", data=form, files={"file": ("skin.h5", export)})
-        assert (sent.status_code, "scope read" in sent.text) == (403, True)
-        own = {"form_token": token_of(writer.get("/upload").text)}
-        place = writer.post("/upload", data=own, files={"file": ("skin.h5", export)}).headers["location"]
-        assert somebody.post(f"{place}/skin", data=form).status_code == 403
-        assert SKIN not in [entry["id"] for entry in server.http.get("/v1/skins").json()["skins"]]

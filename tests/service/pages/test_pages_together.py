@@ -1,10 +1,8 @@
 """Several campaigns, of a skin or of a fleet, diagnosed together in the browser; hostile names, and no script."""
 
 import httpx
-import pytest
 from playwright.sync_api import Browser
 
-from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, HOSTILE, token_of
 from tests.support.diagnosed import finished, sent
 from tests.support.store_server import Server, campaign
@@ -13,45 +11,6 @@ from underskin import Client
 
 def sent_to(server: Server, skin: str, *names: str) -> list[str]:
     return [sent(server, campaign(name, sensors=1), skin) for name in names]
-
-
-@pytest.mark.soak
-def test_campaigns_skin_diagnosed_keyboard(visitor: Visit, server: Server) -> None:
-    """The campaigns of a skin are diagnosed by keyboard."""
-    page = visitor.page
-    sent_to(server, "alone", "the only one")
-    visitor.go("/skins/alone")
-    assert page.get_by_role("button", name="Diagnose its campaigns together").count() == 0
-    first, second = sent_to(server, "several", "one", "two")
-    visitor.go("/skins/several")
-    visitor.require_accessible()
-    page.get_by_role("button", name="Diagnose its campaigns together").focus()
-    page.keyboard.press("Enter")
-    page.wait_for_url("**/diagnoses/*")
-    assert page.get_by_role("heading", level=1).inner_text() == "Diagnosis of several"
-    page.get_by_text("It waits for its turn.").wait_for()
-    finished(server)
-    page.get_by_role("heading", name="What the model lacks, and").wait_for()  # without reloading by hand
-    visitor.require_accessible()
-    assert "to quote, take a campaign's own diagnosis" in page.get_by_role("main").inner_text()
-    for name, campaign_id in (("one", first), ("two", second)):
-        link = page.locator("details").get_by_role("link", name=name, exact=True)
-        assert link.get_attribute("href") == f"/campaigns/{campaign_id}"
-    for nothing in ("Adopt", "Within the limits of your rig", "cannot be adopted", "were not kept"):
-        assert page.get_by_text(nothing, exact=False).count() == 0, nothing
-    for part in ("report.html", "explanations.csv"):
-        assert server.http.get(f"{page.url}/{part}", headers=BROWSING).status_code == 200, part
-    plan = server.http.get(f"{page.url}/plan", headers=BROWSING)
-    assert (plan.status_code, "of several campaigns" in plan.text) == (404, True)
-    page.get_by_role("button", name="Without contact resonance").click()
-    page.get_by_text("Supposed that it is not contact resonance").wait_for()
-    visitor.go("/skins/several")
-    assert page.get_by_role("heading", name="Diagnosed together").count() == 1
-    visitor.go(f"/campaigns/{first}")
-    assert "together with others, as several" in page.get_by_role("main").inner_text()
-    visitor.go("/")
-    assert "together, as several" in page.get_by_role("row").filter(has_text="several").inner_text()
-    assert "not diagnosed" in page.get_by_role("row").filter(has_text="alone").inner_text()
 
 
 def test_what_is_outdated_is_diagnosed_again(server: Server) -> None:
@@ -112,55 +71,6 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, server: Server) ->
     page.get_by_role("navigation").get_by_role("link", name="Fleets").click()
     assert page.get_by_role("heading", name="Diagnosed before").count() == 1
     context.close()
-
-
-@pytest.mark.soak
-def test_chosen_stays_list_searched(visitor: Visit, server: Server) -> None:
-    """What is chosen stays while the list is searched."""
-    for name in ("ring", "disc", "plate"):
-        sent_to(server, f"make-a-{name}", name)
-    page = visitor.page
-    visitor.go("/fleets?find=make-a-ring")
-    page.get_by_label("make-a-ring").check()
-    page.get_by_label("Name").fill("make a")
-    for name, there in (("disc", ["ring", "disc"]), ("plate", ["disc", "ring", "plate"]), ("nothing", None)):
-        page.get_by_label("Find a skin").fill(f"make-a-{name}")
-        page.get_by_label("Find a skin").press("Enter")
-        page.wait_for_url(f"**/fleets?find=make-a-{name}&**")
-        if there is None:
-            page.get_by_text("No skin is called so").wait_for()
-            break
-        shown = page.get_by_role("checkbox")
-        assert [shown.nth(k).get_attribute("value") for k in range(shown.count())] == [f"make-a-{one}" for one in there]
-        page.get_by_label(f"make-a-{name}").check()
-    assert page.get_by_role("checkbox", checked=True).count() == 3
-    visitor.require_accessible()
-    assert page.get_by_label("Name").input_value() == "make a"
-    page.get_by_label("Name").press("Enter")
-    page.wait_for_url("**/diagnoses/*")
-    for name in ("ring", "disc", "plate"):
-        assert page.get_by_role("link", name=f"make-a-{name}").count() == 1
-
-
-def test_filter_page_hides_no_skin_ticked(visitor: Visit, server: Server) -> None:
-    """A filter of the page hides no skin that is ticked."""
-    for number in range(12):
-        sent_to(server, f"make-b-{number}", f"b{number}")
-    page = visitor.page
-    visitor.go("/fleets?find=make-b-")
-    page.get_by_label("make-b-3").check()
-    page.get_by_label("Filter").fill("make-b-7")
-    assert page.locator("tbody tr:visible label").all_inner_texts() == ["make-b-3", "make-b-7"]
-
-
-def test_the_page_of_fleets_is_accessible(visitor: Visit, server: Server) -> None:
-    sent_to(server, "fleet-9", "nine")
-    server.http.patch("/v1/skins/fleet-9", json={"title": "left <palm>"}).raise_for_status()
-    visitor.go("/fleets")
-    assert visitor.page.get_by_label("left <palm> fleet-9").get_attribute("value") == "fleet-9"
-    visitor.require_accessible()
-    visitor.go("/fleets?find=nothing-is-called-so")
-    assert "No skin is called so" in visitor.page.get_by_role("main").inner_text()
 
 
 def test_fleet_skin_nothing_diagnose_refused(server: Server) -> None:

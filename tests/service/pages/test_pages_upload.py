@@ -60,36 +60,6 @@ def test_rig_description_reads_recording_form(visitor: Visit, server: Server) ->
     page.get_by_text("1 recording understood").wait_for()
 
 
-@pytest.mark.soak
-def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
-    page = visitor.page
-    look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG)
-    page.get_by_text("What the channels are").click()
-    page.get_by_label("Unit of the sensitivity of Amplifier").fill("")
-    page.get_by_label("first sample used").fill("0.5")
-    page.get_by_role("button", name="Read it with these settings").click()
-    alert = page.get_by_role("alert")
-    assert "sensitivity of the charge\t10.0\tneeds a unit of the sensitivity, and it one" in alert.inner_text()
-    assert "first sample used" in alert.inner_text()  # all that is wrong is told at once
-    page.get_by_label("first sample used").fill("")
-    visitor.require_accessible()
-    page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/N")
-    page.get_by_label("sphere radius R [mm]", exact=True).fill("5")
-    page.get_by_label("Layout").fill("s01 0")
-    page.get_by_role("button", name="Read it with these settings").click()
-    assert "name, x [mm], y [mm]" in alert.inner_text()
-    assert page.get_by_label("sphere radius R [mm]", exact=True).input_value() == "5"  # what was typed is still there
-    assert page.get_by_label("Layout").input_value() == "s01 0"
-    page.get_by_label("Layout").fill("s01 0 0")
-    page.get_by_label("sphere radius R [mm]", exact=True).fill("")
-    page.get_by_role("button", name="Read it with these settings").click()
-    page.get_by_role("heading", name="It cannot be read so").wait_for()
-    assert "Amplifier" in page.get_by_role("row", name="file").inner_text()
-    page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/pC")
-    page.get_by_role("button", name="Read it with these settings").click()
-    assert "fill it in below" in page.get_by_role("row", name="sphere radius R [mm]").inner_text()
-
-
 def test_the_table_that_is_offered_can_be_sent(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/upload")
@@ -117,37 +87,6 @@ def test_files_that_are_dropped_are_looked_at(visitor: Visit) -> None:
     )
     page.wait_for_url("**/upload/*")
     assert "6 recordings understood" in page.get_by_role("status").inner_text()
-
-
-@pytest.mark.soak
-def test_files_day_become_campaign(visitor: Visit, server: Server) -> None:
-    """Files of one day become one campaign or one each."""
-    page = visitor.page
-    both = [file(f"{name}.json", as_json(campaign(name, id="day"))) for name in ("morning", "evening")]
-    look_at(visitor, both)
-    assert "12 recordings understood" in page.get_by_role("status").inner_text()
-    page.get_by_role("link", name="evening.json").click()
-    visitor.drawn(1)
-    page.get_by_label("Name of the campaign").fill("the whole day")
-    page.get_by_role("button", name="Keep 12 recordings").click()
-    page.wait_for_url("**/campaigns/*")
-    assert page.get_by_role("heading", level=1).inner_text() == "the whole day"
-    look_at(visitor, both)
-    page.get_by_label("a campaign each").check()
-    page.get_by_role("button", name="Keep 12 recordings").click()
-    page.wait_for_url("**/skins/day")
-    assert len(campaigns_of(server, "day")) == 3
-
-
-def test_files_two_skins_not_joined_nothing_kept(visitor: Visit, server: Server) -> None:
-    """Files of two skins are not joined and nothing is kept."""
-    page = visitor.page
-    thin, thick = campaign("thin"), campaign("thick")
-    thick["skin"]["thickness_mm"] = 5.0
-    look_at(visitor, [file("thin.json", as_json(thin)), file("thick.json", as_json(thick))], skin="two-skins")
-    page.get_by_role("button", name="Keep 12 recordings").click()
-    assert "skin.thickness_mm" in page.get_by_role("alert").inner_text()
-    assert campaigns_of(server, "two-skins") == []
 
 
 def test_a_campaign_is_corrected_by_a_newer_file(visitor: Visit, server: Server) -> None:

@@ -1,9 +1,14 @@
-"""What somebody is told of an upload before it is kept: that it is here already, that its d33 can be none."""
+"""What somebody is told of an upload before it is kept: that it is here already, that its d33 can be none, what is
+refused and why."""
 
+import html
+import io
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from tests.service.pages.forms import BROWSING, token_of
 from tests.service.pages.uploads import as_json
@@ -73,3 +78,60 @@ def test_correction_names_skin_offered_corrects(server: Server) -> None:
     assert "nothing would change" not in page
     page = looked_at(server, "same.json", as_json(campaign("slip", id="old")), corrects=wrong)
     assert "it says the same as the campaign that it corrects: nothing would change." in page
+
+
+RATE_HZ, SAMPLES = 1024, 2048
+
+
+def shaken(static: np.ndarray | float) -> bytes:
+    """A shaker about a static force [N], in newtons and picocoulombs."""
+    shaking = 0.1 * np.random.default_rng(3).normal(size=SAMPLES)
+    timing = {"wf_increment": 1 / RATE_HZ, "wf_start_offset": 0.0}
+    buffer = io.BytesIO()
+    with TdmsWriter(buffer) as writer:
+        channels = [
+            ChannelObject("press 1", name, values, {**timing, "unit_string": unit})
+            for name, values, unit in (("Force", static + shaking, "N"), ("Charge", 7 * shaking, "pC"))
+        ]
+        writer.write_segment([RootObject({}), GroupObject("press 1", {}), *channels])
+    return buffer.getvalue()
+
+
+RIG = """\
+schema: rig/1
+kind: frf
+skin: {thickness_mm: 2.5, youngs_modulus_mpa: 16, poisson_ratio: 0.5, sensor_radius_mm: 1.5,
+       sensors: [{id: s1, x_mm: 0, y_mm: 0}]}
+recording: {sensor: s1, indenter_radius_mm: 4, preload_n: 1}
+channels: {force_n: {channel: Force}, charge_pc: {channel: Charge}}
+"""
+
+
+def test_stated_preload_held_against_force_file(server: Server) -> None:
+    """A stated preload is held against the force of each file."""
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
+        form = {"form_token": token_of(client.get("/upload").text)}
+        files = [("file", (f"{force}.tdms", shaken(force))) for force in (1.0, 2.0)]
+        answer = client.post("/upload", data=form, files=[*files, ("rig", ("rig.yaml", RIG))], follow_redirects=True)
+    assert "<b>2</b> recordings understood" in answer.text
+    assert answer.text.count("as stated, but its force is") == 1
+    assert "2.0.tdms: pressed by 1 N as stated, but its force is 2.00 N on average" in html.unescape(answer.text)
+
+
+def test_why_recordings_are_refused_stands_before_they_are_kept(server: Server) -> None:
+    document = campaign("partly", sensors=2, id="partly")
+    document["recordings"][0]["preload_n"] = -2.0
+    page = html.unescape(looked_at(server, "bad.json", as_json(document)))
+    assert "preload_n" in page
+    assert page.index("must be finite and greater than 0") < page.index("<button>Keep")
+
+
+@pytest.mark.parametrize(("first", "said"), [(60.0, "these will give no d33"), (None, "no d33 will come of this")])
+def test_preload_beyond_table_gives_no_d33_said(server: Server, first: float | None, said: str) -> None:
+    """That a preload beyond the table gives no d33 is said before."""
+    document = campaign("heavy", sensors=2, id="heavy")
+    for number, recording in enumerate(document["recordings"]):
+        recording["preload_n"] = 60.0 if first is None or number == 0 else recording["preload_n"]
+    page = looked_at(server, "heavy.json", as_json(document))
+    assert said in page
+    assert page.index(said) < page.index("<button>Keep")

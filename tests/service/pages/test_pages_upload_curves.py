@@ -2,14 +2,12 @@
 
 import base64
 import html
-import io
 import re
 from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
-import openpyxl
 import orjson
 import pytest
 
@@ -103,15 +101,6 @@ def test_curve_drawn_before_anything_else_known(client: httpx.Client) -> None:
     assert upload.page.index('id="figure-curves"') < upload.page.index('id="mapping"')
 
 
-def test_heading_s_unit_overridden_form(client: httpx.Client) -> None:
-    """A heading s unit is overridden in the form."""
-    upload = Upload(client, table({"Depth (nm)": DEPTH_UM, "Force (uN)": FORCE_UN}))
-    assert upload.curve[0].max() == pytest.approx(1.5e-6)
-    upload.say(**{"unit-0": "um"})
-    assert upload.curve[0].max() == pytest.approx(1.5e-3)
-    assert "is labelled 'nm'; the rig description says 'um'" in html.unescape(upload.page)
-
-
 def test_force_depth_come_deflection_form(client: httpx.Client) -> None:
     """Force and depth come from a deflection in the form."""
     raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
@@ -133,15 +122,6 @@ def test_force_depth_come_deflection_form(client: httpx.Client) -> None:
     assert client.get(f"{upload.address}/rig.json").json() == before
 
 
-def test_curves_file_told_apart_form(client: httpx.Client) -> None:
-    """Curves of one file are told apart in the form."""
-    one = table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN})
-    upload = Upload(client, one + "\n\n" + one.partition("eoh\n")[2])
-    upload.say(curves="groups", indenter_radius_mm="0.0075", units_checked="yes")
-    assert "<b>2</b> recordings understood" in upload.page
-    assert client.get(f"{upload.address}/rig.json").json()["curves"] == "groups"
-
-
 def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
     depth = np.concatenate([DEPTH_UM - DEPTH_UM[0], DEPTH_UM[-2::-1] - DEPTH_UM[0]])
     force = np.concatenate([FORCE_UN, FORCE_UN[-2::-1]])
@@ -158,50 +138,6 @@ def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
     course = upload.figure("course")
     assert {trace["name"] for trace in course["data"]} == {"loading", "way back"}
     assert all(np.nanmin(decoded(trace["y"])) >= 0 for trace in course["data"])
-
-
-def test_force_falls_told_words_form(client: httpx.Client) -> None:
-    """A force that falls is told in the words of the form."""
-    upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": -FORCE_UN}))
-    upload.say(indenter_radius_mm="0.0075", units_checked="yes")
-    told = "compression is positive here: say “automatic” as the sign for displacement and force"
-    assert told in html.unescape(upload.page)
-    upload.say(units_checked="yes", **{f"sign-{number}": "auto" for number in range(2)})
-    assert "<b>1</b> recording understood" in upload.page
-
-
-def test_formula_cleared_gives_way_guess(client: httpx.Client) -> None:
-    """A formula that is cleared gives way to the guess."""
-    raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
-    upload = Upload(client, table(raw, "k (N/m)\t3"))
-    formula = {"derived-name-0": "depth", "derived-is-0": "displacement_mm"}
-    formula["derived-formula-0"] = "'Piezo (um)' - 'Deflection (nm)'"
-    upload.say(indenter_radius_mm="0.0075", units_checked="yes", **{**formula, "is-0": "", "is-1": "deflection"})
-    assert client.get(f"{upload.address}/rig.json").json()["channels"]["displacement_mm"] == {"channel": "depth"}
-    upload.say(units_checked="yes", **dict.fromkeys(formula, ""))
-    assert client.get(f"{upload.address}/rig.json").json()["channels"] == {
-        "displacement_mm": {"channel": "Piezo (um)", "deflection": {"channel": "Deflection (nm)"}},
-        "force_n": {"channel": "Deflection (nm)", "spring_constant_n_per_m": {"property": "k (N/m)"}},
-    }
-    assert upload.curve[0] == pytest.approx(1e-3 * DEPTH_UM, abs=1e-9)
-
-
-def test_a_workbook_has_no_separators(client: httpx.Client) -> None:
-    book = openpyxl.Workbook()
-    for row in [("Depth (um)", "Force (uN)"), *zip(DEPTH_UM.tolist(), FORCE_UN.tolist(), strict=True)]:
-        book.active.append(row)
-    data = io.BytesIO()
-    book.save(data)
-    said = html.unescape(Upload(client, data.getvalue(), "curve.xlsx").page)
-    assert "rows of 2 numbers from line 2 to 18; names from line 1" in said
-    assert "separated by" not in said
-    assert "CSV, XLSX, MATLAB" in client.get("/upload").text
-
-
-def test_a_tare_is_told_in_words(client: httpx.Client) -> None:
-    upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}))
-    upload.say(indenter_radius_mm="0.0075", units_checked="yes", **{"tare-force_n": "10"})
-    assert "<li>the force is 0 on average over the first 10 % of all samples of each curve" in upload.page
 
 
 def test_page_and_command_say_the_same_of_a_punch(client: httpx.Client, tmp_path: Path) -> None:

@@ -1,18 +1,14 @@
 """The upload's pages where there is much, little room, or two of a kind."""
 
 import re
-from itertools import pairwise
 
 import numpy as np
-import pytest
 from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.uploads import as_json, file, look_at
-from tests.support.instrument_files import frf_datasets, uff
 from tests.support.store_server import campaign
 
-PHONE = 375
 WRONG = {
     "thickness_mm": "2,5,1",
     "youngs_modulus_mpa": "abc",
@@ -49,47 +45,6 @@ def test_alike_refusals_are_told_once(visitor: Visit) -> None:
     page.get_by_role("heading", name="press 39.json").wait_for()
     assert page.get_by_role("link", name="press 39.json").get_attribute("aria-current") == "true"
     visitor.require_accessible()
-
-
-def test_alike_recordings_file_told_once(visitor: Visit) -> None:
-    """Alike recordings of a file are told once."""
-    document = campaign("half", sensors=12, id="half")
-    for number, recording in enumerate(document["recordings"]):
-        if number % 2:
-            recording["indenter_radius_mm"] = -float(number)
-    document["recordings"][0]["sensor"] = "nowhere"
-    look_at(visitor, [file("half.json", as_json(document))])
-    section = visitor.page.locator("section.findings", has_text="Refused recordings")
-    assert "Refused recordings: 13" in section.inner_text()
-    headings = section.get_by_role("heading", level=3).all_inner_texts()
-    assert headings == ["s0-1N", "12 alike, the first s0-2N"]
-    section.get_by_text("All 12").click()
-    assert "s11-2N" in section.inner_text()
-
-
-def test_the_mapping_fits_a_phone(visitor: Visit) -> None:
-    page = visitor.page
-    page.set_viewport_size({"width": PHONE, "height": 800})
-    look_at(visitor, [file("two forces.csv", TWO_FORCES)])
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE
-    region = page.get_by_role("region", name="Channels")
-    assert region.evaluate("box => box.scrollWidth <= box.clientWidth")
-    for label in (
-        "What Charge [pC] is",
-        "True unit of Charge [pC]",
-        "Sign of Charge [pC]",
-        "Sensitivity of Charge [pC]",
-    ):
-        box = page.get_by_label(label, exact=True).bounding_box()
-        assert box is not None
-        assert box["x"] >= 0
-        assert box["x"] + box["width"] <= PHONE
-    told = region.locator("td", has_text="to 1.10").bounding_box()
-    assert told is not None
-    assert told["height"] < 40  # one line
-    visitor.require_accessible()
-    tops = [field.bounding_box() for field in region.get_by_role("combobox").all()]
-    assert all(one is not None and other is not None and one["y"] < other["y"] for one, other in pairwise(tops))
 
 
 def test_two_channels_field_pointed_out_refused(visitor: Visit) -> None:
@@ -129,40 +84,3 @@ def test_two_channels_field_pointed_out_refused(visitor: Visit) -> None:
     page.get_by_text("What the channels are").click()
     assert page.get_by_label("What Force left [N] is").input_value() == ""
     assert page.get_by_label("What Force right [N] is").input_value() == "force_n"
-
-
-def test_request_names_files_chosen(visitor: Visit) -> None:
-    """The request names the files that were chosen."""
-    page = visitor.page
-    visitor.go("/upload")
-    page.get_by_label("Files").set_input_files([file("it's 1.csv", TWO_FORCES), file("b.csv", TWO_FORCES)])
-    page.get_by_text("The same by request").click()
-    shell, python = (page.get_by_label(name, exact=True).inner_text() for name in ("Shell", "Python"))
-    assert "-F 'file=@it'\"'\"'s 1.csv' \\\n  -F file=@b.csv" in shell
-    assert 'post_files(["it\'s 1.csv", "b.csv"])' in python
-    assert "rig" not in shell + python
-    page.get_by_label("Rig description").set_input_files(file("bench 3.yaml", "schema: rig/1"))
-    shell, python = (page.get_by_label(name, exact=True).inner_text() for name in ("Shell", "Python"))
-    assert "-F 'rig=@bench 3.yaml'" in shell
-    assert 'rig="bench 3.yaml"' in python
-
-
-@pytest.mark.soak
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore:unclosed file:ResourceWarning")
-def test_every_frf_universal_file_becomes(visitor: Visit) -> None:
-    """Every frf of a universal file becomes a recording."""
-    page = visitor.page
-    look_at(visitor, [file("array.uff", uff(0, frf_datasets(["s1", "s2", "s3"])))])
-    assert page.get_by_label("What FRF is").input_value() == "frf_pc_per_n"
-    for label, value in (("thickness h", "2.5"), ("Young's modulus", "16"), ("sensor radius", "1.5")):
-        page.get_by_label(label).fill(value)
-    page.get_by_label("Layout").fill("s1, 0, 0\ns2, 8, 0\ns3, 16, 0")
-    page.get_by_label("sensor that was pressed: where it is").select_option("block")
-    page.locator("#indenter_radius_mm").fill("4")
-    page.locator("#preload_n").fill("1")
-    page.locator("#dynamic_force_n").fill("0.2")
-    page.get_by_role("button", name="Read it with these settings").click()
-    page.get_by_text("3 recordings understood").wait_for()
-    assert "holds 3 FRFs, each a part of its own: s1, s2, s3" in page.get_by_role("main").inner_text()
-    levels = [page.get_by_role("row", name=f"array s{number}").locator("td").last.inner_text() for number in (1, 2, 3)]
-    assert [float(level) for level in levels] == pytest.approx([7.1, 14.2, 21.3], rel=0.01)

@@ -10,6 +10,7 @@ import orjson
 import pytest
 
 from tests.service.pages.forms import BROWSING, token_of
+from tests.service.waiting import until
 from tests.support.file_readers import readers
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -37,10 +38,7 @@ def send(client: httpx.Client, files: list[tuple[str, bytes]]) -> httpx.Response
 
 def send_other(server: Server) -> None:
     """As soon as a file is read, somebody else's upload takes all the room."""
-    end = time.monotonic() + 240
-    while not readers(server.process.pid):
-        assert time.monotonic() < end, "no file is read"
-        time.sleep(0.005)
+    until(lambda: readers(server.process.pid), "no file is read")
     with browser(server) as other:
         content = orjson.dumps(campaign("other"))
         assert send(other, [("other.json", content + b" " * (OTHER_BYTES - len(content)))]).status_code == 303
@@ -82,3 +80,12 @@ def test_being_kept_upload_makes_room_kept(small: Server) -> None:
     while len(shelves := list((small.place.folder / "uploads").glob("*/shelf-*"))) > 1:  # that of the other one
         assert time.monotonic() < end, shelves
         time.sleep(0.05)
+
+
+def test_upload_beyond_limit_refused_page(small: Server) -> None:
+    """An upload beyond the limit is refused on a page."""
+    with browser(small) as client:
+        answer = send(client, [("a.csv", b"1,2\n" * 200_000)])
+    assert answer.status_code == 413
+    assert "UNDERSKIN_MAX_UPLOAD_MB" in answer.text
+    assert "<h1>" in answer.text

@@ -2,17 +2,13 @@
 
 import csv
 from collections.abc import Iterator
-from pathlib import Path
 
 import httpx
 import pytest
 
-from service.ingest.uploads import Upload
-from service.pages.upload.pending_uploads import PendingUploads
-from service.store.errors import Missing
 from tests.service.pages.forms import BROWSING, token_of
 from tests.service.pages.uploads import as_json, campaigns_of
-from tests.support.store_server import Place, Server, campaign, running
+from tests.support.store_server import Server, campaign
 
 
 @pytest.fixture
@@ -60,77 +56,3 @@ def test_an_upload_is_its_session_s_own(sender: httpx.Client, server: Server) ->
     rows = list(csv.DictReader(sender.get(f"{place}/0/frf.csv").text.splitlines()))
     assert len(rows) == 6 * 20
     assert sender.get(f"{place}/1/frf.csv").status_code == 404
-
-
-def test_an_upload_needs_the_session_s_own_form(sender: httpx.Client) -> None:
-    files = {"file": ("a.json", as_json(campaign("forged")))}
-    token = token_of(sender.get("/upload").text)
-    assert sender.post("/upload", data={"form_token": "x"}, files=files).status_code == 403
-    assert sender.post("/upload", files=files).status_code == 403
-    other_site = {"Origin": "https://example.org"}
-    assert sender.post("/upload", data={"form_token": token}, files=files, headers=other_site).status_code == 403
-    assert sender.post("/upload", data={"form_token": token}).status_code in (415, 422)  # no file
-    place = posted(sender)
-    for path in ("keep", "discard", "restore", "mapping"):
-        assert sender.post(f"{place}/{path}", data={"form_token": "x"}).status_code == 403
-
-
-def test_who_may_read_only_uploads_nothing(locked: tuple[Server, dict[str, str]]) -> None:
-    server, keys = locked
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
-        somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
-        shown = somebody.get("/upload").text
-        assert "may read only" in shown
-        assert 'type="file"' not in shown
-        form = {"form_token": token_of(shown)}
-        own = {"Origin": str(server.http.base_url).rstrip("/")}
-        files = {"file": ("a.json", as_json(campaign("locked")))}
-        answer = somebody.post("/upload", data=form, files=files, headers=own)
-        assert answer.status_code == 403
-        assert "scope read" in answer.text
-
-
-@pytest.mark.slow
-def test_upload_beyond_limit_refused_page(tmp_path: Path) -> None:
-    """An upload beyond the limit is refused on a page."""
-    with (
-        running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.1") as server,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody,
-    ):
-        form = {"form_token": token_of(somebody.get("/upload").text)}
-        answer = somebody.post("/upload", data=form, files={"file": ("a.csv", b"1,2\n" * 50_000)})
-        assert answer.status_code == 413
-        assert "UNDERSKIN_MAX_UPLOAD_MB" in answer.text
-        assert "<h1>" in answer.text
-
-
-def upload(folder: Path, size: int) -> Upload:
-    path = folder / f"{len(list(folder.iterdir()))}"
-    path.write_bytes(b"x" * size)
-    return Upload(path, "a", "file", "", in_form=True)
-
-
-def test_shelf_holds_no_upload(tmp_path: Path) -> None:
-    """The shelf holds no more than one upload may."""
-    arriving, shelf_folder = tmp_path / "arriving", tmp_path / "shelf"
-    arriving.mkdir()
-    shelf_folder.mkdir()
-    pending_uploads = PendingUploads(shelf_folder, 1000)
-    first, second = (pending_uploads.put(cookie, [upload(arriving, 400)]) for cookie in ("one", "two"))
-    assert pending_uploads.find("one", first.id) is first
-    third = pending_uploads.put("three", [upload(arriving, 400)])
-    with pytest.raises(Missing):
-        pending_uploads.find("two", second.id)  # looked at longest ago
-    assert pending_uploads.find("one", first.id) is first
-    again = pending_uploads.put("one", [upload(arriving, 100)])  # beside the session's first
-    assert sum(path.stat().st_size for path in shelf_folder.rglob("*") if path.is_file()) == 900
-    assert pending_uploads.waiting("one") == [again, first]
-    assert pending_uploads.waiting("three") == [third]
-    more = [pending_uploads.put("one", [upload(arriving, 1)]) for _ in range(4)]  # a session has five at most
-    with pytest.raises(Missing):
-        pending_uploads.find("one", first.id)
-    assert pending_uploads.waiting("one") == [*reversed(more), again]
-    more[-1].discarded = True
-    last = pending_uploads.put("one", [upload(arriving, 1)])
-    assert pending_uploads.waiting("one") == [last, *reversed(more[:-1]), again]  # what was discarded goes first
-    assert pending_uploads.discarded("one") == []

@@ -74,35 +74,6 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
 
 
 @pytest.mark.soak
-def test_wrong_term_named_beside_formula(sized: Visit) -> None:
-    """A wrong term is named beside its formula."""
-    page = sized.page
-    look_at(sized, [file("wrong.txt", text_of_raw_curve(above="# wrong"))])
-    fill_in(page)
-    assert page.get_by_role("region", name="Formulas").evaluate("box => box.scrollWidth <= box.clientWidth")
-    for typed, said in first(
-        1,
-        (
-            ("'Height (nm)' - 5 [N]", "5 [N] has the unit N; only what has units of one kind"),
-            ("'Height (nm)' ** 2", "'Height (nm)' ** 2: is not allowed"),
-            ("", "it has a name and no formula: write one, or clear its name"),
-        ),
-    ):
-        formula = page.get_by_label("Formula of derived channel 1", exact=True)
-        formula.fill(typed)
-        read_it(page)
-        formula = page.get_by_label("Formula of derived channel 1", exact=True)
-        expect(formula).to_have_value(typed)
-        expect(formula).to_have_attribute("aria-invalid", "true")
-        expect(page.locator("#derived-wrong-0")).to_contain_text(said)
-        expect(page.get_by_label("Formula of derived channel 2", exact=True)).to_have_value(LOAD)
-        sized.require_accessible()
-    page.get_by_label("Formula of derived channel 1", exact=True).fill(DEPTH)
-    read_it(page)
-    expect(page.get_by_role("status").first).to_contain_text("1 recording understood")
-
-
-@pytest.mark.soak
 def test_brushing_the_figure_fills_in_the_trim(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("brush.txt", text_of_raw_curve(above="# brush"))])
@@ -164,60 +135,20 @@ def test_everything_is_done_by_keyboard_alone(visitor: Visit) -> None:
     expect(page.get_by_text("of each curve, samples 11 to 380 are used")).to_be_visible()
 
 
-@pytest.mark.soak
-def test_instrument_s_template_offered_next_time(sized: Visit, server: Server) -> None:
-    """An instrument s template is offered next time."""
-    page = sized.page
-    width = page.viewport_size["width"] if page.viewport_size else 0
-    text = text_of_raw_curve().replace("Height (nm)", f"Z{width} (nm)")
-    look_at(sized, [file("monday.txt", text)], skin=f"monday-{width}")
-    expect(page.get_by_role("button", name="Read them so again")).to_have_count(0)
+def test_a_second_file_is_read_as_the_first_or_afresh(visitor: Visit) -> None:
+    """What it is read by is said, and it can start without."""
+    page = visitor.page
+    look_at(visitor, [file("afm.txt", text_of_raw_curve(above="# first"))], skin="pdms-8")
     fill_in(page)
-    page.get_by_label("Formula of derived channel 1", exact=True).fill(DEPTH.replace("Height", f"Z{width}"))
-    page.get_by_label("Instrument").fill("force microscope 2")
-    page.get_by_label("first sample used").fill("5")
+    page.locator("#instrument").fill("force microscope 7")
     read_it(page)
     page.get_by_role("button", name="Keep 1 recording").click()
     page.wait_for_url("**/campaigns/*")
-    look_at(sized, [file("tuesday.txt", text)], skin=f"tuesday-{width}")
-    template = page.get_by_role("region", name="Template of the instrument")
-    expect(template).to_contain_text("force microscope 2")
-    expect(template).to_contain_text("It keeps the trim: first sample used 5. It keeps the zero: force is 0")
-    expect(template).to_contain_text("over the first 10 % of the curve. It keeps “units checked”")
-    sized.require_accessible()
-    page.get_by_role("button", name="Read them so again").click()
+    look_at(visitor, [file("next.txt", text_of_raw_curve(above="# next"))], skin="pdms-8")
+    told = page.get_by_role("form", name="Read as before")
+    expect(told).to_contain_text("afm.txt of force microscope 7 of skin pdms-8 was, kept")
+    told.get_by_role("button", name="Start without it").click()
     page.wait_for_load_state()
-    expect(page.get_by_role("status").first).to_contain_text("1 recording understood")
-    page.get_by_text("What the channels are").click()
-    expect(page.get_by_label("first sample used")).to_have_value("5")
-    page.get_by_role("button", name="Keep 1 recording").click()
-    page.wait_for_url("**/campaigns/*")
-    bodies = []
-    for day in ("monday", "tuesday"):
-        (kept,) = campaigns_of(server, f"{day}-{width}")
-        bodies.append(server.http.get(f"/v1/campaigns/{kept}/document").json()["recordings"][0]["force_n"])
-    assert bodies[0] == bodies[1]
-    look_at(sized, [file("others.txt", text.replace("Deflection", "Bending"))])
-    expect(page.get_by_role("button", name="Read them so again")).to_have_count(0)
-
-
-@pytest.mark.soak
-def test_recordings_file_listed_page_page(sized: Visit) -> None:
-    """Recordings of a file are listed page by page."""
-    page = sized.page
-    head = (
-        "schema,campaign/1\nname,many\nskin.poisson_ratio,0.5\n\nid,kind,indenter_radius_mm,displacement_mm,force_n\n"
-    )
-    rows = [
-        f"r{number:03},indentation,4,0,0\n,,,0.1,{0.01 * number:g}\n,,,0.2,{0.03 * number:g}\n"
-        for number in range(1, 131)
-    ]
-    look_at(sized, [file("many.csv", head + "".join(rows))])
-    pager = page.get_by_role("navigation", name="Recordings")
-    assert re.findall(r"\d+ to \d+", pager.inner_text()) == ["1 to 60", "61 to 120", "121 to 130"]
-    seen: list[str] = []
-    for pages in ("1 to 60", "61 to 120", "121 to 130"):
-        pager.get_by_role("link", name=pages).click()
-        expect(pager.get_by_role("link", name=pages)).to_have_attribute("aria-current", "page")
-        seen += page.locator('[aria-label="Recordings"] tbody th').all_inner_texts()
-    assert seen == [f"r{number:03}" for number in range(1, 131)]
+    expect(page.get_by_role("form", name="Read as before")).to_have_count(0)
+    expect(page.get_by_label("force is 0 over the first")).to_have_value("")
+    expect(page.get_by_label("Formula of derived channel 1", exact=True)).to_have_value("")

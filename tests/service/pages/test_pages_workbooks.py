@@ -14,31 +14,11 @@ from tests.support.store_server import Place, campaign, running
 
 @pytest.mark.soak
 @pytest.mark.alone
-def test_many_workbooks_leave_threads_pages(tmp_path: Path) -> None:
-    """Many workbooks leave threads for other pages."""
-    with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
-        sent = server.http.post("/v1/campaigns", json=campaign("long", lines=1000)).raise_for_status().json()
-        path = f"/campaigns/{sent['id']}/frf.xlsx"
-        for _ in range(2):  # the first one loads what writes them
-            begun = time.monotonic()
-            assert server.http.get(path).raise_for_status().content.startswith(b"PK")
-            of_one_s = time.monotonic() - begun
-        place = (server.http.base_url.host, server.http.base_url.port)
-        for _ in range(THREADS + 10):
-            connection = stack.enter_context(socket.create_connection(place))
-            connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
-        for _ in range(5):
-            begun = time.monotonic()
-            assert server.http.get("/v1/skins").status_code == 200
-            assert time.monotonic() - begun < 3 * of_one_s
-
-
-@pytest.mark.soak
-@pytest.mark.alone
-@pytest.mark.parametrize("path", ["/design/search", "/design/search/region.csv"])
+@pytest.mark.parametrize("path", ["/campaigns/{id}/frf.xlsx", "/design/search", "/design/search/region.csv"])
 def test_many_long_answers_leave_threads_pages(tmp_path: Path, path: str) -> None:
     """Many long answers leave threads for other pages."""
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
+        path = path.format(**server.http.post("/v1/campaigns", json=campaign("long", lines=1000)).json())
         times = []
         for _ in range(6):
             begun = time.monotonic()

@@ -94,33 +94,6 @@ def test_all_that_is_wrong_is_told_at_once(
     assert {field: ids.split() for field, ids in marked.items()} == expected
 
 
-def test_wrong_pinned_design_marks_no_field(server: Server) -> None:
-    """What is wrong with a pinned design marks no field."""
-    page = server.http.get("/design", params={"pin": "pitch_mm=x&preload_n=-1"}, headers=BROWSING).text
-    assert "A, pinned: pitch of the array [mm]: x – must be a number" in page
-    assert "A, pinned: force F [N]: -1.0" in page
-    assert "aria-invalid" not in page
-
-
-def test_many_wrong_lines_are_counted(server: Server) -> None:
-    page = server.http.get("/loads", params={"loads": "0 0 4\n" * 30}, headers=BROWSING).text
-    assert page.count("must be x y R F") == 20
-    assert "and 10 more" in page
-
-
-@pytest.mark.soak
-def test_wrong_map_wrong_skin_told_once(visitor: Visit) -> None:
-    """A wrong map and a wrong skin are told at once."""
-    page = visitor.page
-    visitor.go("/loads/map")
-    page.get_by_label("thickness h").fill("zwei")
-    page.get_by_label("or as text").fill("mm,0,1\n0,1,x\n1,1,1\n")
-    page.get_by_role("button", name="Compute").click()
-    expect(page.get_by_label("thickness h")).to_have_accessible_description("thickness h [mm]: zwei – must be a number")
-    expect(page.get_by_label("or as text")).to_have_attribute("aria-invalid", "true")
-    visitor.require_accessible()
-
-
 def test_wrong_field_described_sentence(visitor: Visit) -> None:
     """A wrong field is described by its sentence."""
     page = visitor.page

@@ -1,7 +1,7 @@
 """The map of trends colours what the trend's own test calls significant, and says as much as the page's text."""
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import orjson
@@ -12,8 +12,6 @@ from service.pages.skin.figures import drawn_map, map_rows
 from service.schemas.skins import History, Point, SensorHistory, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.array_history import SIGNIFICANT, holm, trend
-
-GREY = "#cfd4d9"
 
 
 def points(values: list[float]) -> list[Point]:
@@ -50,57 +48,6 @@ def history(d33: list[list[float]], uncertainty: float) -> History:
         left_out_points=[],
         left_out_recordings=[],
     )
-
-
-@pytest.mark.parametrize(
-    ("d33", "coloured"),
-    [
-        ([[20.0, 20.9, 22.4], [20.0, 20.1, 19.9]], [False, False]),  # 6.9 uncertainties, of 1 degree of freedom: p 0.09
-        ([[20.0, 21.0, 22.001], [20.0, 20.1, 19.9]], [True, False]),
-    ],
-)
-def test_slope_coloured_trend_significant(d33: list[list[float]], coloured: list[bool]) -> None:
-    """A slope is coloured where its trend is significant."""
-    places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(3)]
-    row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
-    answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
-    of_skin = history(d33, 0.001)
-    drawn = drawn_map("palm", row, map_rows(row, answer, of_skin, places), "trend", "paper", None)
-    shapes: list[dict[str, Any]] = orjson.loads(str(drawn.json))["layout"]["shapes"]
-    assert [shape["fillcolor"] not in (GREY, "#ffffff") for shape in shapes] == [*coloured, False]
-    assert ("no sensor's differs from 0" in drawn.about) is not any(coloured)
-
-
-def test_trend_too_few_campaigns_tell_many() -> None:
-    """A trend that too few campaigns tell of many sensors is named.
-
-    One of sixty dies; by Student's t of 1 degree of freedom nothing is told over the whole array.
-    """
-    places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(60)]
-    row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
-    answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
-    d33 = [[12.35, 9.7, 6.96] if number == 37 else [13.0, 13.1, 13.0] for number in range(60)]
-    about = drawn_map("palm", row, map_rows(row, answer, history(d33, 0.1), places), "trend", "paper", None).about
-    assert "no sensor's differs from 0" in about
-    assert "Taken alone, s37 would have a trend (95 %)" in about
-
-
-def test_sensors_without_trend_white_said_why() -> None:
-    """Sensors without a trend are white and said why."""
-    places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(5)]
-    row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
-    of_skin = history([[20.0, 21.0, 22.001], [20.0, 20.1, 19.9]], 0.001)
-    few = "a trend needs 3 campaigns, and there are 2"
-    short = [
-        SensorHistory(sensor=f"s{2 + number}", points=points([20.0, 20.1]), trend=None, no_trend=few)
-        for number in (0, 1)
-    ]
-    of_skin = of_skin.model_copy(update={"sensors": [*of_skin.sensors, *short]})
-    drawn = drawn_map("palm", row, map_rows(row, {"sensors": []}, of_skin, places), "trend", "paper", None)
-    assert f"3 sensors have no trend, 2 of them since {few}. " in drawn.about
-    figure = orjson.loads(str(drawn.json))
-    legend = [trace["name"] for trace in figure["data"] if trace.get("showlegend") is not False]
-    assert legend == ["trend", "not different from 0", "no trend known"]
 
 
 @pytest.mark.parametrize("values", [[20.0, 20.9, 22.4], [20.0, 21.0, 22.001], [20.0, 20.9, 22.4, 23.0]])

@@ -7,17 +7,13 @@ from typing import Any
 import pytest
 import yaml
 
-from service.ingest.field_words import CHANNELS, KINDS
 from service.pages.upload import recorded_time
-from service.pages.upload.error_words import field_of, field_words, what_came, what_to_do
+from service.pages.upload.error_words import field_words
 from service.pages.upload.file_summary import ChannelSummary
-from service.pages.upload.mapping import document_of, passed_over, sensors_text
+from service.pages.upload.mapping import document_of, sensors_text
 from tests.support.repository import ROOT
-from underskin import InvalidInput
-from underskin.errors import Mention, Requirement
 from underskin.recordings import rig_description
 from underskin.recordings.rig_guess import guessed
-from underskin.units import checked
 
 RIGS = sorted((ROOT / "examples" / "formats" / "rigs").glob("*.yaml"))
 
@@ -79,38 +75,6 @@ def test_columns_of_a_long_table() -> None:
     rig_description.from_dict(said)
 
 
-def test_every_channel_every_kind_chosen() -> None:
-    """Every channel of every kind can be chosen."""
-    assert {name for kind in KINDS for name in rig_description.channel_fields(kind)} == set(CHANNELS)
-
-
-def test_magnitude_phase_not_taken_real_part() -> None:
-    """Magnitude and phase are not taken for a real part."""
-    channels = [channel("Frequency", "Hz"), channel("FRF magnitude", "pC/N"), channel("FRF phase", "deg")]
-    found = guessed(channels, {}, {})
-    assert found["channels"] == {
-        "frequency_hz": {"channel": "Frequency"},
-        "frf_magnitude_pc_per_n": {"channel": "FRF magnitude"},
-        "frf_phase_deg": {"channel": "FRF phase"},
-    }
-    assert [guessed([channel(f"FRF {name}", "pC/N")], {}, {})["channels"] for name in ("real", "imag")] == [
-        {"frf_re_pc_per_n": {"channel": "FRF real"}},
-        {"frf_im_pc_per_n": {"channel": "FRF imag"}},
-    ]
-
-
-def test_piezo_deflection_volts_indentation() -> None:
-    """A piezo and a deflection in volts are an indentation."""
-    channels = [channel("Time", "s"), channel("Piezo", "V"), channel("Deflection", "V")]
-    assert guessed(channels, {}, {})["kind"] == "indentation"
-
-
-def test_percent_sign_behind_percentage() -> None:
-    """A percent sign behind a percentage is no mistake."""
-    form = {"kind": "indentation", "channel-0": "F", "is-0": "force_n", "tare-force_n": "15 %"}
-    assert document_of(form, {})[0]["channels"]["force_n"]["tare_percent"] == 15
-
-
 def test_channels_file_states_guessed_unit_name() -> None:
     """Channels and what a file states are guessed by unit and name."""
     channels = [channel("Kraftmessdose", "mN"), channel("Charge amplifier", "V"), channel("temperature", "V")]
@@ -125,72 +89,6 @@ def test_channels_file_states_guessed_unit_name() -> None:
     curve = guessed([channel("z", "um"), channel("F", "uN"), channel("t", "s")], {}, {})
     assert curve["kind"] == "indentation"
     assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
-
-
-def test_deflection_used_not_said_passed() -> None:
-    """A deflection that is used is not said to be passed over."""
-    sprung = [channel("Piezo", "nm"), channel("Deflection", "nm"), channel("Height", "nm")]
-    assert passed_over(sprung[:2], guessed(sprung[:2], {}, {})) == []
-    (told,) = passed_over(sprung, guessed(sprung, {}, {}))
-    assert told.startswith("Height may be displacement as well as Piezo")
-
-
-def test_testing_machine_s_table_guessed() -> None:
-    """A testing machine s table is guessed to be a compression."""
-    table = [channel("Time (s)", "s"), channel("Compression (mm)", "mm"), channel("Load (N)", "N")]
-    found = guessed([*table, channel("Engineering Strain [-]", "-")], {}, {})
-    assert found["kind"] == "compression"
-    named = {field: how["channel"] for field, how in found["channels"].items()}
-    assert named == {"time_s": "Time (s)", "displacement_mm": "Compression (mm)", "force_n": "Load (N)"}
-    assert guessed([channel("Displacement (mm)", "mm"), channel("Load (N)", "N")], {}, {})["kind"] == "indentation"
-
-
-def test_parts_frf_guessed_complex_ones_sample() -> None:
-    """Both parts of an frf are guessed and complex ones and the sample rate."""
-    parts = [channel("frequency", ""), channel("FRF real", "pC/N"), channel("FRF imaginary", "pC/N")]
-    assert set(guessed(parts, {}, {})["channels"]) == {"frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"}
-    assert guessed([channel("H1", "pC/N", is_complex=True)], {}, {})["channels"] == {"frf_pc_per_n": {"channel": "H1"}}
-    stated = guessed([channel("force", ""), channel("charge", "")], {"Sampling rate": 1000.0}, {})
-    assert stated["recording"] == {"sample_rate_hz": {"property": "Sampling rate"}}
-
-
-def test_missing_said_form_s_words() -> None:
-    """What is missing is said in the form s words."""
-    assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
-    assert field_words("channels.charge_pc.sensitivity") == "sensitivity of the charge"
-    channels = [channel("force", "N")]
-    missing = {"code": "required", "field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
-    assert what_to_do(missing, channels) == "required: say below which channel it is"
-    needs = " needs one of force, such as N"
-    refused = Requirement("channel 'force_n': its unit 'V' is one of voltage; ", Mention("force_n"), needs)
-    told = what_to_do({"code": "unreadable_file", "field": "file", "value": "x.csv", "allowed": refused}, channels)
-    assert told == "channel 'force_n': its unit 'V' is one of voltage; force needs one of force, such as N"
-    with pytest.raises(InvalidInput) as error:
-        checked("thickness_mm", 2500.0)
-    unlikely = error.value.allowed
-    likely = {"code": "unlikely_magnitude", "field": "skin.thickness_mm", "value": 2500, "allowed": unlikely}
-    told = what_to_do(likely, channels)
-    assert "(or tick “These values are right, unusual as they are”)" in told
-    assert "units_checked" not in told
-    assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"}, channels)
-    assert (field_of(missing, []), what_to_do(missing, [])) == ("frf_im_pc_per_n", "required")
-
-
-def test_channel_kind_recording_said() -> None:
-    """A channel of another kind of recording is said without its value."""
-    channels = [channel("charge", "pC")]
-    refused = {"code": "not_one_of", "field": "channels.charge_pc", "value": "a value of type dict", "allowed": "x"}
-    assert what_came(refused, channels) is None
-    assert what_to_do(refused, channels).startswith("the kind of recording that is chosen has no charge")
-    assert what_came(refused, []) == "a value of type dict"
-
-
-def test_unit_label_says_label_wrong() -> None:
-    """A unit other than the label says that the label is wrong."""
-    form = {"kind": "frf", "channel-0": "F", "is-0": "force_n", "label-0": "g", "unit-0": "N"}
-    assert document_of(form, {})[0]["channels"]["force_n"] == {"channel": "F", "labelled": "g", "unit": "N"}
-    same = {**form, "label-0": "N"}
-    assert document_of(same, {})[0]["channels"]["force_n"] == {"channel": "F"}
 
 
 def test_time_typed_lab_s_zone_shown_typed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,41 +118,11 @@ def test_file_states_time_taken_word() -> None:
     assert guessed(channels, {"Date": "Monday", "recorded_at": "noon"}, {})["recording"] == {}
 
 
-def test_cannot_said_named_typed_kept() -> None:
-    """What cannot be said is named and what was typed is kept."""
-    layout = "s1, 0, 0\ns2, 8\ns3, a, 0"
-    found, (wrong,) = document_of({"sensors": layout, "thickness_mm": "2,5"}, {})
-    assert wrong.field == "skin.sensors"
-    assert "line 2" in wrong.allowed
-    assert found["skin"]["thickness_mm"] == 2.5
-    assert sensors_text(found) == layout
-    twice = {"channel-0": "a", "is-0": "force_n", "channel-1": "b", "is-1": "force_n"}
-    found, (wrong,) = document_of(twice, {})
-    assert wrong.allowed == "a is force already: set one of the two to “not used”"
-    assert found["channels"] == {"force_n": {"channel": "a"}}
-
-
-def test_values_checked_before_file_read_file() -> None:
-    """Values are checked before a file is read and those that a file states are not."""
-    typed = {"kind": "frf", "poisson_ratio": "", "preload_n": "0.0001", "indenter_radius_mm": "", "dynamic_force_n": ""}
-    stated = {"indenter_radius_mm-from": "R"}
-    (unlikely,) = document_of({**typed, **stated}, {})[1]
-    assert (unlikely.field, unlikely.value) == ("recording.preload_n", 0.0001)
-    assert document_of({**typed, **stated, "units_checked": "yes"}, {})[1] == []
-    assert document_of({**typed, "kind": "indentation"}, {})[1] == []  # which has no preload
-
-
 @pytest.mark.parametrize("line", ["s1, 0.5, 8", "s1; 0,5; 8", "s1\t0,5\t8", "s1 0.5 8", "s1   0,5 8"])
 def test_a_layout_is_written_as_people_write_it(line: str) -> None:
     found, wrong = document_of({"sensors": line}, {})
     assert wrong == []
     assert found["skin"]["sensors"] == [{"id": "s1", "x_mm": 0.5, "y_mm": 8.0}]
-
-
-def test_time_table_found_no_sample_rate_missing() -> None:
-    """The time of a table is found so that no sample rate is missing."""
-    found = guessed([channel("Time (s)", "s"), channel("Force (N)", "N"), channel("Charge (pC)", "pC")], {}, {})
-    assert found["channels"]["time_s"] == {"channel": "Time (s)"}
 
 
 SPRUNG = {
@@ -276,11 +144,3 @@ def test_deflection_form_makes_force_depth() -> None:
     _, (wrong,) = document_of({**form, **measured, "spring_constant_n_per_m": ""}, {})
     assert "say which channel is the deflection" in wrong.allowed
     assert field_words("spring_constant_n_per_m") == "spring constant [N/m]"
-
-
-def test_curves_said_words_channel() -> None:
-    """Curves are said by words or by a channel."""
-    for said, curves in (("groups", "groups"), ("channel", {"channel": "n"}), ("segments", {"segments": "n"})):
-        assert document_of({"curves": said, "curves-by": "n"}, {})[0]["curves"] == curves
-    assert "curves" not in document_of({"curves": "", "curves-by": "n"}, {"curves": "file"})[0]
-    assert document_of({}, {"curves": "file"})[0]["curves"] == "file"

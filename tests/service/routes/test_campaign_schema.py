@@ -119,28 +119,6 @@ def beyond(name: str, error: InvalidInput) -> bool:
     return name in ("sensor", "recorded_at", "sensors") or error.place.startswith("skin.")
 
 
-@pytest.mark.parametrize(
-    ("changes", "recording"),
-    [
-        ({"name": ""}, {}),
-        ({"schema": "campaign/2"}, {}),
-        ({"extra": 1}, {}),
-        ({"skin": {"poisson_ratio": 0.6}}, {}),
-        ({}, {"preload_n": 0}),
-        ({}, {"coherence": [0.9, 1.0, 1.1]}),
-        ({}, {"frequency_hz": []}),
-        ({}, {"force_n": [1.0, 2.0, 3.0]}),
-        ({}, {"conditions": {"preload_n": 2.0}}),
-    ],
-)
-def test_service_refuses_schema(http: httpx.Client, changes: dict[str, Any], recording: dict[str, Any]) -> None:
-    """The service refuses what the schema does."""
-    campaign = document({**FRF, **recording}, **changes)
-    assert not VALID.is_valid(campaign)
-    answer = http.post("/v1/campaigns", json=campaign)
-    assert answer.status_code == 422 or answer.json()["status"] == "refused", answer.text
-
-
 def test_document_gives_back_schema_describes(http: httpx.Client) -> None:
     """The document gives back what the schema describes."""
     campaign = document(*RECORDINGS.values(), name="every kind")

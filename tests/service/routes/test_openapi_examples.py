@@ -85,14 +85,3 @@ def test_example_report_valid() -> None:
     """The report of the example is a `report/1`, without further fields."""
     report = STORED["diagnosis"]["answer"]["report"]
     jsonschema_rs.Draft202012Validator(closed(Report.model_json_schema())).validate(report)
-
-
-def test_the_example_of_a_form_is_accepted(http: httpx.Client, document: dict[str, Any]) -> None:
-    body = document["paths"]["/v1/campaigns"]["post"]["requestBody"]["content"]["multipart/form-data"]
-    (file,) = body["example"]["file"]
-    fields = {name: value for name, value in body["example"].items() if name != "file"}
-    answer = http.post("/v1/campaigns", data=fields, files={"file": ("first.json", file.encode())})
-    assert answer.status_code == 201, answer.text
-    (sent,) = answer.json()["campaigns"]
-    assert sent["status"] == "ok"
-    assert http.get(f"/v1/campaigns/{sent['id']}").json()["name"] == fields["together"]

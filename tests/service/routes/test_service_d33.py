@@ -1,7 +1,5 @@
 """d33 over HTTP: what /v1/frf predicts comes back; uncertainties; lines with a band to average over."""
 
-import csv
-import io
 from typing import Any
 
 import httpx
@@ -28,16 +26,6 @@ def refused(http: httpx.Client, **columns: Any) -> tuple[str, str]:
     assert reply.status_code == 422, reply.text
     (error,) = reply.json()["errors"]
     return error["field"], error["allowed"]
-
-
-def test_the_prototypes_array(http: httpx.Client) -> None:
-    """12 sensors of 14 pC/N pressed with 1 N and 41 of 22 pC/N pressed with 3 N (R 4 mm) come back as such."""
-    preload, d33 = [1] * 12 + [3] * 41, [14.0] * 12 + [22.0] * 41
-    predicted = posted(http, "/v1/frf", preload_n=preload, d33_pc_per_n=d33)
-    answer = posted(http, preload_n=preload, frf_pc_per_n=predicted["frf_pc_per_n"])
-    assert answer["d33_pc_per_n"] == pytest.approx(d33, rel=1e-13)
-    assert answer["status"] == ["ok"] * 53
-    assert (answer["model"], answer["table_sha256"]) == ("paper", TABLE.sha256)
 
 
 def test_known_frf_values_mean_known_d33(http: httpx.Client) -> None:
@@ -146,16 +134,6 @@ def test_lines_are_averaged_over_the_band(http: httpx.Client) -> None:
         assert answer[name] == pytest.approx(same[name], rel=1e-14)
 
 
-def test_sent_uncertainty_replaces_lines_scatter(http: httpx.Client) -> None:
-    """A sent uncertainty replaces the lines scatter."""
-    lines: dict[str, Any] = {"frequency_hz": FREQUENCY, "frf_re_pc_per_n": [[7.1, 7.2, 7.3, 7.4, 7.5, 7.6]]}
-    answer = posted(http, preload_n=1, **lines, band_hz=[0, 1000], frf_uncertainty_pc_per_n=0.5)
-    assert answer["frf_uncertainty_pc_per_n"] == [0.5]
-    one_line = posted(http, preload_n=1, **lines, band_hz=[20, 20], frf_uncertainty_pc_per_n=0.5)
-    assert one_line["frf_pc_per_n"] == [7.3]
-    assert "frf_im_pc_per_n" not in one_line
-
-
 def test_a_spectrum_from_frf_comes_back(http: httpx.Client) -> None:
     predicted = posted(http, "/v1/frf", preload_n=[1, 3], d33_pc_per_n=[14, -22], frequency_hz=FREQUENCY)
     lines = {name: predicted[name] for name in ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")}
@@ -189,16 +167,3 @@ def test_lines_that_cannot_be_used_are_refused(
     found_field, found_allowed = refused(http, **columns)
     assert found_field == field
     assert allowed in found_allowed
-
-
-def test_csv_in_and_out(http: httpx.Client) -> None:
-    header = [*SKIN, "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n"]
-    rows = [[*SKIN.values(), preload, frf, 0.1] for preload, frf in ((1, 7.4), (300, 7.4), (3, 11.5))]
-    text = "\n".join(",".join(map(str, line)) for line in (header, *rows))
-    reply = http.post("/v1/d33", content=text, headers={"Content-Type": "text/csv", "Accept": "text/csv"})
-    assert reply.status_code == 200, reply.text
-    first, second, third = csv.DictReader(io.StringIO(reply.text, newline=""))
-    expected = posted(http, preload_n=[1, 3], frf_pc_per_n=[7.4, 11.5], frf_uncertainty_pc_per_n=0.1)
-    assert [float(row["d33_pc_per_n"]) for row in (first, third)] == expected["d33_pc_per_n"]
-    assert (second["d33_pc_per_n"], second["status"]) == ("NaN", "out_of_domain")
-    assert reply.headers["underskin-table-sha256"] == expected["table_sha256"]

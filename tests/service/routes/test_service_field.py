@@ -52,15 +52,6 @@ def test_section_hertz_s_pressure_above_sensor_s(http: httpx.Client) -> None:
     assert mean == pytest.approx(-found["mean_stress_mpa"], rel=0.01)
 
 
-def test_poisson_ratio_linear_layer_s(http: httpx.Client) -> None:
-    """Another poisson ratio is the linear layer s."""
-    linear, half = asked(http, poisson_ratio=0.45), asked(http)
-    assert linear["model"] == "linear_layer"
-    assert linear["rel_error"] is linear["section_error"] is None  # nothing of finite strain is in it
-    assert linear["sigma"] == pytest.approx(half["sigma"], rel=0.06)
-    assert linear["sigma"] != half["sigma"]
-
-
 def test_outside_table_says_limit_no_stress(http: httpx.Client) -> None:
     """Outside the table it says which limit and has no stress."""
     for ratio in (0.5, 0.3):
@@ -95,11 +86,6 @@ def test_what_cannot_be_used_is_named(http: httpx.Client, changed: dict[str, Any
     assert reply.headers["content-type"] == "application/problem+json"
     (error,) = reply.json()["errors"]
     assert (error["field"], error["code"]) == (field, code)
-
-
-def test_a_field_that_is_missing_is_named(http: httpx.Client) -> None:
-    reply = http.get("/v1/field", params={name: value for name, value in SPHERE.items() if name != "preload_n"})
-    assert [(error["field"], error["code"]) for error in reply.json()["errors"]] == [("preload_n", "required")]
 
 
 def test_client_command_numbers(http: httpx.Client, server_url: str) -> None:

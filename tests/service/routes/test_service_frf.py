@@ -74,18 +74,6 @@ def test_columns_are_the_librarys(http: httpx.Client) -> None:
         assert np.array(answer[name], dtype=float) == pytest.approx(values, rel=1e-13, nan_ok=True), name
 
 
-def test_preload_and_indenter_in_columns(http: httpx.Client) -> None:
-    answer = posted(http, indenter_radius_mm=[4, 4, 10], preload_n=[1, 3, 3])
-    for row, (radius, preload) in enumerate([(4, 1), (4, 3), (10, 3)]):
-        alone = posted(http, indenter_radius_mm=radius, preload_n=preload)
-        assert answer["frf_pc_per_n"][row] == pytest.approx(alone["frf_pc_per_n"][0], rel=1e-14)
-
-
-def test_an_inverted_polarity_inverts_the_frf(http: httpx.Client) -> None:
-    plus, minus = posted(http, d33_pc_per_n=[14, -14])["frf_pc_per_n"]
-    assert plus == -minus > 0
-
-
 def test_rows_outside_keep_not_depend_table(http: httpx.Client) -> None:
     """Rows outside keep what does not depend on the table.
 
@@ -134,15 +122,6 @@ def test_spectra_have_a_limit_that_is_told(http: httpx.Client) -> None:
     assert "at most 1000000" in error["allowed"]
 
 
-def test_csv_in_is_read_like_json(http: httpx.Client) -> None:
-    columns = {name: [value] * 2 for name, value in PROTOTYPE.items()} | {"preload_n": [1, 3]}
-    lines = [",".join(columns) + ",units_checked"]
-    lines += [",".join(map(str, values)) + ",false" for values in zip(*columns.values(), strict=True)]
-    reply = http.post("/v1/frf", content="\n".join(lines), headers={"Content-Type": "text/csv"})
-    assert reply.status_code == 200, reply.text
-    assert reply.json() == posted(http, preload_n=[1, 3])
-
-
 def test_unusual_magnitudes_pass_once_confirmed(http: httpx.Client) -> None:
     """Unusual magnitudes pass once they are confirmed.
 
@@ -160,23 +139,3 @@ def test_overflows_outside_spoils(http: httpx.Client) -> None:
     answer = posted(http, preload_n=[1, 1e308], indenter_radius_mm=[4, 1e308], units_checked=True)
     assert answer["status"] == ["ok", "out_of_domain"]
     assert answer["frf_pc_per_n"] == [posted(http)["frf_pc_per_n"][0], None]
-
-
-@pytest.mark.parametrize("route", ["/v1/frf", "/v1/d33"])
-@pytest.mark.parametrize(
-    ("asked", "status", "told"),
-    [
-        ({"model": "adopted"}, 422, "skin_id"),
-        ({"model": "adopted", "skin_id": "left palm"}, 404, "'left palm' has no adopted model"),
-        ({"skin_id": "left palm"}, 422, "used only with model adopted"),
-        ({"model": "best"}, 422, "model"),
-    ],
-)
-def test_adopted_models_are_refused_clearly(
-    http: httpx.Client, route: str, asked: dict[str, str], status: int, told: str
-) -> None:
-    body = {**PROTOTYPE, "frf_pc_per_n": 7.0, **asked}
-    del body["d33_pc_per_n" if route == "/v1/d33" else "frf_pc_per_n"]
-    reply = http.post(route, json=body)
-    assert reply.status_code == status
-    assert told in reply.json()["detail"]

@@ -8,8 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.service.requests import D33, FRF
-
 LONG = 20_000  # bytes
 
 
@@ -37,24 +35,16 @@ def sigma(a: str, rest: str = "") -> bytes:
         sigma("[1e400, 1]"),
         sigma("[1" + "0" * 400 + "]"),
         sigma("0.3", ', "load_parameter": [0.01, 0.02], "model": "layer"'),
-        sigma("[0.3, -1]"),
         sigma("[0.3, NaN]"),
         sigma("[0.3, null]"),
-        sigma("[0.3, true]"),
         sigma('[0.3, "0.6"]'),
         sigma("[[0.3, 0.6]]"),
-        sigma("[[0.3], [0.6]]"),
-        sigma("[0.3, []]"),
         sigma("[[], [0.3, 0.6]]"),
         sigma("[0.3, {}]"),
         sigma("[]"),
-        sigma("{}"),
         sigma('{"a": [0.3]}'),
-        sigma('"0.3"'),
         sigma("[0.3, 0.6]", ', "load_parameter": [0.1, 0.1, 0.1]'),
-        sigma("[0.3, 0.6]", ', "model": ["layer"]'),
         sigma("[0.3, 0.6]", ', "model": "sphere"'),
-        sigma("[0.3, 0.6]", ', "load": [1, 2.5]'),
         sigma("[0.3, 0.6]", ', "loads[0]": 0.1'),
         sigma("[0.3, 0.6]", ', "a_over_h": [0.3, 0.7]'),
         sigma("[0.3, 0.6]", ', "a\\u005fover_h": [0.3, 0.7]'),
@@ -66,47 +56,12 @@ def sigma(a: str, rest: str = "") -> bytes:
         sigma("[0.3, 0.6]", ', "é": 1').decode().encode("latin-1"),
         sigma("[0.3, 0.6]").decode().encode("utf-16"),
         b"[0.3, 0.6]",
-        b"0.3",
         b"{}",
     ],
 )
 def test_sigma(http: httpx.Client, body: bytes) -> None:
     short, long = both(http, "/v1/sigma", body)
     assert long == short
-
-
-@pytest.mark.parametrize(
-    ("path", "fields"),
-    [
-        ("/v1/frf", FRF),
-        ("/v1/frf", {**FRF, "frequency_hz": [10, 20.5]}),
-        ("/v1/frf", {**FRF, "frequency_hz": [10, -20]}),
-        ("/v1/frf", {**FRF, "offset_x_mm": [1, 2.5]}),
-        ("/v1/frf", {**FRF, "offset_x_mm": [1] * 100}),
-        ("/v1/frf", {**FRF, "preload_n": [1e-9, 1]}),
-        ("/v1/frf", {**FRF, "units_checked": [True]}),
-        ("/v1/d33", {**D33, "frf_pc_per_n": [7, 7e-12]}),
-        ("/v1/d33", {**D33, "band_hz": [1, 100]}),
-        (
-            "/v1/d33",
-            {
-                **{name: D33[name] for name in D33 if name != "frf_pc_per_n"},
-                "frequency_hz": [10, 20],
-                "band_hz": [1, 100],
-                "frf_re_pc_per_n": [[7, 7.1], [8, 8.1]],
-            },
-        ),
-    ],
-)
-def test_frf_and_d33(http: httpx.Client, path: str, fields: dict[str, Any]) -> None:
-    short, long = both(http, path, json.dumps(fields).encode())
-    assert long == short
-
-
-def test_a_great_many_fields_are_refused_at_once(http: httpx.Client) -> None:
-    body = json.dumps({f"field{number}": 0 for number in range(100_000)})
-    answer = http.post("/v1/sigma", content=body, headers={"Content-Type": "application/json"}, timeout=240)
-    assert answer.status_code == 422
 
 
 NUMBERS = st.one_of(st.floats(), st.integers(-(2**70), 2**70), st.floats(0, 3))

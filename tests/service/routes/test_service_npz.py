@@ -95,16 +95,6 @@ def test_arrays_are_answered_as_json_is(http: httpx.Client, path: str, fields: d
             assert array.tolist() == expected[name], name
 
 
-def test_many_rows_are_answered_without_loss(http: httpx.Client) -> None:
-    points = {name: GENERATOR.uniform(0, 1.1 * high, 50_000) for name, (_, high) in TABLE.domain.items()}
-    reply = post(http, "/v1/sigma", archive(points), NPZ)
-    expected = TABLE.sigma(**points)
-    with np.load(io.BytesIO(reply.content)) as arrays:
-        assert np.array_equal(arrays["sigma"], expected.sigma, equal_nan=True)
-        assert np.array_equal(arrays["rel_error"], expected.rel_error, equal_nan=True)
-        assert np.array_equal(arrays["status"] == "ok", expected.inside)
-
-
 @pytest.mark.parametrize(
     "body",
     [
@@ -118,11 +108,6 @@ def test_whatever_holds_numbers_read_alike(http: httpx.Client, body: bytes) -> N
     """Whatever holds the same numbers is read alike."""
     expected = http.post("/v1/sigma", json={"a_over_h": [0.5, 1.0], "rt_over_h": 0.5}).json()
     assert post(http, "/v1/sigma", body).json() == expected
-
-
-def test_lines_stored_by_columns_are_read(http: httpx.Client) -> None:
-    by_columns = {**LINES, "frf_re_pc_per_n": np.asfortranarray(LINES["frf_re_pc_per_n"])}
-    assert post(http, "/v1/d33", archive(by_columns)).json() == http.post("/v1/d33", json=LINES).json()
 
 
 def test_any_answer_in_columns_comes_as_arrays(http: httpx.Client) -> None:
@@ -168,25 +153,17 @@ STRUCTURED = np.zeros(2, [("x", float)])
     ("path", "arrays", "field", "said"),
     [
         ("/v1/sigma", {"a_over_h": ["0.3", "0.6"]}, "a_over_h", "must be an array of floats or integers"),
-        ("/v1/sigma", {"a_over_h": [b"0.3"]}, "a_over_h", "must be an array of floats"),
-        ("/v1/sigma", {"a_over_h": [0.3, 1j]}, "a_over_h", "must be an array of floats"),
         ("/v1/sigma", {"a_over_h": [True, False]}, "a_over_h", "must be an array of floats"),
-        ("/v1/sigma", {"a_over_h": np.zeros(2, "M8[s]")}, "a_over_h", "must be an array of floats"),
         ("/v1/sigma", {"a_over_h": STRUCTURED}, "a_over_h", "must be an array of floats"),
         ("/v1/sigma", {"a_over_h": OBJECTS}, "a_over_h", "it holds Python objects (pickles)"),
         ("/v1/sigma", {"a_over_h": [[0.3, 0.6]]}, "a_over_h", "must be a column, of shape (rows,)"),
         ("/v1/sigma", {"a_over_h": []}, "a_over_h", "must not be empty"),
         ("/v1/sigma", {"a_over_h": [0.3, np.nan]}, "a_over_h", "must be finite"),
-        ("/v1/sigma", {"a_over_h": [0.3, -0.6]}, "a_over_h", "at least 0"),
         ("/v1/sigma", {"rt_over_h": [0.6, 0.6, 0.6]}, "rt_over_h", "must have as many rows as a_over_h (2)"),
         ("/v1/sigma", {"model": ["layer", "layer"]}, "model", "must be a single text or boolean, of shape ()"),
-        ("/v1/sigma", {"model": 1.0}, "model", "must be a single text or boolean"),
-        ("/v1/sigma", {"model": "sphere"}, "model", "'layer' or 'half_space'"),
         ("/v1/sigma", {"model": np.array(0xD800FFFF, "<u4").view("<U1")}, "model", "must be a text in Unicode"),
         ("/v1/sigma", {"load": 0.1}, "load", "is not a field of this request"),
         ("/v1/frf", {**FRF, "units_checked": "yes"}, "units_checked", "must be true or false"),
-        ("/v1/frf", {**FRF, "frequency_hz": [[1.0]]}, "frequency_hz", "must be a number"),
-        ("/v1/frf", {**FRF, "frequency_hz": ["1"]}, "frequency_hz", "must be an array of floats"),
         ("/v1/frf", {**FRF, "offset_x_mm": [0.0, 0.1]}, "offset_x_mm", "is used only with model adopted"),
         ("/v1/d33", {**LINES, "frf_re_pc_per_n": [7.0, 7.1]}, "frf_re_pc_per_n", "should be a valid list"),
     ],
@@ -211,14 +188,10 @@ GOOD = npy(np.array([0.3, 0.6]))
         ([("a_over_h.npy", GOOD), ("a_over_h.npy", GOOD)], "is given twice"),
         ([("a_over_h.npy", GOOD), ("a_over_h", GOOD)], "is given twice"),
         ([("a_over_h.npy", b"")], "NumPy's .npy format"),
-        ([("a_over_h.npy", b"0.3,0.6")], "NumPy's .npy format"),
         ([("a_over_h.npy", GOOD[:-1])], "NumPy's .npy format"),
         ([("a_over_h.npy", GOOD + b"\0")], "it has 17 bytes, and its header says 16"),
-        ([("a_over_h.npy", GOOD[:20])], "NumPy's .npy format"),
         ([("a_over_h.npy", GOOD.replace(b"\x01\x00", b"\x09\x00", 1))], "NumPy's .npy format"),
         ([("a_over_h.npy", claiming("(1000000000000,)"))], "NumPy's .npy format"),
-        ([("a_over_h.npy", claiming("(10**12,)"))], "NumPy's .npy format"),
-        ([("a_over_h.npy", claiming("(-1,)"))], "NumPy's .npy format"),
         ([("a_over_h.npy", claiming("(0, 1000000000000)"))], "must be a column"),
         ([("a_over_h.npy", npy(OBJECTS, allow_pickle=True))], "it holds Python objects (pickles)"),
     ],

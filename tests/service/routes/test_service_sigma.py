@@ -1,7 +1,5 @@
 """σ over HTTP: the library's numbers on every path, row by row, in JSON and CSV."""
 
-import csv
-import io
 import math
 from typing import Any
 from urllib.parse import urlencode
@@ -9,9 +7,6 @@ from urllib.parse import urlencode
 import httpx
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
-from scipy.integrate import quad
-from scipy.special import j1
 
 from tests.support.oracle import NEEDS_ORACLE, linear_layer_values
 from underskin import load_table
@@ -20,7 +15,6 @@ from underskin.units import Floats
 
 TABLE = load_table()
 GENERATOR = np.random.default_rng(459)
-CSV = {"Accept": "text/csv"}
 
 
 def posted(http: httpx.Client, **columns: Any) -> dict[str, Any]:
@@ -35,11 +29,6 @@ def floats(values: list[float | None]) -> Floats:
     return np.array(values, dtype=float)
 
 
-def table_of(text: str) -> dict[str, list[str]]:
-    header, *lines = csv.reader(io.StringIO(text, newline=""))
-    return {name: list(cells) for name, *cells in zip(header, *lines, strict=True)}
-
-
 def same(found: float | None, expected: float | None) -> bool:
     """Both null, or equal to rounding: single points are summed in another order than columns."""
     return found == (None if expected is None else pytest.approx(expected, rel=1e-13))
@@ -47,15 +36,6 @@ def same(found: float | None, expected: float | None) -> bool:
 
 def random_points(count: int, beyond: float = 1.0) -> dict[str, Floats]:
     return {name: GENERATOR.uniform(low, high * beyond, count) for name, (low, high) in TABLE.domain.items()}
-
-
-def test_columns_are_the_librarys(http: httpx.Client) -> None:
-    points = random_points(500)
-    answer = posted(http, **points)
-    expected = TABLE.sigma(**points)
-    assert answer["sigma"] == expected.sigma.tolist()
-    assert answer["rel_error"] == expected.rel_error.tolist()
-    assert answer["status"] == ["ok"] * 500
 
 
 def test_point_alone_columns(http: httpx.Client) -> None:
@@ -116,15 +96,6 @@ def test_both_paths_read_a_query_alike(http: httpx.Client, query: str) -> None:
         assert short.json()["errors"] == long.json()["errors"]
 
 
-def test_load_parameter_0_left(http: httpx.Client) -> None:
-    """The load parameter is 0 where it is left out."""
-    point = {"a_over_h": 0.3, "rt_over_h": 0.6}
-    alone = http.get("/v1/sigma", params=point).json()
-    assert alone["sigma"] == pytest.approx(0.936505, abs=1e-6)
-    assert posted(http, **point)["sigma"] == pytest.approx([alone["sigma"]], rel=1e-13)
-    assert posted(http, **point, load_parameter=0.0)["sigma"] == posted(http, **point)["sigma"]
-
-
 @NEEDS_ORACLE
 def test_linear_limit_equals_the_exact_values(http: httpx.Client) -> None:
     rho, a, offset, value = linear_layer_values("sigma_hertz")
@@ -132,12 +103,6 @@ def test_linear_limit_equals_the_exact_values(http: httpx.Client) -> None:
     assert used.sum() > 50
     answer = posted(http, a_over_h=a[used], rt_over_h=rho[used], load_parameter=0)
     assert answer["sigma"] == pytest.approx(value[used], rel=1e-5)
-
-
-def test_finite_strain_reference_values(http: httpx.Client) -> None:
-    load = [0.0, 1e-3, 1e-2, 3e-2, 1e-1]
-    sigma = floats(posted(http, a_over_h=0.3, rt_over_h=0.6, load_parameter=load)["sigma"])
-    assert sigma[1:] / sigma[0] == pytest.approx([1.01293, 1.02966, 1.04522, 1.07489], abs=1e-4)
 
 
 def test_rows_outside_null_spoil(http: httpx.Client) -> None:
@@ -153,15 +118,6 @@ def test_rows_outside_null_spoil(http: httpx.Client) -> None:
         assert (alone["sigma"], alone["rel_error"]) == ([answer["sigma"][row]], [answer["rel_error"][row]])
 
 
-def test_single_numbers_hold_for_all_rows(http: httpx.Client) -> None:
-    a = GENERATOR.uniform(0, 3, 5)
-    short = posted(http, a_over_h=a, rt_over_h=0.6, load_parameter=0.02)
-    long = posted(http, a_over_h=a, rt_over_h=[0.6] * 5, load_parameter=[0.02] * 5)
-    assert short == long
-    only = posted(http, a_over_h=1, rt_over_h=2)
-    assert [len(only[name]) for name in ("sigma", "rel_error", "status")] == [1, 1, 1]
-
-
 def test_a_hundred_thousand_rows(http: httpx.Client) -> None:
     points = random_points(100_000, beyond=1.1)
     answer = posted(http, **points)
@@ -170,48 +126,6 @@ def test_a_hundred_thousand_rows(http: httpx.Client) -> None:
     assert np.array_equal(floats(answer["rel_error"]), expected.rel_error, equal_nan=True)
     assert [status == "ok" for status in answer["status"]] == expected.inside.tolist()
     assert 60_000 < expected.inside.sum() < 90_000
-
-
-def test_csv_out_has_all_digits_and_nan(http: httpx.Client) -> None:
-    body = {"a_over_h": [0.3, 4.0, 1.7], "rt_over_h": 0.6, "load_parameter": 0.01}
-    reply = http.post("/v1/sigma", json=body, headers=CSV)
-    plain = http.post("/v1/sigma", json=body).json()
-    assert reply.headers["content-type"].startswith("text/csv")
-    assert reply.headers["underskin-model"] == plain["model"] == "layer"
-    assert reply.headers["underskin-table-sha256"] == plain["table_sha256"] == TABLE.sha256
-    columns = table_of(reply.text)
-    assert list(columns) == ["sigma", "rel_error", "limit", "status"]
-    assert columns["limit"] == ["", "a/h = 4 exceeds 3", ""]
-    assert plain["limit"] == [None, "a/h = 4 exceeds 3", None]
-    assert columns["status"] == plain["status"] == ["ok", "out_of_domain", "ok"]
-    for name in ("sigma", "rel_error"):
-        assert columns[name][1] == "NaN"
-        assert [float(columns[name][row]) for row in (0, 2)] == [plain[name][row] for row in (0, 2)]
-
-
-def test_csv_out_of_one_point(http: httpx.Client) -> None:
-    point = {"a_over_h": 0.3, "rt_over_h": 0.6, "load_parameter": 0.01}
-    columns = table_of(http.get("/v1/sigma", params=point, headers=CSV).text)
-    plain = http.get("/v1/sigma", params=point).json()
-    assert float(columns["sigma"][0]) == pytest.approx(plain["sigma"], rel=1e-13)
-    assert columns["status"] == ["ok"]
-
-
-@pytest.mark.parametrize(
-    ("accept", "form"),
-    [
-        ("text/csv, application/json;q=0.9", "text/csv"),
-        ("application/json, text/csv;q=0.9", "application/json"),
-        ("text/csv;q=0, */*", "application/json"),
-        ("text/html, */*", "application/json"),
-    ],
-)
-def test_the_preferred_form_is_sent(http: httpx.Client, accept: str, form: str) -> None:
-    for reply in (
-        http.post("/v1/sigma", json={"a_over_h": 0.3, "rt_over_h": 0.6}, headers={"Accept": accept}),
-        http.get("/v1/sigma?a_over_h=0.3&rt_over_h=0.6", headers={"Accept": accept}),
-    ):
-        assert reply.headers["content-type"].split(";")[0] == form
 
 
 @pytest.mark.parametrize("ends", ["\r\n", "\n"])
@@ -227,12 +141,6 @@ def test_csv_in_is_read_like_json(http: httpx.Client, ends: str) -> None:
     assert reply.json() == posted(http, a_over_h=[0.3, 4, 1.7], rt_over_h=0.6, load_parameter=[0.01, 0, 0])
 
 
-@pytest.mark.parametrize("query", ["", "&load_parameter=7", "&model=layer"])
-def test_every_answer_names_model_and_table(http: httpx.Client, query: str) -> None:
-    alone = http.get(f"/v1/sigma?a_over_h=0.3&rt_over_h=0.6{query}").json()
-    assert (alone["model"], alone["table_sha256"]) == ("layer", TABLE.sha256)
-
-
 def test_the_tables_route_describes_the_table(http: httpx.Client) -> None:
     table, *others = http.get("/v1/tables").json()["tables"]
     assert [other["name"] for other in others] == ["influence", "contact"]
@@ -241,47 +149,6 @@ def test_the_tables_route_describes_the_table(http: httpx.Client) -> None:
     assert [axis["nodes"] for axis in table["axes"]] == [len(axis) for axis in TABLE.axes]
     assert {"mesh", "solver", "material", "poisson_ratio"} <= set(table["about"])
     assert http.get("/ready").json() == {"status": "ready", "table_sha256": TABLE.sha256}
-
-
-def integrated(a: float, rho: float) -> float:
-    """The half space's σ by SciPy's adaptive quadrature, beside the library's own."""
-
-    def hertz(s: float) -> float:
-        return 3 * (math.sin(s) - s * math.cos(s)) / s**3 if s > 0.05 else 1 - s**2 / 10 + s**4 / 280 - s**6 / 15120
-
-    def disc(s: float) -> float:
-        return 2 * float(j1(s)) / s if s > 1e-4 else 1 - s**2 / 8
-
-    def integrand(k: float) -> float:
-        return (1 + k) * math.exp(-k) * hertz(k * a) * disc(k * rho) * k / 3
-
-    return float(quad(integrand, 0, 60, limit=2000, epsabs=1e-15, epsrel=1e-13)[0])
-
-
-def half_space_answer(http: httpx.Client, a: ArrayLike, rho: ArrayLike) -> tuple[Floats, Floats]:
-    answer = posted(http, a_over_h=np.asarray(a), rt_over_h=np.asarray(rho), model="half_space")
-    assert (answer["model"], answer["table_sha256"]) == ("half_space", None)
-    assert set(answer["status"]) == {"ok"}
-    return floats(answer["sigma"]), floats(answer["rel_error"])
-
-
-def test_the_half_spaces_error_is_as_reported(http: httpx.Client) -> None:
-    end = half_space.DOMAIN_END
-    corners = np.array([(0.0, 0.0), (end, 0.0), (0.0, end), (end, end), (end, 1e-3), (1e-3, end)])
-    a, rho = np.concatenate([corners, GENERATOR.uniform(0, end, (60, 2))]).T
-    sigma, rel_error = half_space_answer(http, a, rho)
-    exact = np.array([integrated(*pair) for pair in zip(a.tolist(), rho.tolist(), strict=True)])
-    assert (np.abs(sigma / exact - 1) <= rel_error).all()
-    assert set(rel_error) == {half_space.REL_ERROR}
-
-
-def test_the_half_spaces_closed_forms(http: httpx.Client) -> None:
-    size = np.linspace(0.01, half_space.DOMAIN_END, 200)
-    point_sensor, rel_error = half_space_answer(http, size, 0.0)
-    assert (np.abs(point_sensor * (1 + size**2) - 1) <= rel_error).all()
-    point_load, rel_error = half_space_answer(http, 0.0, size)
-    exact = 2 / (3 * size**2) * (1 - (1 + size**2) ** -1.5)
-    assert (np.abs(point_load / exact - 1) <= rel_error).all()
 
 
 def test_the_half_space_ends_and_knows_no_strain(http: httpx.Client) -> None:

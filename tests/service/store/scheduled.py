@@ -1,11 +1,11 @@
 """Servers that make backups on a schedule, and what `underskin doctor` says of a store."""
 
 import json
-import time
 from pathlib import Path
 from typing import Any
 
 from service.usecases.scheduled_backups import stored_backups
+from tests.service.waiting import until
 from tests.support.store_server import Place
 
 NO_WORKERS = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
@@ -17,13 +17,12 @@ def scheduled(folder: Path, **settings: str) -> dict[str, str]:
 
 def wait_for(folder: Path, count: int) -> list[Path]:
     """Until there are so many backups, or more."""
-    deadline = time.monotonic() + 240
-    while time.monotonic() < deadline:
-        found = [entry.path for entry in stored_backups(folder)] if folder.is_dir() else []
-        if len(found) >= count:
-            return found
-        time.sleep(0.05)
-    raise AssertionError(f"{found} instead of {count} backups")
+
+    def found() -> list[Path]:
+        return [entry.path for entry in stored_backups(folder)] if folder.is_dir() else []
+
+    until(lambda: len(found()) >= count, found)
+    return found()
 
 
 def doctor(place: Place, **settings: str) -> tuple[int, dict[str, dict[str, Any]]]:

@@ -96,20 +96,6 @@ def test_trial_put_away_beside_campaigns_use(server: Server) -> None:
     assert history(server) == {kept, trial}
 
 
-def test_a_withdrawn_trial_comes_back_withdrawn(server: Server) -> None:
-    trial = sent(server, "trial")
-    server.http.post(f"/v1/campaigns/{trial}/withdraw", json={"reason": "wrong sphere"}).raise_for_status()
-    server.http.post(f"/v1/campaigns/{trial}/discard", json={"reason": "a trial"}).raise_for_status()
-    put_away, withdrawal = changes(server, trial)
-    assert not withdrawal["may_be_undone"]
-    assert undo(server, withdrawal).status_code == 409
-    assert undo(server, put_away).json()["undone"]
-    detail = server.http.get(f"/v1/campaigns/{trial}").json()
-    assert (detail["discarded_at"], detail["withdraw_reason"]) == (None, "wrong sphere")
-    assert undo(server, withdrawal).status_code == 200
-    assert history(server) == {trial}
-
-
 def test_what_something_builds_on_is_no_trial(server: Server) -> None:
     diagnosed, corrected = sent(server, "diagnosed"), sent(server, "corrected", "hand")
     server.http.post(f"/v1/campaigns/{diagnosed}/diagnosis").raise_for_status()
@@ -140,20 +126,6 @@ def test_correction_undone_until_something(server: Server) -> None:
     assert history(server) == {again}
     server.http.post(f"/v1/campaigns/{again}/diagnosis").raise_for_status()
     assert undo(server, changes(server, again)[0]).status_code == 409
-
-
-def test_correction_skin_not_undone_once_skin(server: Server) -> None:
-    """A correction on another skin is not undone once the skin it left was diagnosed."""
-    older = sent(server, "older")
-    for day in ("tuesday", "wednesday"):
-        sent(server, day)
-    newer = sent(server, "newer", "hand", corrects=older, reason="it was the hand")
-    (correction,) = changes(server, newer)
-    assert correction["may_be_undone"]
-    server.http.post("/v1/skins/palm/diagnosis").raise_for_status()
-    assert not changes(server, newer)[0]["may_be_undone"]
-    refused = undo(server, correction)
-    assert (refused.status_code, "it was diagnosed since" in refused.text) == (409, True)
 
 
 def test_correction_skin_not_undone_once_skin_left(server: Server, client: underskin.Client) -> None:

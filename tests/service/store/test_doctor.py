@@ -158,17 +158,6 @@ def nobody(*folders: Path) -> Iterator[None]:
             folder.chmod(0o700)
 
 
-def test_doctor_names_settings_nothing_reads(tmp_path: Path) -> None:
-    """The doctor names settings that nothing reads."""
-    place = Place(tmp_path / "data")
-    place.folder.mkdir(0o700)
-    _, found = doctor(place, UNDERSKIN_MAX_HAEDER_KB="16", **NO_WORKERS)
-    assert (found["settings"]["level"], found["settings"]["found"]) == (
-        "warning",
-        "nothing reads UNDERSKIN_MAX_HAEDER_KB",
-    )
-
-
 @pytest.mark.parametrize("command", [["backup", "b.pgdump"], ["restore", "b.pgdump"], ["key", "sessions"]])
 def test_database_not_line(tmp_path: Path, command: list[str]) -> None:
     """A database that is not there is one line."""

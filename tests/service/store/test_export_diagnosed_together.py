@@ -69,17 +69,6 @@ def test_they_are_elsewhere_as_they_were_here(
         assert there.diagnoses.get(own[1])["outdated"] is None
 
 
-def test_a_backup_holds_those_of_fleets_too(server: Server, client: Client, tmp_path: Path) -> None:
-    own, fleet = diagnosed_together(server, client)
-    before = told(client, [*own, fleet])
-    backup = tmp_path / "backup"
-    assert server.place.command("backup", str(backup)).returncode == 0
-    sent(server, campaign("new", sensors=1), "palm")
-    done = server.place.command("restore", str(backup))
-    assert done.returncode == 0, done.stderr
-    assert told(client, [*own, fleet]) == before
-
-
 def changed(**values: Any) -> Callable[[Rows], None]:
     def spoil(rows: Rows) -> None:
         rows[0].update(values)
@@ -133,20 +122,3 @@ def test_spoilt_ones_are_refused(server: Server, elsewhere: Server, client: Clie
         answer = elsewhere.http.post("/v1/skins/import", content=content.getvalue(), headers=headers)
         assert answer.status_code == 422, f"{number}: {answer.text}"
         assert elsewhere.http.get("/v1/diagnoses").json()["diagnoses"] == []
-
-
-def test_files_of_an_older_underskin_come_in(server: Server, elsewhere: Server, client: Client, tmp_path: Path) -> None:
-    alone = client.diagnoses.start(sent(server, campaign("a", sensors=1)))["id"]
-    finished(server)
-    file = tmp_path / "palm.h5"
-    client.skins.export("palm", file)
-    with h5py.File(file, "r+") as opened:
-        (row,) = orjson.loads(opened["diagnoses"][()].tobytes())
-        for name in ("kind", "name", "members", "all_of"):
-            del row[name]
-        del opened["diagnoses"]
-        opened["diagnoses"] = np.frombuffer(orjson.dumps([row]), np.uint8)
-    with Client(str(elsewhere.http.base_url)) as there:
-        assert there.skins.load(file)["kept"] == 1
-        assert told(there, [alone]) == told(client, [alone])
-        assert client.skins.load(file)["present"] == 1

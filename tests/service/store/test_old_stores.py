@@ -77,7 +77,25 @@ def test_an_old_store_answers_as_it_did(place: Place, version: str) -> None:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, metadata) == []
     store.close()
+    if version in ON_ALL:
+        require_the_way_back(place)
     record(Figure("Stores of earlier versions that answer as they did", 1, "", 2 * len(LANDED)))
+
+
+def require_the_way_back(place: Place) -> None:
+    """What the migration saved first is of the older version, and comes back, brought up to date; pages are shown."""
+    (made,) = (place.folder / "backups").iterdir()
+    assert place.command("restore", str(made)).returncode == 0
+    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        campaigns = server.http.get("/v1/campaigns?state=all").json()["campaigns"]
+        assert campaigns
+        addresses = {f"/campaigns/{entry['id']}" for entry in campaigns} | {f"/skins/{e['skin_id']}" for e in campaigns}
+        told = server.http.get("/v1/diagnoses").json()["diagnoses"]
+        for path in ("/", *sorted(addresses), *(f"/diagnoses/{entry['id']}" for entry in told)):
+            assert server.http.get(path, headers={"Accept": "text/html"}).status_code == 200, path
+        added = server.http.post("/v1/campaigns?skin=palm", json=campaign("after")).raise_for_status().json()
+        asked = server.http.post(f"/v1/campaigns/{added['id']}/diagnosis").raise_for_status().json()
+        assert asked["state"] == "queued"
 
 
 def test_every_earlier_schema_has_a_store_here() -> None:

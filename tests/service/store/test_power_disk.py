@@ -1,7 +1,6 @@
 """What the disk of the tests of power cuts forgets, and what it keeps."""
 
 import os
-import random
 import subprocess
 import sys
 from pathlib import Path
@@ -40,17 +39,6 @@ def test_a_cut_forgets_what_was_not_synced(tmp_path: Path) -> None:
         disk.cut()
     left = {path.name: path.read_text() for path in tmp_path.iterdir()}
     assert left == {"old": "old content", "half": "a" * 4096, "named": "whole", "empty": ""}
-
-
-def test_cut_leave_sectors_not_synced(tmp_path: Path) -> None:
-    """A cut may leave any sectors of what was not synced."""
-    (tmp_path / "old").write_text("old content")
-    with powered(tmp_path) as disk:
-        write(disk)
-        disk.cut(random.Random(1))
-    half = (tmp_path / "half").read_text()
-    assert {half[at : at + 512] for at in range(0, 4096, 512)} == {"a" * 512, "b" * 512}
-    assert len({path.name for path in tmp_path.iterdir()} & {"named", "renamed"}) == 1
 
 
 def write(disk: Disk) -> None:

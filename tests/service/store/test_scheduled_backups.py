@@ -1,7 +1,6 @@
 """Backups on a schedule by a real server: made, read back, rotated, restored."""
 
 import re
-import shutil
 import sqlite3
 import time
 from contextlib import closing
@@ -9,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from service.usecases.scheduled_backups import OWNER, stored_backups
+from service.usecases.scheduled_backups import stored_backups
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
-from tests.support import postgres
+from tests.service.waiting import until
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -34,10 +33,7 @@ def test_backup_made_start_restored(place: Place, tmp_path: Path) -> None:
         (file,) = wait_for(folder, 1)
         assert file.stat().st_mode & 0o077 == 0
         later = sent(server, campaign("later"))
-        deadline = time.monotonic() + 240
-        while metric(server, "underskin_backup_bytes") != file.stat().st_size:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: metric(server, "underskin_backup_bytes") == file.stat().st_size)
         assert metric(server, "underskin_backup_age_seconds") < 60
         assert "Last backup" in server.http.get("/").text
     with running(place, **scheduled(folder)):  # the one that is there is young enough
@@ -60,10 +56,7 @@ def test_old_ones_deleted_files(place: Place, tmp_path: Path) -> None:
         other.write_text("mine")
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND, UNDERSKIN_BACKUP_KEEP="2")):
         (first, *_) = wait_for(folder, 1)
-        deadline = time.monotonic() + 240
-        while first.exists():
-            assert time.monotonic() < deadline, "the oldest backup stays"
-            time.sleep(0.05)
+        until(lambda: not first.exists(), "the oldest backup stays")
         assert 1 <= len(stored_backups(folder)) <= 3
     assert all(other.read_text() == "mine" for other in others)
     assert not list(folder.glob("*.part*"))
@@ -76,41 +69,18 @@ def test_folder_disk_not_mounted_gets_no_place(place: Place, tmp_path: Path) -> 
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
         wait_for(folder, 1)
         folder.rename(away)
-        deadline = time.monotonic() + 240
-        while "is its disk mounted?" not in log.read_text():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: "is its disk mounted?" in log.read_text())
         assert metric(server, "underskin_backup_failures_total") >= 1
         folder.mkdir()  # the empty folder below the mount
         time.sleep(1.0)
         assert not list(folder.iterdir())
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:  # nor after a restart
-        deadline = time.monotonic() + 240
-        while metric(server, "underskin_backup_failures_total") < 1:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: metric(server, "underskin_backup_failures_total") >= 1)
         assert not list(folder.iterdir())
         folder.rmdir()
         before = len(stored_backups(away))
         away.rename(folder)
         wait_for(folder, before + 1)
-
-
-def test_backups_begin_anew_emptied_folder_once(place: Place, tmp_path: Path) -> None:
-    """Backups begin anew in an emptied folder once its note is deleted."""
-    folder = tmp_path / "backups"
-    log = place.folder.parent / f"{place.folder.name}.log"
-    with running(place, **scheduled(folder)):
-        wait_for(folder, 1)
-    shutil.rmtree(folder)
-    with running(place, **scheduled(folder)):
-        deadline = time.monotonic() + 240
-        while not (advice := re.search(r"To begin anew there, delete (\S+) and restart", log.read_text())):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-    Path(advice[1]).unlink()
-    with running(place, **scheduled(folder)):
-        wait_for(folder, 1)
 
 
 def test_backup_fails_counted_logged_made_later(place: Place, tmp_path: Path) -> None:
@@ -119,10 +89,7 @@ def test_backup_fails_counted_logged_made_later(place: Place, tmp_path: Path) ->
     folder.write_text("a file")
     log = place.folder.parent / f"{place.folder.name}.log"
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
-        deadline = time.monotonic() + 240
-        while "no scheduled backup could be made" not in log.read_text():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: "no scheduled backup could be made" in log.read_text())
         assert metric(server, "underskin_backup_failures_total") >= 1
         assert "overdue" in server.http.get("/").text
         folder.unlink()
@@ -165,10 +132,7 @@ def test_store_busy_long_ends_no_schedule(tmp_path: Path) -> None:
         wait_for(folder, 1)
         with closing(sqlite3.connect(data / "underskin.sqlite3", isolation_level=None)) as other:
             other.execute("BEGIN EXCLUSIVE")
-            deadline = time.monotonic() + 240
-            while "no scheduled backup could be made" not in (tmp_path / "data.log").read_text():
-                assert time.monotonic() < deadline
-                time.sleep(0.2)
+            until(lambda: "no scheduled backup could be made" in (tmp_path / "data.log").read_text())
             other.execute("ROLLBACK")
         count = len(stored_backups(folder))
         wait_for(folder, count + 1)
@@ -192,10 +156,7 @@ def test_folder_store_left_alone_doctor_says(place: Place, tmp_path: Path) -> No
         theirs = wait_for(folder, 1)
     often = {"UNDERSKIN_BACKUP_EVERY": _SECOND, "UNDERSKIN_BACKUP_KEEP": "1"}
     with running(other, **scheduled(folder, **often)) as server:
-        deadline = time.monotonic() + 240
-        while metric(server, "underskin_backup_failures_total") < 1:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        until(lambda: metric(server, "underskin_backup_failures_total") >= 1)
         assert "overdue" in server.http.get("/").text
     assert [entry.path for entry in stored_backups(folder)] == theirs
     assert "holds the backups of another store" in (tmp_path / "other.log").read_text()
@@ -219,38 +180,3 @@ def test_store_restored_backup_before_schedule(tmp_path: Path) -> None:
         assert restored.returncode == 0, restored.stderr
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)):
         wait_for(folder, 2)
-
-
-def test_empty_note_folder_ends_no_schedule(place: Place, tmp_path: Path) -> None:
-    """An empty note of whose folder it is ends no schedule.
-
-    What an older version left where the disk was full, or the power failed.
-    """
-    folder = tmp_path / "backups"
-    folder.mkdir()
-    (folder / OWNER).touch()
-    with running(place, **scheduled(folder)):
-        wait_for(folder, 1)
-    assert (folder / OWNER).read_text()
-
-
-def test_metrics_wait_for_no_database(tmp_path: Path) -> None:
-    if not postgres.available():
-        pytest.skip("PostgreSQL (Debian's package postgresql) is not installed")
-    folder, backups = tmp_path / "data", tmp_path / "backups"
-    folder.mkdir()
-    with postgres.running() as cluster:
-        place = Place(folder, cluster.new_database())
-        with running(place, **scheduled(backups)) as server:
-            (file,) = wait_for(backups, 1)
-            deadline = time.monotonic() + 240
-            while metric(server, "underskin_backup_bytes") == 0:
-                assert time.monotonic() < deadline
-                time.sleep(0.05)
-            cluster.stop()
-            assert server.http.get("/health").status_code == 200
-            assert metric(server, "underskin_backup_bytes") == file.stat().st_size
-            status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), **NO_WORKERS)
-    assert status == 2
-    assert "does not answer" in found["store"]["found"]
-    assert (found["store"]["level"], found["backups"]["level"]) == ("critical", "warning")

@@ -2,14 +2,13 @@
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
 from tests.service.pages.forms import BROWSING, token_of
-from tests.support.store_server import Place, Server, campaign, running
+from tests.support.store_server import Server, campaign
 
 BACKEND = "postgresql"
 
@@ -65,25 +64,6 @@ def test_withdrawal_undone_until_something(server: Server, lab: httpx.Client) ->
     assert undo(lab, place, "ch-nothing").status_code == 404
 
 
-def test_exclusions_undone_not_once_diagnosed(server: Server, lab: httpx.Client) -> None:
-    """Exclusions are undone one by one and not once diagnosed."""
-    campaign_id = sent(server, "tuesday")
-    place = f"/campaigns/{campaign_id}"
-    for recording in ("s0-1N", "s1-1N"):
-        assert change(lab, place, "exclude", recording=recording, reason="loose cable") == 303
-    assert detail(server, campaign_id)["excluded"] == 2
-    (latest,) = undoable(lab, place)  # the first one lies below it
-    assert undo(lab, place, latest).status_code == 303
-    excluded = [entry["id"] for entry in detail(server, campaign_id)["entries"] if entry["excluded_at"] is not None]
-    assert excluded == ["s0-1N"]
-    assert detail(server, campaign_id)["excluded"] == 1
-    (first,) = undoable(lab, place)
-    server.http.post(f"/v1/campaigns/{campaign_id}/diagnosis").raise_for_status()
-    assert undoable(lab, place) == []
-    assert undo(lab, place, first).status_code == 409
-    assert "it was diagnosed since" in undo(lab, place, first).text
-
-
 def test_written_campaign_found_taken_back(server: Server, lab: httpx.Client) -> None:
     """What is written to a campaign is found and taken back."""
     campaign_id = sent(server, "wednesday")
@@ -103,21 +83,6 @@ def test_written_campaign_found_taken_back(server: Server, lab: httpx.Client) ->
     (own,) = undoable(lab, place)
     assert undo(lab, place, own).status_code == 303
     assert detail(server, campaign_id)["name"] == "wednesday"
-
-
-def test_skins_are_named_joined_and_parted(server: Server, lab: httpx.Client) -> None:
-    for skin in ("palm", "hand"):
-        sent(server, skin, skin)
-    assert change(lab, "/skins/palm", "annotate", title="left palm", tags="silicone") == 303
-    assert ">left palm</a>" in lab.get("/?find=silicone").text
-    assert ">hand</a>" not in lab.get("/?find=silicone").text
-    assert change(lab, "/skins/palm", "join", other="hand", reason="one skin") == 303
-    joined = server.http.get("/v1/skins/hand").json()
-    assert joined["id"] == "palm"
-    own = undoable(lab, "/skins/palm")[0]
-    assert undo(lab, "/skins/palm", own).status_code == 303
-    assert server.http.get("/v1/skins/hand").json() == {**server.http.get("/v1/skins/hand").json(), "joined": []}
-    assert server.http.get("/v1/skins/hand").json()["id"] == "hand"
 
 
 def test_skin_without_campaigns_use_put_away(server: Server, lab: httpx.Client) -> None:
@@ -156,47 +121,3 @@ def test_export_brings_changes_made(server: Server, elsewhere: Server, lab: http
     assert "left palm" in elsewhere.http.get("/skins/palm", headers=BROWSING).text
     again = elsewhere.http.post("/v1/skins/import", content=exported, headers=headers)
     assert again.json()["present"] == 1, again.text
-
-
-def test_a_withdrawal_says_who(tmp_path: Path) -> None:
-    place = Place(tmp_path)
-    key = place.command("key", "create", "Maria", "--scope", "write").stdout.strip()
-    with running(place, key=key, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        campaign_id = sent(server, "hers")
-        for path, body in (
-            ("exclusions", {"recording": "s0-1N", "reason": "loose cable"}),
-            ("withdraw", {"reason": "wrong sphere"}),
-        ):
-            server.http.post(f"/v1/campaigns/{campaign_id}/{path}", json=body).raise_for_status()
-        told = detail(server, campaign_id)
-        assert (told["withdrawn_from"], told["withdraw_reason"]) == ("Maria", "wrong sphere")
-        assert told["entries"][0]["excluded_from"] == "Maria"
-
-
-@pytest.mark.soak
-def test_import_skin_put_away_brings_back(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
-    """An import into a skin put away brings it back."""
-
-    def listed() -> list[str]:
-        return [entry["id"] for entry in elsewhere.http.get("/v1/skins").json()["skins"]]
-
-    def imported() -> None:
-        file = server.http.get("/v1/skins/palm/export").content
-        elsewhere.http.post("/v1/skins/import", content=file, headers={"Content-Type": "application/x-hdf5"})
-
-    first = sent(server, "first")
-    assert change(lab, f"/campaigns/{first}", "withdraw", reason="a trial") == 303
-    imported()
-    assert listed() == ["palm"]
-    with httpx.Client(base_url=elsewhere.http.base_url, headers=BROWSING, timeout=300) as there:
-        assert change(there, "/skins/palm", "discard", reason="a trial") == 303
-        assert listed() == []
-        imported()  # with nothing new
-        assert listed() == ["palm"]
-        assert change(there, "/skins/palm", "discard", reason="a trial") == 303
-    assert change(lab, "/skins/palm", "discard", reason="a trial") == 303
-    imported()
-    assert listed() == []  # as the file has it
-    sent(server, "second")
-    imported()
-    assert listed() == ["palm"]

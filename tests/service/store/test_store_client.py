@@ -10,7 +10,7 @@ import pytest
 
 from service.store import campaigns, database
 from tests.support.store_server import Place, Server, campaign, running
-from underskin import Client, ServiceError
+from underskin import Client
 from underskin.recordings.campaign import parse, to_dict
 
 BACKEND = "sqlite"
@@ -34,17 +34,6 @@ def test_a_campaign_there_and_back(client: Client) -> None:
     assert (chosen["band"]["low_hz"], chosen["band"]["chosen_by_user"]) == (20, True)
 
 
-def test_corrections_exclusions_and_withdrawals(client: Client) -> None:
-    first = client.campaigns.post(campaign("first"), skin="palm")["id"]
-    second = client.campaigns.post(campaign("second"), corrects=first, reason="typing slip")["id"]
-    assert client.campaigns.exclude(second, "s0-1N", "cable loose")["excluded"] == 1
-    client.campaigns.withdraw(second, "fell down")
-    assert list(client.campaigns.all(skin="palm")) == []
-    assert {entry["id"] for entry in client.campaigns.all(skin="palm", state="all")} == {first, second}
-    with pytest.raises(ServiceError, match="fell down"):
-        client.campaigns.withdraw(second, "again")
-
-
 def test_pages_are_turned(client: Client, server: Server) -> None:
     store = database(server.place.database_url, server.place.folder)
     with closing(store), store.writing() as connection:
@@ -53,19 +42,6 @@ def test_pages_are_turned(client: Client, server: Server) -> None:
             campaigns.add(connection, campaigns.NewCampaign(one, None))
     assert len({entry["id"] for entry in client.campaigns.all()}) == 210
     assert len({entry["id"] for entry in client.skins.all()}) == 210
-
-
-def test_skins(client: Client, tmp_path: Path) -> None:
-    for skin in ("a", "b"):
-        client.campaigns.post(campaign(skin), skin=skin)
-    assert [entry["id"] for entry in client.skins.join("a", "b", "one skin")["joined"]] == ["b"]
-    assert len(client.skins.history("b")["sensors"][0]["points"]) == 2
-    client.skins.export("a", tmp_path / "a.h5")
-    assert client.skins.load(tmp_path / "a.h5")["present"] == 2
-    assert client.skins.get("b")["id"] == "a"
-    with pytest.raises(ServiceError, match="404"):
-        client.skins.export("none", tmp_path / "none.h5")
-    assert [path.name for path in tmp_path.glob("*.h5*")] == ["a.h5"]
 
 
 def test_the_commands_import_and_export(server: Server, tmp_path: Path) -> None:

@@ -1,13 +1,10 @@
 """The commands on what the service keeps: as tables, as JSON, and each error in one line."""
 
 import json
-import re
-from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 import orjson
-import pytest
 
 from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.server import free_port
@@ -47,16 +44,6 @@ def rows(table: str) -> list[list[str]]:
     return [line.split() for line in body.splitlines()[1:] if line.strip()]
 
 
-def by_heading(table: str) -> list[dict[str, str]]:
-    """The rows of the first table in a text: what stands below each heading."""
-    headings, _, *body = f" {table.lstrip()}".splitlines()
-    names = re.split(r" {2,}", headings.strip())
-    starts = [headings.index(name) for name in names]
-    cells = list(zip(names, starts, [*starts[1:], None], strict=True))
-    lines = takewhile(str.strip, body)
-    return [{name: line[start:end].strip() for name, start, end in cells} for line in lines]
-
-
 def test_campaigns_and_skins_are_listed(server: Server) -> None:
     first, other = sent(server, "first", "palm"), sent(server, "second", "hand")
     assert [row[0] for row in rows(told(server, "campaigns"))] == [other, first]
@@ -83,27 +70,6 @@ def test_campaign_shown_recordings_diagnoses(server: Server) -> None:
     document = as_json(server, "campaigns", campaign_id)
     assert [one["id"] for one in document.pop("diagnoses")] == [diagnosis_id]
     assert document == server.http.get(f"/v1/campaigns/{campaign_id}").json()
-
-
-def test_history_skin_leaves(server: Server) -> None:
-    """The history of a skin and what it leaves out."""
-    first = sent(server, "first", "palm")
-    second = sent(server, "second", "palm", d33=10.0)
-    gone = sent(server, "third", "palm")
-    told(server, "withdraw", gone, "--reason", "wrong sphere")
-    shown = told(server, "history", "palm")
-    document = server.http.get("/v1/skins/palm/history").json()
-    assert as_json(server, "history", "palm") == document
-    points = [point for sensor in document["sensors"] for point in sensor["points"]]
-    table = by_heading(shown)
-    assert [row["time is"] for row in table] == [point["time_is"] for point in points]
-    for heading, field in (("d33 pC/N", "d33_pc_per_n"), ("±", "d33_uncertainty_pc_per_n")):
-        assert [float(row[heading]) for row in table] == pytest.approx([point[field] for point in points], rel=0.05)
-    assert [row["campaign"] for row in table] == [point["campaign_id"] for point in points]
-    assert {row["campaign"] for row in table} == {first, second}
-    assert f"left out: campaign {gone}: withdrawn: wrong sphere" in shown
-    assert "none: " in shown  # a trend needs more than two points
-    assert "no adopted model" in refused(server, "history", "palm", "--model", "adopted")
 
 
 def test_campaign_withdrawn_recording_excluded(server: Server) -> None:
@@ -138,31 +104,6 @@ def test_campaign_corrected_once_however_often(server: Server, tmp_path: Path) -
     told(server, "correct", entry["id"], *both, "--reason", "two files", "--together", "both")
     assert [one["name"] for one in server.http.get("/v1/campaigns").json()["campaigns"]] == ["both"]
     assert "cannot be opened" in refused(server, "correct", first, str(tmp_path / "none"), "--reason", "x")
-
-
-def test_moduli_import_say_recording(server: Server, tmp_path: Path) -> None:
-    """Moduli of an import say of which recording."""
-    travel = [0.05 * step for step in range(20)]
-    blocks = [
-        {"id": name, "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0,
-         "displacement_mm": travel, "force_n": [stiffness * one for one in travel]}
-        for name, stiffness in (("soft", 80.0), ("hard", 160.0))
-    ]  # fmt: skip
-    skin = {"id": "blocks", "youngs_modulus_mpa": 16.0, "poisson_ratio": 0.5}
-    file = tmp_path / "blocks.json"
-    file.write_text(json.dumps({"schema": "campaign/1", "name": "blocks", "skin": skin, "recordings": blocks}))
-    words = told(server, "import", str(file))
-    soft, hard = (float(re.findall(rf"E of {name} ([\d.]+) ±", words)[0]) for name in ("soft", "hard"))
-    assert hard == pytest.approx(2 * soft, rel=1e-3)
-
-
-def test_skins_are_joined(server: Server) -> None:
-    for skin in ("palm", "palm-b"):
-        sent(server, skin, skin)
-    words = told(server, "join", "palm", "palm-b", "--reason", "one skin, two labels")
-    assert words == "skin palm counts as one with palm-b\n"
-    assert len(rows(told(server, "campaigns", "--skin", "palm"))) == 2
-    assert refused(server, "join", "palm", "none", "--reason", "x").endswith("There is no skin 'none'.")
 
 
 def test_the_model_of_a_diagnosis_is_adopted(server: Server) -> None:

@@ -134,14 +134,6 @@ def fill(disk: Path) -> None:
             file.write(bytes(4096))
 
 
-def test_key_finds_no_room_leaves_no_digest(small_disk: Path) -> None:
-    """A key that finds no room leaves no digest behind."""
-    fill(small_disk)
-    with pytest.raises(OSError, match="No space"):
-        KeyStore(small_disk).create("lab", "read")
-    assert {path.name for path in small_disk.iterdir()} <= {"filling", "keys.lock"}
-
-
 def test_files_that_may_not_grow_are_told(tmp_path: Path) -> None:
     """A limit on the size of files (EFBIG) is answered as a disk that takes nothing, for uploads and for the store."""
     (tmp_path / "data").mkdir()

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from service.schemas.campaign_d33 import D33
@@ -11,7 +10,7 @@ from service.store import Database, backup, campaigns, inversions, open_store
 from service.store.migrate import restore
 from service.store.tables import AnyRow
 from service.usecases import d33_cache
-from tests.support.store_server import Place, Server, campaign
+from tests.support.store_server import Place, campaign
 from underskin import load_table
 from underskin.inversion import invert
 from underskin.recordings.campaign import parse
@@ -71,23 +70,6 @@ def test_figures_cannot_computed_answer_tried(
     assert d33_cache.answer(store, table, row, None)["status"] == "ok"
     with store.reading() as connection:
         assert len(inversions.history(connection, "palm", table.sha256)) == 3
-
-
-def test_values_leave_nothing_invert_answered(server: Server) -> None:
-    """Values that leave nothing to invert are answered."""
-    silent, huge, wide = (campaign(name) for name in ("silent", "huge", "wide"))
-    for recording in silent["recordings"]:
-        recording["frf_re_pc_per_n"] = recording["frf_im_pc_per_n"] = [0.0] * 20
-    for recording in huge["recordings"]:
-        recording["frf_re_pc_per_n"] = [9e8] * 20
-    for recording in wide["recordings"]:
-        recording["frequency_hz"] = np.geomspace(1e-6, 1e9, 20).tolist()
-    for document in (silent, huge, wide):
-        sent = server.http.post("/v1/campaigns?skin=palm", json=document)
-        assert sent.status_code == 201, sent.text
-        told = server.http.get(f"/v1/campaigns/{sent.json()['id']}/d33")
-        assert (told.status_code, told.json()["status"] in ("ok", "none")) == (200, True), told.text
-    assert server.http.get("/v1/skins/palm/history").status_code == 200
 
 
 def test_derived_before_restore_not_kept(store: Database, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import inspect
 
-from service.store import Database, StoreError, campaigns, database, migrate, open_store
+from service.store import Database, StoreError, campaigns, migrate, open_store
 from service.store.tables import metadata
 from tests.support.store_server import Place, campaign
 from underskin.recordings.campaign import parse
@@ -59,19 +59,6 @@ def test_migrations_make_tables_code_uses(store: Database) -> None:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, metadata) == []
     assert ScriptDirectory(str(migrate.SCRIPTS)).get_current_head() == migrate.VERSIONS[-1]
-
-
-def test_the_first_schema_becomes_the_newest(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened = database(place.database_url, place.folder)
-    with monkeypatch.context() as patch:
-        patch.setattr(migrate, "VERSIONS", ("0001",))
-        migrate.migrate(opened, place.folder)
-        with opened.reading() as connection:
-            assert "diagnoses" not in inspect(connection).get_table_names()
-    migrate.migrate(opened, place.folder)
-    with opened.reading() as connection:
-        assert set(metadata.tables) < set(inspect(connection).get_table_names())
-    opened.close()
 
 
 def test_older_store_backed_up_brought_up_date(

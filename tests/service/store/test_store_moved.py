@@ -11,6 +11,7 @@ import pytest
 
 from service.routes.pressed_skin import D33_EXAMPLE as D33
 from service.routes.pressed_skin import FRF_EXAMPLE as FRF
+from tests.service.waiting import until
 from tests.support.store_server import Place, Server, campaign, running
 
 DATABASE = "underskin.sqlite3"
@@ -236,18 +237,12 @@ def test_diagnoses_wait_file_log_says_once(place: Place, tmp_path: Path) -> None
     with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
         answer = server.http.post("/v1/campaigns", json=campaign("one", lines=5))
         (place.folder / DATABASE).rename(tmp_path / "aside")
-        deadline = time.monotonic() + 240
-        while any(told not in log.read_text() for told in watchers):
-            assert time.monotonic() < deadline
-            time.sleep(0.2)
+        until(lambda: all(told in log.read_text() for told in watchers))
         time.sleep(2.5)  # another look at the queue
         (tmp_path / "aside").rename(place.folder / DATABASE)
         started = server.http.post(f"/v1/campaigns/{answer.json()['id']}/diagnosis")
         assert started.status_code == 202, started.text
-        deadline = time.monotonic() + 240
-        while server.http.get(f"/v1/diagnoses/{started.json()['id']}").json()["state"] == "queued":
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
+        until(lambda: server.http.get(f"/v1/diagnoses/{started.json()['id']}").json()["state"] != "queued")
     text = log.read_text()
     assert [text.count(told) for told in watchers] == [1, 1, 1]
     assert 1 <= text.count("the store answers again") <= len(watchers)  # of each once, unless the server ends before

@@ -104,19 +104,6 @@ def save_workbook(file: io.BytesIO) -> None:
     book.save(file)
 
 
-def test_write_waits_too_long_refused_keeps(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A write that waits too long is refused and keeps nothing."""
-    monkeypatch.setattr(write_turns, "WAIT_S", 0.3)
-    monkeypatch.setattr("service.store.engine.WAIT_S", 0.3)
-    with closing(store_of(place)) as store:
-        began = time.monotonic()
-        with locked(place), pytest.raises(OperationalError), store.writing():
-            raise AssertionError("nobody else may write")
-        assert time.monotonic() - began > 0.2
-        with store.writing() as connection:
-            assert connection.execute(text("SELECT 1")).scalar() == 1
-
-
 @pytest.mark.parametrize("place", BACKENDS, indirect=True)
 def test_many_wait_vain_told(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many that wait in vain each is told so.
@@ -161,18 +148,6 @@ def test_readers_hold_connections_keep_no_writer(place: Place) -> None:
             stack.enter_context(store.reading())
         with store.writing() as connection:
             assert connection.execute(text("SELECT 1")).scalar() == 1
-
-
-def test_no_more_wait_than_there_are_places(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(write_turns, "SLOT_WAIT_S", 0.1)
-    turns = write_turns.WriteTurns()
-    with ExitStack() as stack:
-        for _ in range(write_turns.MOST_WAITING):
-            stack.enter_context(turns.slot())
-        with pytest.raises(OperationalError), turns.slot():
-            raise AssertionError("there was no place")
-    with turns.slot():
-        pass
 
 
 def test_turns_are_taken_one_at_a_time(tmp_path: Path) -> None:

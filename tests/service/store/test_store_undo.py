@@ -1,19 +1,18 @@
 """Changes taken back below others, of skins put away, and beside other writers."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 import pytest
-from sqlalchemy import Connection, event, select
+from sqlalchemy import Connection, select
 
 from service.store import (
     Conflict,
     Database,
     annotations,
     campaigns,
-    changes,
     diagnoses,
     export,
     import_checks,
@@ -23,7 +22,6 @@ from service.store import (
     undo,
 )
 from service.store.tables import changes as change_rows
-from service.usecases import changes as shown_changes
 from tests.support import postgres
 from tests.support.store_server import Place, campaign
 from underskin.recordings.campaign import parse
@@ -86,29 +84,6 @@ def test_join_below_undone(store: Database) -> None:
     assert roots(store, "abcd") == {"a": "a", "b": "d", "c": "c", "d": "d"}
 
 
-def test_join_no_longer_cannot_undone(store: Database) -> None:
-    """A join that is no longer so cannot be undone."""
-    for name in "abc":
-        store.write(skins.require, name)
-    joined(store, "c", "b")
-    foreign = {"skin_id": "b", "members": ["b"]}  # as another store may have kept it
-    store.write(changes.record, "join", "a", None, before=foreign)
-    with pytest.raises(Conflict, match="joined otherwise"):
-        store.write(undo.undo, last(store), None)
-    assert roots(store, "abc") == {"a": "a", "b": "c", "c": "c"}
-
-
-def test_skin_put_away_comes_back_campaigns_use(store: Database) -> None:
-    """A skin put away comes back with campaigns in use."""
-    campaign_id = store.write(keep, "palm")
-    store.write(campaigns.withdraw, campaign_id, "wrong sphere", None)
-    withdrawal = last(store)
-    store.write(annotations.discard, "palm", "empty", None)
-    assert listed(store) == set()
-    store.write(undo.undo, withdrawal, None)
-    assert listed(store) == {"palm"}
-
-
 def test_join_undone_since_exported_imported(store: Database, tmp_path: Path) -> None:
     """A join undone since is exported and imported."""
     for name in "ab":
@@ -132,25 +107,6 @@ def test_neither_two_joined_skins_stays_put_away(store: Database, away: str) -> 
     assert listed(store) == {"palm"}
     store.write(undo.undo, join, None)
     assert listed(store) == {"palm", "hand"}
-
-
-def test_page_asks_no_store_many_changes(store: Database) -> None:
-    """A page asks no more of the store for many changes."""
-    campaign_id = store.write(keep, "palm")
-
-    def statements() -> int:
-        told: list[str] = []
-        listener: Callable[..., None] = lambda *given: told.append(given[2])  # noqa: E731
-        event.listen(store.engine, "before_cursor_execute", listener)
-        store.read(shown_changes.of_campaign, campaign_id)
-        event.remove(store.engine, "before_cursor_execute", listener)
-        return len(told)
-
-    store.write(annotations.of_campaign, campaign_id, {"remark": "0"}, None)
-    few = statements()
-    for number in range(1, 15):
-        store.write(annotations.of_campaign, campaign_id, {"remark": str(number)}, None)
-    assert statements() == few
 
 
 def test_arrivals_skin_not_wait(on_postgresql: Database) -> None:
@@ -207,4 +163,4 @@ def test_undo_correction_waits_model_skin_left(on_postgresql: Database) -> None:
         assert not undone.done()
         connection.commit()
         with pytest.raises(Conflict, match="a model was adopted since"):
-            undone.result(10)
+            undone.result(240)

@@ -1,12 +1,12 @@
 """Two servers on one PostgreSQL: one is killed, nothing is lost, and the other takes over what it was diagnosing."""
 
 import threading
-import time
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from tests.service.waiting import until
 from tests.support.diagnosed import awaited, begun, found, small, small_report
 from tests.support.postgres import Cluster
 from tests.support.store_server import Place, running
@@ -37,16 +37,11 @@ def test_either_acknowledged_kept_killed(places: list[Place]) -> None:
         ]
         for thread in threads:
             thread.start()
-        deadline = time.monotonic() + 240
-        while min(len(stream.acknowledged) for stream in streams) < 2 * BATCH:
-            assert time.monotonic() < deadline, "the servers do not answer"
-            time.sleep(0.05)
+        until(lambda: min(len(stream.acknowledged) for stream in streams) >= 2 * BATCH, "no server answers")
         servers[0].kill()
         threads[0].join()
         before = len(streams[1].acknowledged)
-        while len(streams[1].acknowledged) == before:
-            assert time.monotonic() < deadline, "the other server no longer answers"
-            time.sleep(0.05)
+        until(lambda: len(streams[1].acknowledged) > before, "the other server no longer answers")
         servers[1].kill()
         threads[1].join()
     with running(places[1], **_NONE) as server:

@@ -245,20 +245,6 @@ def test_diagnoses_models_elsewhere_here(server: Server, elsewhere: Server, tmp_
         assert len(there.skins.models("palm")) == 1
 
 
-def test_a_backup_brings_models_back(server: Server, client: Client, tmp_path: Path) -> None:
-    _, diagnosis_id = diagnosed(server, resonant("array"), report())
-    adopted = client.skins.adopt("palm", diagnosis_id)
-    file = tmp_path / "backup"
-    assert server.place.command("backup", str(file)).returncode == 0
-    _, newer = diagnosed(server, resonant("again"), report())
-    client.skins.adopt("palm", newer)
-    done = server.place.command("restore", str(file))
-    assert done.returncode == 0, done.stderr
-    assert client.skins.models("palm") == [adopted]
-    with pytest.raises(ServiceError, match="404"):
-        client.diagnoses.get(newer)
-
-
 def _spoil(report: dict[str, Any], part: str) -> dict[str, Any]:
     spoilt = {**report, "mechanisms": [dict(entry) for entry in report["mechanisms"]]}
     if part == "value":

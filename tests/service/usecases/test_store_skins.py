@@ -2,10 +2,8 @@
 
 from typing import Any
 
-import numpy as np
 import pytest
 
-from tests.support.blocks import block
 from tests.support.store_server import Server, campaign
 
 BACKEND = "postgresql"
@@ -57,20 +55,6 @@ def test_joined_skins_keep_names(server: Server) -> None:
     assert len(server.http.get("/v1/campaigns?skin=b").json()["campaigns"]) == 3
     d = post(server, "b", "late", year=2020)
     assert points(server, "c") == [a, b, c, d]
-
-
-def test_joined_skins_declare_differently_said(server: Server) -> None:
-    """What joined skins declare differently is said."""
-    post(server, "a", "a")
-    document = campaign("b")
-    document["skin"] |= {"youngs_modulus_mpa": 9.0}
-    assert server.http.post("/v1/campaigns", json=document, params={"skin": "b"}).status_code == 201
-    assert server.http.get("/v1/skins/a").json()["differences"] == []
-    detail = server.http.post("/v1/skins/a/join", json={"skin_id": "b", "reason": "one skin"}).json()
-    declared = campaign("a")["skin"]["youngs_modulus_mpa"]
-    assert detail["differences"] == [f"youngs_modulus_mpa is {declared:g} of a and 9 of b"]
-    assert history(server, "b")["differences"] == detail["differences"]
-    assert detail["differences"][0] in server.http.get("/skins/a").text
 
 
 @pytest.mark.parametrize(("skin", "other", "status"), [("a", "a", 422), ("a", "none", 404), ("none", "a", 404)])
@@ -154,51 +138,6 @@ def test_figures_say_what_they_leave_out(server: Server) -> None:
     assert again.status_code == 409
     absent = server.http.post(f"/v1/campaigns/{kept}/exclusions", json={"recording": "r9", "reason": "?"})
     assert absent.status_code == 404
-
-
-def test_d33_shows_looks_wrong_elastomers(server: Server) -> None:
-    """D33 shows what looks wrong and the elastomers modulus."""
-    document = campaign("in C/N", d33=14e-12)
-    strain = np.linspace(0, 0.1, 30)
-    block = {
-        "kind": "compression",
-        "sample_height_mm": 10.0,
-        "sample_diameter_mm": 12.0,
-        "displacement_mm": (10 * strain).tolist(),
-        "force_n": (16 * np.pi / 4 * 12**2 * strain).tolist(),
-    }
-    blocks = [{**block, "id": "block"}, {**block, "id": "idle", "force_n": [0.0] * 30}]
-    document["recordings"] += blocks
-    found = server.http.get(f"/v1/campaigns/{sent(server, document)}/d33").json()
-    assert sum("was it given in C/N?" in finding for finding in found["findings"]) == 1
-    (modulus,) = found["moduli"]
-    assert (modulus["recording"], modulus["kind"]) == ("block", "compression")
-    assert modulus["youngs_modulus_mpa"] == pytest.approx(16)
-    assert "not seen to leave the line" in modulus["statement"]
-    assert [entry["recording"] for entry in found["left_out"]] == ["idle"]
-    alone = server.http.get(f"/v1/campaigns/{sent(server, {**document, 'recordings': blocks})}/d33").json()
-    assert (alone["status"], alone["findings"], alone["moduli"]) == ("none", [], [modulus])
-    usual = server.http.get(f"/v1/campaigns/{sent(server, campaign('usual'))}/d33").json()
-    assert (usual["findings"], usual["moduli"]) == ([], [])
-
-
-def sent(server: Server, document: dict[str, Any]) -> str:
-    answer = server.http.post("/v1/campaigns", json=document)
-    assert answer.status_code == 201, answer.text
-    return str(answer.json()["id"])
-
-
-def test_page_describes_skin_latest_campaign(server: Server) -> None:
-    """The page describes the skin by its latest campaign with frfs."""
-    for name, day in (("later", "2024-09-02"), ("earlier", "2024-05-02")):
-        document = campaign(name, thickness_mm=3.0 if name == "later" else 2.5)
-        for recording in document["recordings"]:
-            recording["recorded_at"] = f"{day}T09:00:00Z"
-        server.http.post("/v1/campaigns?skin=palm", json=document).raise_for_status()
-    server.http.post("/v1/campaigns?skin=palm", json=block("block", recorded_at="2024-11-02T09:00:00Z"))
-    page = server.http.get("/skins/palm", headers={"Accept": "text/html"}).text
-    assert page.index(">block</a>") < page.index(">later</a>", page.index(">block</a>")) < page.index(">earlier</a>")
-    assert '>3</span>&nbsp;<span class="unit">mm</span>' in page
 
 
 def test_array_ages_told_before_sensors(server: Server) -> None:

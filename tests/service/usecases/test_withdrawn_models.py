@@ -10,10 +10,9 @@ import numpy as np
 import orjson
 import pytest
 
-from service.auth.keys import KeyStore
 from tests.service.usecases.test_adopted_models import FREQUENCY, PRESSED
 from tests.support.diagnosed import D33, diagnosed, report, resonant
-from tests.support.store_server import Place, Server, running
+from tests.support.store_server import Server
 from underskin import Client, ServiceError
 
 BACKEND = "sqlite"
@@ -78,40 +77,6 @@ def test_without_skin_answers_never_model(server: Server, client: Client) -> Non
     assert client.skins.models("palm") == [again, {**first, **gone}]
 
 
-def test_versions_before_it_do_not_come_back(server: Server, client: Client) -> None:
-    adopted = []
-    for name in ("monday", "tuesday"):
-        _, diagnosis_id = diagnosed(server, resonant(name), report())
-        adopted.append(client.skins.adopt("palm", diagnosis_id))
-    client.skins.withdraw_model("palm", "neither")
-    with pytest.raises(ServiceError, match="no adopted model"):
-        client.skins.model("palm")
-    assert [entry["withdraw_reason"] for entry in client.skins.models("palm")] == ["neither", None]
-    assert client.skins.adopt("palm", adopted[0]["diagnosis_id"])["version"] == 3
-
-
-def test_joined_skins_last_adoption_withdrawn(server: Server, client: Client) -> None:
-    """Of joined skins the last adoption is withdrawn."""
-    for skin in ("a", "b"):
-        _, diagnosis_id = diagnosed(server, resonant(skin), report(), skin)
-        client.skins.adopt(skin, diagnosis_id)
-    client.skins.join("a", "b", "one skin")
-    assert client.skins.withdraw_model("b", "of both")["skin_id"] == "b"
-    for skin in ("a", "b"):
-        with pytest.raises(ServiceError, match="no adopted model"):
-            client.skins.model(skin)
-
-
-def test_model_serves_nothing_withdrawn(server: Server, client: Client) -> None:
-    """A model that serves nothing can be withdrawn."""
-    campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
-    client.skins.adopt("palm", diagnosis_id)
-    client.campaigns.withdraw(campaign_id, "fell down")
-    assert by_the_adopted_model(server, campaign_id)[0][0] == 409
-    client.skins.withdraw_model("palm", "of a campaign that fell down")
-    assert by_the_adopted_model(server, campaign_id)[0][0] == 404
-
-
 def test_a_reason_is_asked_for(server: Server, client: Client) -> None:
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     adopted = client.skins.adopt("palm", diagnosis_id)
@@ -139,49 +104,6 @@ def test_it_is_withdrawn_once(server: Server, client: Client) -> None:
     assert withdraw("wrong", **{"Idempotency-Key": "once"}).json() == first.json()
     assert withdraw("other", **{"Idempotency-Key": "once"}).status_code == 422
     assert client.skins.model("palm") == newest
-
-
-def test_withdrew_kept_read(tmp_path: Path) -> None:
-    """Who withdrew it is kept and who may read only cannot."""
-    folder = tmp_path / "data"
-    reading, writing = (KeyStore(folder).create(f"the {scope}er", scope) for scope in ("read", "write"))
-    with running(Place(folder), key=writing, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        address = str(server.http.base_url)
-        with Client(address, api_key=writing) as writer, Client(address, api_key=reading) as reader:
-            _, diagnosis_id = diagnosed(server, resonant("array"), report())
-            adopted = writer.skins.adopt("palm", diagnosis_id)
-            with pytest.raises(ServiceError, match="403"):
-                reader.skins.withdraw_model("palm", "no")
-            assert reader.skins.model("palm") == adopted
-            assert writer.skins.withdraw_model("palm", "yes")["withdrawn_from"] == "the writeer"
-
-
-def test_elsewhere_after_restore_here(server: Server, elsewhere: Server, client: Client, tmp_path: Path) -> None:
-    """It is elsewhere and after a restore as it was here."""
-    _, diagnosis_id = diagnosed(server, resonant("array"), report())
-    client.skins.adopt("palm", diagnosis_id)
-    in_force, withdrawn = tmp_path / "in-force.h5", tmp_path / "withdrawn.h5"
-    client.skins.export("palm", in_force)
-    client.skins.withdraw_model("palm", "wrong diagnosis")
-    kept = client.skins.models("palm")
-    client.skins.export("palm", withdrawn)
-    with Client(str(elsewhere.http.base_url)) as there:
-        assert there.skins.load(withdrawn)["kept"] == 1
-        assert there.skins.load(withdrawn)["present"] == 1
-        assert there.skins.models("palm") == kept
-        with pytest.raises(ServiceError, match="no adopted model"):
-            there.skins.model("palm")
-        with pytest.raises(ServiceError, match="Model 1 of skin 'palm' is there already and differs"):
-            there.skins.load(in_force)
-        assert there.skins.adopt("palm", diagnosis_id)["version"] == 2
-    backup = tmp_path / "backup"
-    assert server.place.command("backup", str(backup)).returncode == 0
-    client.skins.adopt("palm", diagnosis_id)
-    done = server.place.command("restore", str(backup))
-    assert done.returncode == 0, done.stderr
-    assert client.skins.models("palm") == kept
-    with pytest.raises(ServiceError, match="no adopted model"):
-        client.skins.model("palm")
 
 
 def test_files_older_underskin_come_spoilt_ones(
