@@ -187,6 +187,12 @@ class FileError(UnderskinError):
         return InvalidInput(field, file, allowed, code=self.code)
 
 
+def of_file(file: str, error: Exception) -> str:
+    """An error in one line that begins with the file's name, once."""
+    line = " ".join(str(error).split())
+    return line if isinstance(error, FileError) else f"{file}: {line}"
+
+
 @contextmanager
 def damage_said(file: str, place: str, describe: Callable[[Exception], str]) -> Iterator[None]:
     """Convert any exception of a library on a damaged file into FileError; MemoryError is passed on."""
