@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any, Self
 
 
@@ -188,9 +189,11 @@ class FileError(UnderskinError):
 
 
 def of_file(file: str, error: Exception) -> str:
-    """An error in one line that begins with the file's name, once."""
+    """An error on a file, or on one joined to it, in one line that begins with the file's name as the user gave it."""
     line = " ".join(str(error).split())
-    return line if isinstance(error, FileError) else f"{file}: {line}"
+    if isinstance(error, FileError) and Path(error.file).name == Path(file).name:
+        return file + line.removeprefix(error.file)
+    return f"{file}: {line}"
 
 
 @contextmanager
