@@ -22,7 +22,7 @@ def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
         ({"d33": D33}, "Nothing is missing; d33 −30 pC/N (−31 to −29)"),  # kept before reports had `quotable`
         ({"d33": {"quotable": False}}, "Nothing is missing"),
         ({"probability": 0.6, "alternatives": [{"mechanisms": ["adhesion"], "probability": 0.3}]},
-         "Nothing may be missing (60 %), or adhesion"),
+         "Perhaps nothing is missing (60 %), or adhesion"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", DELAY)]},
          "Timing delay, delay 14.2 µs (13.4–15.1)"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", {**DELAY, "at_bound": "high"})]},

@@ -85,11 +85,11 @@ def _answers(report: Document) -> Iterator[str]:
     elif verdict == "no_mismatch":
         rivals = [_named(rival["mechanisms"]) for rival in _rivals(report)]
         if (report["probability"] or 0.0) < EXPLAINED and rivals:
-            yield f"nothing may be missing ({probability}), or {' or '.join(rivals)}"
+            yield f"perhaps nothing is missing ({probability}), or {' or '.join(rivals)}"
         yield (
             "nothing is missing"
             if (report["probability"] or 0.0) >= EXPLAINED
-            else f"nothing may be missing ({probability})"
+            else f"perhaps nothing is missing ({probability})"
         )
     elif verdict == "unexplained":
         law = report.get("unnamed")
