@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any, Self
 
 
@@ -185,6 +186,14 @@ class FileError(UnderskinError):
         """The same error for a field whose value is the file, under the name that it was sent with."""
         allowed = ": ".join(part for part in (self.place, self.reason) if part)
         return InvalidInput(field, file, allowed, code=self.code)
+
+
+def of_file(file: str, error: Exception) -> str:
+    """An error on a file, or on one joined to it, in one line that begins with the file's name as the user gave it."""
+    line = " ".join(str(error).split())
+    if isinstance(error, FileError) and Path(error.file).name == Path(file).name:
+        return file + line.removeprefix(error.file)
+    return f"{file}: {line}"
 
 
 @contextmanager

@@ -181,6 +181,16 @@ def test_read_otherwise_headed_left_out_told() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("command", [["d33"], ["diagnose"], ["diagnose", "--together", "all"]])
+def test_missing_file_is_named_once(command: list[str], tmp_path: Path) -> None:
+    """A file that does not exist is named once, with the reason."""
+    file = str(tmp_path / "none.csv")
+    answer = run(*command, file, *(["--output-dir", str(tmp_path)] if command[0] == "diagnose" else []), COLUMNS="200")
+    assert answer.returncode == 2
+    assert answer.stderr.count(file) == 1
+    assert "cannot be opened: No such file" in answer.stderr
+
+
 def test_missing_table_says_what_to_do(tmp_path: Path) -> None:
     line = refused(*FRF, "--preload-n", "1", UNDERSKIN_TABLES=str(tmp_path))
     assert "sigma.h5 cannot be read: No such file or directory. Restore it" in line

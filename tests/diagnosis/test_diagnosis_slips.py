@@ -152,6 +152,9 @@ def test_two_ranges_leave_d33_open(table: SigmaTable) -> None:
     assert statement.startswith("sensors s0, s2, s5 and sensors s1, s3, s4 are two groups")
     assert report["verdict"] == "no_mismatch"
     assert not report["d33"]["quotable"]
+    by_others = re.search(r"by the sensors s1, s3 and s4 it is ([0-9.]+) times that", report["statement"])
+    assert by_others
+    assert float(by_others[1]) == pytest.approx(4.0, rel=0.1)
 
 
 @pytest.mark.parametrize(("share", "word"), first(2, [(0.75, "weak"), (2.0, "strong"), (1.35, "strong")]))

@@ -8,6 +8,7 @@ from underskin.diagnosis.reporting.headline import first_and_rest
 
 D33 = {"name": "d33", "unit": "pC/N", "value": -30.0, "low": -31.0, "high": -29.0}
 DELAY = {"name": "delay", "unit": "µs", "value": 14.2, "low": 13.4, "high": 15.1}
+LONG = {**DELAY, "value": -20000.4, "low": -20002.6, "high": -19998.2}
 KNOWN = {"name": "youngs_modulus", "unit": "MPa", "value": 2.0, "low": 1.8, "high": 2.2}
 SIGN = [{"code": "sign_flipped", "recording": "r1"}]
 
@@ -22,9 +23,11 @@ def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
         ({"d33": D33}, "Nothing is missing; d33 −30 pC/N (−31 to −29)"),  # kept before reports had `quotable`
         ({"d33": {"quotable": False}}, "Nothing is missing"),
         ({"probability": 0.6, "alternatives": [{"mechanisms": ["adhesion"], "probability": 0.3}]},
-         "Nothing may be missing (60 %), or adhesion"),
+         "Perhaps nothing is missing (60 %), or adhesion"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", DELAY)]},
          "Timing delay, delay 14.2 µs (13.4–15.1)"),
+        ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", LONG)]},
+         "Timing delay, delay −20000 µs (−20003 to −19998)"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", {**DELAY, "at_bound": "high"})]},
          "Timing delay, delay at or beyond 14.2 µs"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", {**DELAY, "value": None})]}, "Timing delay"),

@@ -259,6 +259,17 @@ def test_frequencies_in_khz_are_named(table: SigmaTable, lowest_hz: float) -> No
         assert any("kHz" in one.statement for one in said) is is_said
 
 
+@pytest.mark.parametrize(("factor", "unit"), [(1e-3, "ms"), (1e3, "s")])
+def test_a_clock_in_another_unit_is_named(table: SigmaTable, factor: float, unit: str) -> None:
+    """Of time series, whose times give the frequencies, it is the unit of their time that is named."""
+    series = [
+        replace(recording, sample_rate_hz=factor * (recording.sample_rate_hz or 0.0))
+        for recording in shaken().of(FrfRecording)
+    ]
+    found = invert(replace(shaken(), recordings=tuple(series)), table)
+    assert any(f"time of the series given in {unit}?" in one.statement for one in found.findings)
+
+
 @pytest.mark.parametrize("mains_hz", [50.0, 60.03])
 def test_force_at_the_mains_alone_is_said(table: SigmaTable, mains_hz: float) -> None:
     """d33 of a tone at the mains is stated with the word that pick-up cannot be told from it; of another tone not."""

@@ -111,6 +111,22 @@ def test_thousands_unknown_fields_said() -> None:
     assert [problem.field for problem in problems] == ["preload_n", "sensor", "frf_im_pc_per_n"]
 
 
+@pytest.mark.parametrize(("in_skin", "used"), [((1, 2, 3), (0, 1, 2)), ((0, 1, 2), (1, 2, 3)), ((1, 2, 3), (0, 1))])
+def test_sensors_counted_from_0_and_from_1(in_skin: tuple[int, ...], used: tuple[int, ...]) -> None:
+    """Where the recordings count the sensors from 0 and the skin from 1, or the other way round, no recording is taken
+    for a neighbour's; one name too many, or fewer sensors than the skin has, is no such count."""
+
+    def counted(numbers: tuple[int, ...]) -> dict[str, Any]:
+        sensors = [{"id": f"s{number:02d}", "x_mm": 8.0 * number, "y_mm": 0.0} for number in in_skin]
+        recordings = [{**FRF, "id": f"r{number}", "sensor": f"s{number:02d}"} for number in numbers]
+        return {**document(*recordings), "skin": {**SKIN, "sensors": sensors}}
+
+    with pytest.raises(InvalidInput, match=r"recordings\[\d\]\.sensor = .*counted from 0"):
+        from_dict(counted(used))
+    assert from_dict(counted(in_skin))[1] == from_dict(counted(in_skin[1:]))[1] == []
+    assert [problem.field for problem in from_dict(counted((*in_skin, 9)))[1]] == ["sensor"]
+
+
 def test_id_given_twice_refused_second_time() -> None:
     """An id given twice is refused the second time."""
     campaign, problems = from_dict(document(FRF, FRF))

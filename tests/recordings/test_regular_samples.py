@@ -30,6 +30,14 @@ def frf(order: list[int], cells: dict[int, str] | None = None, values: Any = FRF
     return read_file(text.encode(), "frf.csv", rig_description.from_dict({**RIG, "channels": PARTS}))
 
 
+def frf_of_readings(gains: tuple[float, ...]) -> Reading:
+    """As `frf`, each line read once with each of these gains, with 0.1 % of noise."""
+    noise = np.random.default_rng(1).normal(scale=0.007, size=(len(FRF), len(gains)))
+    order = np.repeat(np.arange(len(FRF)), len(gains)).tolist()
+    readings = np.outer(FRF.real, gains) + noise
+    return frf(order, {row: repr(float(cell)) for row, cell in enumerate(readings.ravel())}, FRF.real + 0j)
+
+
 def assert_is_the_frf(reading: Reading, lines: slice = slice(None)) -> None:
     assert reading.problems == []
     (recording,) = reading.campaign.recordings
@@ -55,6 +63,20 @@ def test_readings_of_a_frequency_are_averaged(counts: list[int], down: bool, the
     reading = frf(order)
     assert_is_the_frf(reading)
     assert any("averaged" in note for note in reading.warnings) == (len(set(order)) < len(order))
+
+
+@pytest.mark.parametrize(("gains", "word"), [((1.0, 1.0), "scatter by 0"), ((1.0, 0.97, 0.97), "0.97")])
+def test_scatter_of_readings(gains: tuple[float, ...], word: str) -> None:
+    """The note on an average says how far its readings lie apart, and whether they do so alike at all frequencies."""
+    (note,) = frf_of_readings(gains).warnings
+    assert word in note
+
+
+@pytest.mark.parametrize("gains", [(1.0, 0.7), (1.0, 0.9, 1.1, 0.5), (1.0, -1.0)])
+def test_readings_of_several_recordings_are_no_average(gains: tuple[float, ...]) -> None:
+    """Readings that differ alike at all frequencies, by a factor or in sign, are refused: which is right shows not."""
+    with pytest.raises(FileError, match=rf"frequency_hz: .* number {len(gains)} is .* times the first; these may be"):
+        frf_of_readings(gains)
 
 
 @pytest.mark.parametrize("order", [[*range(5), *range(5)], [0, 1, 2, 0, 1, 2, 3, 4], [*range(5)] * 8])

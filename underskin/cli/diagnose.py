@@ -21,7 +21,7 @@ import typer
 
 from underskin.cli.rigs import EstimatorOption, RigOption, read_by, reading_notes, rig_description_in
 from underskin.cli.store import LOCAL, KeyOption, Url, connect
-from underskin.errors import UnderskinError
+from underskin.errors import UnderskinError, of_file
 from underskin.parallel import one_blas_thread, processes
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def of_several(
         try:
             readings.append(read_file(file))
         except UnderskinError as error:
-            raise UnderskinError(f"{file}: {error}") from error
+            raise UnderskinError(of_file(str(file), error)) from error
     skin_ids = sorted({reading.campaign.skin.id for reading in readings if reading.campaign.skin.id is not None})
     if together is not None and len(skin_ids) > 1:
         allowed = f"the campaigns are of several skins (skin.id): {', '.join(skin_ids)}"
@@ -325,7 +325,7 @@ def _diagnose_file(
         reading = read_file(file)
         diagnosis = with_refused(work_out(reading.campaign, _table(), without=without), reading.problems)
     except UnderskinError as error:
-        return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
+        return _Outcome(str(file), of_file(str(file), error))
     document = report(diagnosis)
     write_report(document, output_dir / f"{file.stem}.json")
     if html:

@@ -20,7 +20,7 @@ from rich.text import Text
 
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes, rig_description_in
-from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
+from underskin.errors import InvalidInput, TableError, UnderskinError, not_unique, of_file, wrong_type
 from underskin.findings.formatting import in_digits, left_out_lines, significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
@@ -273,8 +273,7 @@ class _FileErrors:
             yield
         except (UnderskinError, OSError) as error:
             self.count += 1
-            line = str(error) if isinstance(error, FileError) else f"{name}: {error}"
-            self._console.print(f"underskin: {line}", markup=False, highlight=False, soft_wrap=True)
+            self._console.print(f"underskin: {of_file(name, error)}", markup=False, highlight=False, soft_wrap=True)
 
 
 def invert_files(

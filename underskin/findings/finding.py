@@ -199,8 +199,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.PRELOADS_LARGE: "no preload is below {lowest_n:g} N: they look 1000 × too large; were they given in mN?",
     Reason.COHERENCE_SMALL: "no coherence is above {largest:.2g}: does its heading say %, where it is a share of 1?",
     Reason.FREQUENCIES: "frequencies are {lowest_hz:g} to {highest_hz:g} Hz: they look 1000 × too "
-    "{too_large:large|small}; were "
-    "they given in {given_in}?",
+    "{too_large:large|small}; {are_series:was the time of the series|were they} given in {given_in}?",
     Reason.PERIODS_TOO_LONG: "no period of {lowest_hz:g} Hz fits into the {pause_s:.3g} s after which, by recorded_at, "
     "the next recording follows: are they 1000 × too small, given in kHz?",
     Reason.RESPONSE_BESIDE_OTHERS: f"the response looks {_RESPONSE} Left out",

@@ -68,7 +68,8 @@ def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
         return clause(text)
 
     filled = ([as_clause(text) for text in clauses if text] for clauses in sentences)
-    return " ".join(f"{capital('; '.join(map(small, clauses)))}." for clauses in filled if clauses)
+    texts = (capital("; ".join(map(small, clauses))) for clauses in filled if clauses)
+    return " ".join(text if text.endswith("?") else f"{text}." for text in texts)
 
 
 def clause(text: str) -> str:

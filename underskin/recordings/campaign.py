@@ -595,6 +595,7 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     recording_documents = document.get("recordings")
     if not isinstance(recording_documents, list) or not recording_documents:
         raise errors.wrong_type("recordings", shown(recording_documents), "must be a list of at least one recording")
+    field.counted_alike([sensor.id for sensor in skin.sensors], recording_documents)
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
     for index, recording_document in enumerate(recording_documents):

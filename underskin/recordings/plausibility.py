@@ -191,12 +191,14 @@ def _of_frequencies(recordings: Sequence[FrfRecording], lines: Sequence[Floats])
         max(float(frequency.max()) for frequency in lines),
     )
     slow = (lowest < _SLOW_HZ[0] and highest < _SLOW_HZ[1]) or lowest < highest < _LEAST_SWEEP_HZ
+    are_series = all(recording.force_n is not None for recording in recordings)  # whose times give the frequencies
     for wrong, too_large, unit in (
-        (highest > _FREQUENCIES_HZ[1], True, "mHz"),
-        (slow or highest < _FREQUENCIES_HZ[0], False, "kHz"),
+        (highest > _FREQUENCIES_HZ[1], True, "s" if are_series else "mHz"),
+        (slow or highest < _FREQUENCIES_HZ[0], False, "ms" if are_series else "kHz"),
     ):
         if wrong:
             arguments = {"lowest_hz": lowest, "highest_hz": highest, "too_large": too_large, "given_in": unit}
+            arguments["are_series"] = are_series
             return [Finding(Reason.FREQUENCIES, "", "frequency_hz", arguments)]
     pause = _pause_s(recordings)
     if pause is not None and pause * lowest < 1 and _SLIP * highest <= _FREQUENCIES_HZ[1]:

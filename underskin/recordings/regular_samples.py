@@ -12,13 +12,18 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 
 import numpy as np
+from scipy.special import fdtrc
 
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents
-from underskin.units import Floats, Mask
+from underskin.units import Complexes, Floats, Indices, Mask
 
 OFF_SAMPLE = 0.05  # of a step: at half the rate a phase of 9°, and Re FRF 1.2 % too small
 _LEAST_COMMON = 2  # samples in common
+_ONE_GAIN = 0.05  # scatter of the gain of one contact on a poor rig (`mixed_model.GAIN_RANGE`)
+_BY_CHANCE = 1e-6
+_ROUNDING = 1e-9  # relative: no file has more digits
+_TINY = float(np.finfo(float).tiny)
 
 
 def aligned(contents: Contents, names: Collection[str], file: str) -> Contents:
@@ -283,7 +288,7 @@ def sorted_spectrum(columns: Columns) -> tuple[dict[str, Floats], list[str]]:
     """The lines of a spectrum by rising `frequency_hz`; several readings of a frequency are averaged.
 
     Readings of a frequency follow each other, or come from a sweep up and down. Raises ValueError where a sweep starts
-    again: these may be several recordings.
+    again, or where the readings differ alike at all frequencies: these may be several recordings.
     """
     frequency = columns["frequency_hz"]
     rises = np.diff(frequency)
@@ -299,9 +304,53 @@ def sorted_spectrum(columns: Columns) -> tuple[dict[str, Floats], list[str]]:
         raise ValueError(f"{reason}, which may be several recordings; one recording may sweep up and down once")
     notes = ["the frequencies do not rise: the lines were sorted"] if (rises < 0).any() else []
     if is_repeated:
-        notes.append(f"{(counts > 1).sum()} frequencies have several readings, up to {counts.max()}: averaged")
+        spread = _spread_of_readings(columns, index, counts)
+        notes.append(f"{(counts > 1).sum()} frequencies have several readings, up to {counts.max()}: averaged{spread}")
     averaged = {
         name: distinct if name == "frequency_hz" else np.bincount(index, column) / counts
         for name, column in columns.items()
     }
     return averaged, notes
+
+
+def _spread_of_readings(columns: Columns, index: Indices, counts: Indices) -> str:
+    """How the readings of one frequency scatter, in words; `index` (readings,) is each one's frequency, of which there
+    are `counts` (frequencies,).
+
+    With e the departure of a reading from the mean of its frequency, relative to the root mean square there, and b the
+    mean of e over the first readings of all frequencies, over the second ones and so on, noise makes the quotient of
+    the squares that b explains and of the rest one of Fisher's F: a change of the gain moves all frequencies alike.
+    """
+    if not {"frf_re_pc_per_n", "frf_im_pc_per_n"} <= columns.keys():
+        return ""
+    order = np.argsort(index, kind="stable")
+    order = order[(counts > 1)[index[order]]]
+    line, turn = index[order], np.concatenate([np.arange(count) for count in counts[counts > 1]])
+    values = columns["frf_re_pc_per_n"][order] + 1j * columns["frf_im_pc_per_n"][order]
+    size = np.sqrt(np.bincount(line, np.abs(values) ** 2, len(counts)) / counts)[line]
+    off = (values - _mean_of(values, line)[line]) / np.where(size > 0, size, 1.0)
+    alike = _mean_of(off, turn)
+    explained, rest = (float((np.abs(part) ** 2).sum()) for part in (alike[turn], off - alike[turn]))
+    free, freedom = int((counts - 1).sum()), len(alike) - 1
+    scatter = math.sqrt((explained + rest) / free)
+    if scatter < _ROUNDING:
+        return ", all equal"
+    words = f"; they scatter by {100 * scatter:.2g} % (rms)"
+    by_noise = max(rest / max(free - freedom, 1), _ROUNDING**2)
+    if free == freedom or fdtrc(2 * freedom, 2 * (free - freedom), explained / freedom / by_noise) > _BY_CHANCE:
+        return words
+    number = int(np.abs(alike - alike[0]).argmax())
+    other = values[turn == number]
+    first = values[(turn == 0) & np.isin(line, line[turn == number])]
+    ratio = float((np.conj(first) * other).real.sum() / max((np.abs(first) ** 2).sum(), _TINY))
+    differ = f"differ alike at all of them: number {number + 1} is {ratio:.3g} times the first"
+    if math.sqrt(explained / free) > _ONE_GAIN:
+        reason = f"the readings of single frequencies {differ}; these may be several recordings (another sensor, place"
+        raise ValueError(f"{reason}, day or range), and one recording is needed for each, or a column that says which")
+    return f"{words}, and {differ}"
+
+
+def _mean_of(values: Complexes, group: Indices) -> Complexes:
+    """The mean of the values of each group; 0 of an empty one."""
+    sums = np.bincount(group, values.real) + 1j * np.bincount(group, values.imag)
+    return np.asarray(sums / np.maximum(np.bincount(group), 1))

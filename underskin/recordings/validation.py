@@ -7,7 +7,7 @@ the end.
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, fields
 from datetime import datetime
 from functools import cache
@@ -110,6 +110,32 @@ def of_schema(noun: str, value: Any, schema: str, field_names: Collection[str]) 
     if given != schema:
         raise errors.not_one_of("schema", given, (schema,))
     return document
+
+
+_NUMBERED = re.compile(r"(.*?)(\d{1,9})")
+
+
+def counted_alike(sensors: Sequence[str], recordings: Sequence[Any]) -> None:
+    """Raises InvalidInput where the sensors of the recordings' documents are counted from 0 and the skin's from 1, or
+    the other way round: then all but one are found, and each recording would be taken for one of a neighbour's."""
+    named = [entry.get("sensor") if isinstance(entry, Mapping) else None for entry in recordings]
+    ids, used = ({part for one in which if (part := _counted(one))} for which in (sensors, named))
+    for step, begins in ((1, used - ids), (-1, ids - used)):
+        moved = {(prefix, count + step) for prefix, count in used}
+        if moved <= ids and not used <= ids and any(count == 0 for _, count in begins):
+            index = next(index for index, name in enumerate(named) if _counted(name) in used - ids)
+            numbers = [[count for _, count in part] for part in (used, ids)]
+            (first, last), (least, most) = ((min(part), max(part)) for part in numbers)
+            reason = f"the recordings' sensors are numbered {first} to {last}, the skin's {least} to {most}: was one of"
+            doubt = "them counted from 0? Then each recording would be taken for a neighbour's: number both alike"
+            allowed = f"must be the id of one of the skin's sensors; {reason} {doubt}"
+            raise InvalidInput(f"recordings[{index}].sensor", named[index], allowed, code=ErrorCode.NOT_ONE_OF)
+
+
+def _counted(name: Any) -> tuple[str, int] | None:
+    """The words and the number of a name such as s01; None of others."""
+    parts = _NUMBERED.fullmatch(name) if isinstance(name, str) else None
+    return None if parts is None else (parts[1], int(parts[2]))
 
 
 def mapping(field: str, value: Any) -> Mapping[str, Any]:

@@ -140,7 +140,7 @@ WARMTH = {
     ("verdict", "probability", "mechanisms", "alternatives", "tag", "beside", "mood"),
     [
         ("no_mismatch", 0.6, [], [("strain_stiffening", 0.38)], "no mismatch found, 60 %",
-         "Nothing may be missing (60 %), or strain stiffening", "look"),
+         "Perhaps nothing is missing (60 %), or strain stiffening", "look"),
         ("explained", 0.97, ["contact_resonance"], [("timing_delay", 0.03)], "mismatch explained",
          "Contact resonance, tip mass", "look"),
         ("unexplained", 0.998, [], [], "mismatch by a law that nobody listed, 99.8 %",

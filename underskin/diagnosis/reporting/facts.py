@@ -26,7 +26,7 @@ from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Power
 from underskin.findings.codes import FindingCode, Lacking, Reason
 from underskin.findings.finding import Finding
-from underskin.findings.formatting import in_digits
+from underskin.findings.formatting import in_digits, listed
 from underskin.mechanisms.base import Stage
 from underskin.mechanisms.laws import contact_creep, liquid_drag, strain_stiffening
 from underskin.mechanisms.registry import CATALOGUE
@@ -348,8 +348,7 @@ class Facts:
             "a law that is in no list acts on it": law is not None and not law.is_outside_band,
             "its force acts at the mains alone": self._holds_for_all(Reason.EXCITED_AT_MAINS),
             "its gain changes within the recordings": self._holds_for_all(Reason.GAIN_STEP, Reason.GAIN_DRIFTS),
-            "its sensors are two groups a factor apart": Reason.TWO_GROUPS
-            in [item.reason for item in diagnosis.findings],
+            self._by_other_sensors: bool(self._by_other_sensors),
             "no PVDF has such a value": plausibility.implausibility(
                 d33["value"], units_checked=self.problem.lines.campaign.units_checked
             )
@@ -365,6 +364,17 @@ class Facts:
         shifts = () if why_not else diagnosis.shifts
         hidden = [shift for shift in shifts if abs(shift.log_factor) > half_width]
         return StatedD33(d33, hidden, why_not, diagnosis.skin_d33_pc_per_n)
+
+    @cached_property
+    def _by_other_sensors(self) -> str:
+        """What d33 is by the other of two groups of sensors, either of which may be right; empty without groups."""
+        for finding in self.diagnosis.findings:
+            if finding.reason == Reason.TWO_GROUPS:
+                lower, higher, factor = (finding.arguments[name] for name in ("lower", "higher", "factor"))
+                is_lower = len(lower) >= len(higher)  # of the two that d33 is taken from
+                times, others = (factor, higher) if is_lower else (1 / factor, lower)
+                return f"by the sensors {listed(others)} it is {times:.3g} times that"
+        return ""
 
     def _holds_for_all(self, *reasons: Reason) -> bool:
         """Whether a finding for one of the reasons affects all recordings."""

@@ -10,10 +10,11 @@ from typing import Any
 
 from underskin.diagnosis.data.names import EXPLAINED, MOST_QUOTED, NAMED, in_words, quantity_in_words
 from underskin.diagnosis.reporting.numbers import is_known
+from underskin.diagnosis.reporting.page_styles import with_minus
 from underskin.diagnosis.reporting.statement import SLIPS
-from underskin.diagnosis.reporting.wording import finding, in_its_unit, number, readable, unit
+from underskin.diagnosis.reporting.wording import finding, in_its_unit, readable, unit
 from underskin.findings.codes import FindingCode
-from underskin.findings.formatting import capital, in_percent
+from underskin.findings.formatting import capital, in_percent, significant
 from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 
 WORDS = 20  # read at a glance
@@ -85,11 +86,11 @@ def _answers(report: Document) -> Iterator[str]:
     elif verdict == "no_mismatch":
         rivals = [_named(rival["mechanisms"]) for rival in _rivals(report)]
         if (report["probability"] or 0.0) < EXPLAINED and rivals:
-            yield f"nothing may be missing ({probability}), or {' or '.join(rivals)}"
+            yield f"perhaps nothing is missing ({probability}), or {' or '.join(rivals)}"
         yield (
             "nothing is missing"
             if (report["probability"] or 0.0) >= EXPLAINED
-            else f"nothing may be missing ({probability})"
+            else f"perhaps nothing is missing ({probability})"
         )
     elif verdict == "unexplained":
         law = report.get("unnamed")
@@ -139,7 +140,10 @@ def _with_strength(mechanism: Document) -> str:
 def _value(parameter: Document) -> str:
     parameter = in_its_unit(parameter)
     called = quantity_in_words(parameter["name"])
-    value, low, high = (number(parameter[end], digits=3) for end in ("value", "low", "high"))
+    ends = [parameter[end] for end in ("value", "low", "high")]
+    # As many digits as tell the interval's ends apart
+    digits = next((most for most in range(3, 7) if significant(ends[1], most) != significant(ends[2], most)), 3)
+    value, low, high = (with_minus(significant(end, digits)) for end in ends)
     size = f"{value} {unit(parameter['unit'])}".rstrip()
     if parameter.get("at_bound"):
         return f"{called} at or beyond {size}"

@@ -64,12 +64,12 @@ def statement(facts: Facts) -> str:
     slips = [words for words in slips if words]
     decides = [*(contradiction["statement"] for contradiction in facts.contradictions), *slips]
     apart = bool(decides)
-    # A mechanism that was not tried may be what is missing: that comes first
     of_tried = verdict == "unexplained" and bool(facts.untried)
-    decides += facts.untried if of_tried else []
     doubts = (*facts.bounds, *facts.doubts) if verdict == "ambiguous" else ()
     reserves = [finding for finding in facts.findings if finding["statement"] not in doubts]
-    open_questions = [*_clauses(reserves, _RESERVES), *([] if of_tried else facts.untried)]
+    open_questions = [*_clauses(reserves, _RESERVES), *facts.untried]
+    if of_tried:  # first, since a mechanism that was not tried may be what is missing
+        open_questions = [*facts.untried, *_clauses(reserves, _RESERVES)]
     quoted = [
         kinds.moduli_clause(facts.joined, facts.by_kind),
         _depths_clause(facts),
@@ -78,7 +78,7 @@ def statement(facts: Facts) -> str:
     ]
     model, of_curves = SIMPLEST[facts.problem.kind], "youngs_modulus" in fit["before"]
     if facts.leading is not None and facts.law is not None:
-        which = "none of the other mechanisms" if of_tried else "no known mechanism"
+        which = "none of the mechanisms that were tried" if of_tried else "no known mechanism"
         first = f"{which} describes this (probability {in_percent(facts.leader.probability)})"
         second, further = _law_clauses(facts, facts.leading, facts.law)
         last = [*further, _misfit_clause(fit, model, "this law") if of_curves else "", *quoted]
