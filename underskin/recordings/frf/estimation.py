@@ -265,40 +265,15 @@ def broadband(
     window: str = "hann",
     estimator: Estimator = "H1",
 ) -> Frf:
-    """The FRF of a broadband force: Welch's average over blocks.
+    """The FRF of a broadband force: Welch's average over blocks, at the multiples of sample_rate/block_samples.
 
-    The straight line through each block (preload, DC and drift) is removed. The lines at 0 Hz and at half the sample
-    rate, which carry no phase, are left out, as are blocks with a defect. A lag between the signals, which would lower
-    H1, is removed first and restored in the phase, where that raises γ².
+    Parameters and errors are those of `estimate`; a block has 8 samples to all of the series, without `block_samples`
+    1/8 of it; the next one has the share `overlap`, less than 1, in common with it. The straight line through each
+    block (preload, DC and drift) is removed, and the `window` applied, a name of `scipy.signal.get_window`. The lines
+    at 0 Hz and at half the sample rate, which carry no phase, are left out, as are blocks with a defect. A lag between
+    the signals, which would lower H1, is removed first and restored in the phase, where that raises γ².
 
-    Parameters
-    ----------
-    force, charge : (samples,) arrays
-        Time series [N], [C], of one length.
-    sample_rate : float
-        [Hz].
-    block_samples : int, optional
-        Length of a block, 8 to the length of the series; without it 1/8 of that.
-    overlap : float
-        Share of a block that the next one has in common with it, 0 or greater and less than 1.
-    window : str
-        Taper of a block, a name of `scipy.signal.get_window`.
-    estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see `estimators`.
-
-    Returns
-    -------
-    Frf
-        At the multiples of sample_rate/block_samples.
-
-    Raises
-    ------
-    InvalidInput
-        No undamaged block is left, or the series do not make a block.
-
-    Source
-    ------
-    Welch 1967; Bendat and Piersol, Random Data, chapters 5 and 9.
+    Source: Welch 1967; Bendat and Piersol, Random Data, chapters 5 and 9.
     """
     _check(force, charge, sample_rate)
     size = block_samples or max(8, 2 * len(force) // (_BLOCKS + 1))
@@ -306,9 +281,7 @@ def broadband(
         raise out_of_range("block_samples", size, f"must be 8 to {len(force)}, the length of the signals")
     if not 0 <= overlap < 1:
         raise out_of_range("overlap", overlap, "must be 0 or greater and less than 1")
-    step = max(1, round(size * (1 - overlap)))
-    taper = _taper(window, size)
-    blocks = Blocks(taper, step, slice(1, (size + 1) // 2), without_line)
+    blocks = Blocks(_taper(window, size), max(1, round(size * (1 - overlap))), slice(1, (size + 1) // 2), without_line)
     frf = replace(averaged(force, charge, sample_rate, blocks, estimator), independent=False)
     lag = lag_between(force, charge, size)
     if not lag:
@@ -341,65 +314,28 @@ def _as_recorded(aligned: Frf, lag: int, sample_rate: float) -> Frf:
 
 
 def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
-    """The FRF of a periodic force: the average over all pairs of consecutive periods.
+    """The FRF of a periodic force: the average over all pairs of consecutive periods T.
 
-    With Hann's window over two periods T the lines at the multiples of 1/T are free of leakage.
+    With Hann's window over two of them the lines at the multiples of 1/T are free of leakage; those below half the
+    sample rate are given. Parameters are those of `estimate`; raises InvalidInput, also where the force has no period,
+    or no two undamaged periods in a row are left.
 
-    Parameters
-    ----------
-    force, charge : (samples,) arrays
-        Time series [N], [C], of one length.
-    sample_rate : float
-        [Hz].
-    estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see `estimators`.
-
-    Returns
-    -------
-    Frf
-        At the multiples of 1/T below half the sample rate.
-
-    Raises
-    ------
-    InvalidInput
-        The force has no period, or no two undamaged periods in a row are left.
-
-    Source
-    ------
-    Pintelon and Schoukens, System Identification, 2012, chapter 2.
+    Source: Pintelon and Schoukens, System Identification, 2012, chapter 2.
     """
     _check(force, charge, sample_rate)
     period = period_of(force)
     if not period:
         raise unusable("force_n", f"{len(force)} samples", "must repeat itself at least four times")
-    taper = _taper("hann", 2 * period)
-    blocks = Blocks(taper, period, slice(2, period, 2), without_drift)
+    blocks = Blocks(_taper("hann", 2 * period), period, slice(2, period, 2), without_drift)
     return averaged(force, charge, sample_rate, blocks, estimator)
 
 
 def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
     """The FRF of a stepped-sine force: synchronous demodulation of each tone that the force dwells on.
 
-    Least squares on sine, cosine, DC and drift; a few whole cycles are one block of the average.
-
-    Parameters
-    ----------
-    force, charge : (samples,) arrays
-        Time series [N], [C], of one length.
-    sample_rate : float
-        [Hz].
-    estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see `estimators`.
-
-    Returns
-    -------
-    Frf
-        One line for each tone, in order of frequency.
-
-    Raises
-    ------
-    InvalidInput
-        The force dwells on no tone, or no cycle is undamaged.
+    Least squares on sine, cosine, DC and drift; a few whole cycles are one block of the average. There is one line for
+    each tone, in order of frequency. Parameters are those of `estimate`; raises InvalidInput, also where the force
+    dwells on no tone, or no cycle is undamaged.
     """
     _check(force, charge, sample_rate)
     steps = find_steps(force, sample_rate)
