@@ -31,7 +31,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
-from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
+from underskin.inversion.mixed_model import ROBUST, Estimate, LevelRows, MixedModel
 from underskin.inversion.noted_conditions import NotedConditions, noted_conditions
 from underskin.inversion.sensor_flags import (
     ENOUGH,
@@ -322,14 +322,7 @@ class Inversion:
     @property
     def absolute_d33(self) -> Estimate | None:
         """`campaign_d33` with the tolerances of the declared skin, independent of the scatter."""
-        relative = self.campaign_d33
-        if relative is None:
-            return None
-        off = abs(relative.value) * self.declared_percent / 100
-        half = SDS_OF_95 * off
-        low = relative.value - np.hypot(relative.value - relative.low, half)
-        high = relative.value + np.hypot(relative.high - relative.value, half)
-        return Estimate(relative.value, np.hypot(relative.uncertainty, off), low, high)
+        return None if self.campaign_d33 is None else self.campaign_d33.wider(self.declared_percent / 100)
 
     def wider(self, relative: float) -> "Inversion":
         """With a further relative uncertainty common to all its d33."""
