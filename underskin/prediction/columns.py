@@ -8,7 +8,7 @@ import csv
 import io
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -85,16 +85,22 @@ class CsvError(ValueError):
 @dataclass(frozen=True)
 class CsvColumn:
     """One column: its heading as written, the cells, the lines of the text on which they stand (from 1), the factor to
-    the unit of its field, and the decimal mark."""
+    the unit of its field, and the decimal mark; of the magnitude of an FRF, whose real part is taken, its `phase`."""
 
     heading: str
     cells: Sequence[str]
     lines: Sequence[int]
     factor: float
     decimal: str
+    phase: "CsvColumn | None" = None
 
     def numbers(self, field: str) -> list[float]:
-        """Its values in the field's unit; raises InvalidInput that names the field, the row and the line."""
+        """Its values in the field's unit; raises InvalidInput that names the field, or magnitude or phase, the row and
+        the line."""
+        if self.phase is not None:
+            magnitude = replace(self, phase=None).numbers(MAGNITUDE)
+            phase = self.phase.numbers(self.phase.heading)
+            return [size * math.cos(angle) for size, angle in zip(magnitude, phase, strict=True)]
         values = [_number(cell, self.decimal) for cell in self.cells]
         if None in values:
             raise self._refused(field, [row for row, value in enumerate(values) if value is None])
@@ -109,34 +115,11 @@ class CsvColumn:
 
 
 @dataclass(frozen=True)
-class RealPart:
-    """The real part of an FRF in columns of its magnitude [pC/N] and its phase [rad]."""
-
-    magnitude: CsvColumn
-    phase: CsvColumn
-
-    @property
-    def heading(self) -> str:
-        """Both headings as written."""
-        return f"{self.magnitude.heading}, {self.phase.heading}"
-
-    @property
-    def cells(self) -> Sequence[str]:
-        """The cells of the magnitude."""
-        return self.magnitude.cells
-
-    def numbers(self, _field: str) -> list[float]:
-        """Its values in pC/N; raises InvalidInput that names magnitude or phase, the row and the line."""
-        polar = zip(self.magnitude.numbers(MAGNITUDE), self.phase.numbers(self.phase.heading), strict=True)
-        return [size * math.cos(angle) for size, angle in polar]
-
-
-@dataclass(frozen=True)
 class CsvColumns:
     """The columns by field; by heading, the cells of `unknown` columns, which hold numbers and name no field, and of
     `labels`, which only label rows; `notes`: what was left out or interpreted."""
 
-    fields: dict[str, CsvColumn | RealPart]
+    fields: dict[str, CsvColumn]
     unknown: dict[str, list[str]]
     labels: dict[str, list[str]]
     notes: list[str]
@@ -215,12 +198,13 @@ def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -
     return factor
 
 
-def _real_part(parts: Mapping[str, CsvColumn]) -> RealPart:
+def _real_part(parts: Mapping[str, CsvColumn]) -> CsvColumn:
     """The real part from magnitude and phase; raises CsvError where one is missing."""
     if len(parts) == 1:
         ((field, column),) = parts.items()
         raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {template_columns.lacking(field)}")
-    return RealPart(parts[MAGNITUDE], parts[PHASE])
+    heading = f"{parts[MAGNITUDE].heading}, {parts[PHASE].heading}"
+    return replace(parts[MAGNITUDE], heading=heading, phase=parts[PHASE])
 
 
 def _table(data: bytes) -> _Table:
