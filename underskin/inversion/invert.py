@@ -20,7 +20,7 @@ the array's d33. Findings are used.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -58,7 +58,7 @@ from underskin.prediction.pressed_skin import (
 )
 from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
-from underskin.recordings.frf.estimation import exchanged_channels, lines_of
+from underskin.recordings.frf.estimation import exchanged_channels
 from underskin.recordings.frf.flat_zone import (
     FlatZone,
     RollOff,
@@ -68,7 +68,8 @@ from underskin.recordings.frf.flat_zone import (
     roll_off,
     without_chain_phase,
 )
-from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings, usable_lines
+from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings
+from underskin.recordings.frf.series_lines import chosen_lines, of_spoilt
 from underskin.recordings.frf.spectra import Frf, Stack, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
@@ -449,7 +450,7 @@ def _measured(
 ) -> tuple[list[Frf], list[FrfRecording], list[Finding], list[Finding]]:
     """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on those
     that are used: channels that look exchanged although the units were checked, and forces at the mains alone."""
-    frfs, recordings, left_out, findings = [], [], [], []
+    recordings, left_out, findings = list[FrfRecording](), list[Finding](), list[Finding]()
     for recording in recorded:
         exchanged = exchanged_channels(recording)
         if exchanged is not None and units_checked:
@@ -466,18 +467,11 @@ def _measured(
             arguments = {"largest": beyond.largest, "low": beyond.low, "high": beyond.high}
             left_out.append(Finding(Reason.IMPOSSIBLE_RECORDING, recording.id, beyond.field, arguments))
             continue
-        try:
-            frfs.append(lines_of(recording))
-            recordings.append(recording)
-        except InvalidInput as refusal:
-            left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    chosen = dict(zip((recording.id for recording in recordings), usable_lines(frfs), strict=True))
-    for name, mains_hz in [(name, lines.all_spoilt_by_hz) for name, lines in chosen.items() if lines.all_spoilt_by_hz]:
-        left_out.append(Finding(Reason.MAINS_SPOIL_ALL, name, "charge_pc", {"mains_hz": mains_hz}))
-        del chosen[name]
-    for name, defect in [(name, lines.overload) for name, lines in chosen.items() if lines.overload is not None]:
-        left_out.append(Finding(Reason.DEFECT, name, defect.channel, asdict(defect)))
-        del chosen[name]
+        recordings.append(recording)
+    chosen, refused = chosen_lines(recordings, Reason.NO_FRF)
+    spoilt = {name: why for name, lines in chosen.items() if (why := of_spoilt(name, lines)) is not None}
+    left_out += [*refused, *spoilt.values()]
+    chosen = {name: lines for name, lines in chosen.items() if name not in spoilt}
     findings += excited_at_mains(chosen)
     used = [recording for recording in recordings if recording.id in chosen]
     return [lines.frf for lines in chosen.values()], used, left_out, findings
